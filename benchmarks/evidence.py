@@ -168,23 +168,6 @@ def hunting_locked_rig() -> Values:
     return {"edge_hz": min(symmetric["flip"]), "fold_hz": max(symmetric["fold"])}
 
 
-MOVES = 6
-"""Machines whose moves are fitted without their controller."""
-
-
-def identify_without_controller() -> Values:
-    from benchmarks.identify import drawn, identify_moves, moves
-
-    shown = held = 0
-    for seed in range(MOVES):
-        machine = drawn(seed, False)
-        for each in identify_moves(moves(machine), machine.guess.flat(), False).estimates:
-            if each.name.startswith("friction.") and each.determined:
-                shown += 1
-                held += each.holds(machine.flat[each.name])
-    return {"machines": MOVES, "shown": shown, "held": held}
-
-
 def minutes(*arguments: str) -> float:
     """Wall time of a command [min]."""
     begin = time.perf_counter()
@@ -206,7 +189,6 @@ LONG: Mapping[str, Callable[[], Values]] = {
     "rig.constant-speed": rig_constant_speed,
     "rig.slow-cycles": rig_slow_cycles,
     "compare.thesis-rig": compare_thesis_rig,
-    "identify.without-controller": identify_without_controller,
     "guideline.minutes": lambda: {"rough": minutes("guideline", "--samples", "64")},
     "reproduce.minutes": lambda: {"all": minutes("reproduce")},
 }

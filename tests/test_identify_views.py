@@ -17,7 +17,7 @@ from snapshots import Snapshots
 
 from friso.identify.combine import combined
 from friso.identify.errors import SimulationErrors, residual_of
-from friso.identify.estimate import Estimate
+from friso.identify.estimate import NO_INTERVAL, Estimate
 from friso.identify.experiments.break_away import static_from_ramps
 from friso.identify.experiments.constant_speed import FrictionAtSpeeds
 from friso.identify.experiments.moves import IdentifiedMoves, SimulatedLog
@@ -34,6 +34,7 @@ from friso.identify.output_error.fit import OutputErrorFit, first_values
 from friso.identify.output_error.parameters import parameters_of
 from friso.identify.output_error.problem import Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile
+from friso.identify.quality import Quality
 from friso.identify.readings.at_bearing import Between
 from friso.identify.readings.common import deflections, record
 from friso.identify.readings.friction_position import friction_position
@@ -105,7 +106,7 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
         coverage(log["position"], moved, MASS, COULOMB, DT),
         Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
         SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
-        residual_of(residual, moved, DT), loop,
+        residual_of(residual, moved, DT), loop, Quality(0.2, 0.2, 0.2, 0.05, 0.04),
     )  # fmt: skip
     return found, log
 
@@ -268,7 +269,7 @@ def figures(case: tuple[Identification, list[LogFile], list[Prediction]]) -> lis
         (Estimate("delay", "s", 1.17e-3, 0.97e-3, 1.37e-3, ""), "1.17 ms (0.97 to 1.37)"),
         (Estimate("ratio", "1", 0.0768, 0.0701, 0.0835, ""), "0.0768 (0.0701 to 0.0835)"),
         (Estimate("mass", "A s^2/rad", 9.53e9, 9.39e9, 9.67e9, ""), "9.530e+09 A·s²/rad (9.390e+09 to 9.670e+09)"),
-        (Estimate("friction.coulomb", "N", 20.0, 20.0, 20.0, ""), "20.00 N (20.00 to 20.00)"),
+        (Estimate("friction.coulomb", "N", 20.0, 20.0, 20.0, ""), f"not identified ({NO_INTERVAL})"),
         (Estimate("offset", "N", 0.0, -0.001, 0.001, ""), "0.0000 N (-0.0010 to 0.0010)"),
         (Estimate.unknown("friction.static", "N", "", "too fast", 20.0), "not identified (too fast)"),
     ],
@@ -327,10 +328,12 @@ def test_rounding_hides_less_than_a_twentieth_of_half_the_interval(
 
 
 def test_the_headline_says_what_is_identified_and_why_the_rest_is_not(case: tuple, snapshots: Snapshots) -> None:
-    shown, response, volts, lost = (sentence for _, sentence in headline(case[0]))
+    shown, response, volts, lost, ways = (sentence for _, sentence in headline(case[0]))
     for value in ("10.000 kg (9.961 to 10.039)", "8.000 N (7.902 to 8.098)"):
         assert value in shown
     assert WHY in lost
+    for way in ("--as break-away", "friso rig stiction", "--as slow-sliding"):
+        assert way in ways
     assert "1.70" in response
     assert ("--scale" in response, "--scale" in volts) == (False, True)
     snapshots.check("identify", "headline", "\n".join((shown, response, volts, lost)))

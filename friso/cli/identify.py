@@ -69,6 +69,8 @@ def identify(
 ) -> None:
     """A stage file with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.
 
+    The exit status is 1 where a model does not describe its log.
+
     Example: friso identify log.csv --stage stage.toml --map position=ActPos --scale force="35.15 N/V" --out identified
     """
     from friso.identify.logs.mapping import from_options
@@ -91,6 +93,8 @@ def identify(
 
         files = target.write(identify_files(identified, inputs, predictions), progress)
     _answer(identified, inputs, predictions, files, as_json)
+    if identified.failed:
+        raise typer.Exit(1)
 
 
 def _read(paths: list[Path], options: Mapping, target: OutputFolder) -> list[LogFile]:
@@ -185,12 +189,7 @@ def _answer(
         print_wrapped(line)
     named = [file for file in files if file.suffix in (".toml", ".html")]
     print(f"\nwrote {', '.join(map(str, named))}, and {len({file.stem for file in files[len(named) :]})} figures")
-    if identified.stage is None:
-        print(
-            "no stage file: a frequency response or a stiffness alone does not describe a machine; give the rest with "
-            "--stage"
-        )
-    else:
+    if identified.stage is not None:
         print(f"next: friso check {files[0]}{' --draws 1000' if identified.stage.uncertain() else ''}")
 
 

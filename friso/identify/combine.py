@@ -74,7 +74,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
 
 def _weighty(estimates: Sequence[Estimate]) -> list[Estimate]:
     """Those that can be weighted: shown, with an interval."""
-    return [estimate for estimate in estimates if estimate.determined and estimate.half_width > 0]
+    return [estimate for estimate in estimates if estimate.determined]
 
 
 def _weight(estimate: Estimate) -> float:

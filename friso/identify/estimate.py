@@ -8,15 +8,18 @@ import numpy as np
 
 from friso.intervals import COVERAGE
 
+NO_INTERVAL = "how far off it may be is not known"
+"""Why a value whose interval has no width, or no ends, is not determined."""
+
 
 @dataclass(frozen=True)
 class Estimate:
     """A quantity found from data, all numbers in the SI `unit`.
 
     `name` is a key of the stage file ("friction.coulomb") where it is one, else what it is ("resonance 1 frequency").
-    `low` to `high` is the 95 % interval of the `value`. Where the data cannot show the quantity, `value` is NaN,
-    `reason` says why, and `low`, `high` are what is left possible (infinite where nothing is known). `systematic` is
-    the part of the interval's half-width that repeating the experiment does not make smaller.
+    `low` to `high`, finite and apart, is the 95 % interval of the `value`. Where the data cannot show the quantity,
+    `value` is NaN, `reason` says why, and `low`, `high` are what is left possible (infinite where nothing is known).
+    `systematic` is the part of the interval's half-width that repeating the experiment does not make smaller.
     """
 
     name: str
@@ -27,6 +30,13 @@ class Estimate:
     method: str
     reason: str = ""
     systematic: float = 0.0
+
+    def __post_init__(self) -> None:
+        """A value without an interval around it is no estimate: it is not determined then."""
+        if self.reason or (np.isfinite([self.value, self.low, self.high]).all() and self.low < self.high):
+            return
+        for name, end in (("value", np.nan), ("low", -np.inf), ("high", np.inf), ("reason", NO_INTERVAL)):
+            object.__setattr__(self, name, end)
 
     @classmethod
     def normal(cls, name: str, unit: str, value: float, deviation: float, method: str) -> Estimate:

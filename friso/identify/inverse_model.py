@@ -19,7 +19,7 @@ from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import Log
 from friso.identify.readings.common import cart
-from friso.identify.spread import spread_of
+from friso.identify.spread import groups_of, spread_of
 
 SMOOTH, DECIMATE = 5.0, 2.0
 """Cut-off frequencies, in units of the motion's bandwidth, of the filter of the position and of the decimation, which
@@ -52,12 +52,13 @@ METHOD = "least squares on the inverse model"
 @dataclass(frozen=True)
 class InverseModel:
     """The fit: `estimates` and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and
-    "... backward"), the `covariance` of all columns, times [s] and forces [N] of the rows, measured and fitted, of
-    shape (rows,), and the relative `error`, norm of the residual over that of the force. `bandwidth` [Hz] is the
-    motion's."""
+    "... backward"), the `columns`, shape (rows, columns), and their `covariance`, times [s] and forces [N] of the rows,
+    measured and fitted, of shape (rows,), and the relative `error`, norm of the residual over that of the force.
+    `bandwidth` [Hz] is the motion's."""
 
     estimates: tuple[Estimate, ...]
     solution: Mapping[str, float]
+    columns: np.ndarray
     covariance: np.ndarray
     time: np.ndarray
     measured: np.ndarray
@@ -129,10 +130,11 @@ def inverse_model(
         actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
         raise InputError("--bandwidth", actual, expected, '--bandwidth "20 Hz"', log.name)
     parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
-    time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
-    speed = np.abs(columns[:, 1] + columns[:, 3]) if by_direction else np.abs(columns[:, 1])
+    time, columns, force, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    velocity = columns[:, 1] + columns[:, 3] if by_direction else columns[:, 1]
+    speed = np.abs(velocity)
     slides = ~_rests(speed <= SLIDING * speed.max(initial=0.0), time)
-    time, columns, force = time[slides], columns[slides], force[slides]
+    time, columns, force, position, velocity = (rows[slides] for rows in (time, columns, force, position, velocity))
     if len(force) < LEAST:
         actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
         raise InputError("position", actual, f"at least {LEAST} in motion after decimation", "a longer log")
@@ -141,7 +143,7 @@ def inverse_model(
         columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
     solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     fitted = columns @ solution
-    covariance = spread_of(columns, force - fitted)
+    covariance = spread_of(columns, force - fitted, groups_of(position, velocity, columns[:, 0]))
     names = _NAMES[by_direction]
     estimates = tuple(
         _estimate(name, unit, value, variance if both or name != "coulomb" else np.inf)
@@ -151,7 +153,7 @@ def inverse_model(
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
         raise InputError("force", f"a mass of {solution[0]:.3g} kg", expected, '--scale force="-35 N/V"', log.name)
     numbers = dict(zip((name for name, _ in names), map(float, solution), strict=True))
-    return InverseModel(estimates, numbers, covariance, time, force, fitted, band)
+    return InverseModel(estimates, numbers, columns, covariance, time, force, fitted, band)
 
 
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
@@ -183,10 +185,10 @@ _NAMES = {
 
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, columns of the inverse model and forces of a segment, decimated."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times, columns of the inverse model, forces and positions of a segment, decimated."""
     if part.stop - part.start < 2 * EDGE:
-        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]))), np.zeros(0)
+        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]))), np.zeros(0), np.zeros(0)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * band)
     v, a = moved.velocity, moved.acceleration
     carried_position = cart(log) if cart_share else None
@@ -200,8 +202,9 @@ def _rows(
     else:
         columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
     every = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
-    arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part])]
-    return arrays[0][_first(len(arrays[0]), every) :: every], _decimated(arrays[1], every), _decimated(arrays[2], every)
+    arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part], moved.position)]
+    time, position = (array[_first(len(array), every) :: every] for array in (arrays[0], arrays[3]))
+    return time, _decimated(arrays[1], every), _decimated(arrays[2], every), position
 
 
 def _decimated(columns: np.ndarray, every: int) -> np.ndarray:

@@ -92,7 +92,7 @@ def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
 
 def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
     """Those that are shown, with an interval."""
-    return [estimate for estimate in estimates if estimate.determined and estimate.half_width > 0]
+    return [estimate for estimate in estimates if estimate.determined]
 
 
 @dataclass(frozen=True)
@@ -117,8 +117,9 @@ class ExperimentKind(Generic[Result]):
     one event; logs like that count as one log with gaps. `together`: all its logs are realisations of one experiment;
     `responses`: it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody
     said what it is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes`
-    are what the engineer should know of all its results, the stage being given or not. Functions raise InputError for
-    logs that cannot be used."""
+    are what the engineer should know of all its results, the stage being given or not; `doubts` what speaks against
+    believing a result, in sentences, and `failed` whether its analysis failed, whatever of it still holds. Functions
+    raise InputError for logs that cannot be used."""
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
     estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
@@ -133,6 +134,8 @@ class ExperimentKind(Generic[Result]):
     around: Callable[[Log], Stage] | None = None
     notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
     predictor: Predictor[Result] | None = None
+    doubts: Callable[[Result], Sequence[str]] = lambda result: ()
+    failed: Callable[[Result], bool] = lambda result: False
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
         """The roles that a log needs, where these are mapped."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from friso.identify.estimate import Estimate
 from friso.identify.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identify.kinds import KINDS, in_order
 from friso.identify.logs.log import Log
-from friso.identify.stage_file import identified
+from friso.identify.stage_file import identified, origins
 from friso.identify.stage_keys import Fitting, fitting
 from friso.progress import Progress, silent
 from friso.stage import Stage
@@ -33,15 +33,21 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Identification:
-    """The stage with its uncertain keys (None: neither a stage was given, nor a log around which one could be made up),
-    the correlations of these, the experiments behind it, the `estimates` that went into it (one per key), and what the
-    engineer should know (`warnings`)."""
+    """The stage with its uncertain keys (None: neither a stage was given, nor a log around which one could be made up,
+    or nothing was identified), the correlations of these, the experiments behind it, the `estimates` that went into it
+    (one per key), and what the engineer should know (`warnings`).
+
+    `doubts` are sentences that speak against believing it, and `failed` is whether an analysis failed, whatever of it
+    still holds. `origins` says of each key of the stage where it comes from."""
 
     stage: Stage | None
     correlations: Correlations
     experiments: tuple[Experiment, ...]
     estimates: tuple[Estimate, ...]
     warnings: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+    failed: bool = False
+    origins: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -74,8 +80,12 @@ def identify(
         result = KINDS[kind].analyse(group, prior, settings)
         experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
     estimates, warnings = combined(_every_estimate(experiments))
-    if stage is None:
-        return Identification(None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings))
+    doubts = tuple(doubt for experiment in experiments for doubt in KINDS[experiment.kind].doubts(experiment.result))
+    failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
+    if stage is None or (failed and not any(estimate.determined for estimate in estimates)):
+        return Identification(
+            None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings), doubts, failed
+        )
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified(stage, fits.estimates, [log.name for log, _ in logs])
@@ -85,6 +95,9 @@ def identify(
         tuple(experiments),
         tuple(estimates),
         (*warnings, *fits.notes),
+        doubts,
+        failed,
+        origins(whole, fits.estimates, fits.follows, base is not None),
     )
 
 

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from scipy.stats import t as student
+
+from friso.intervals import COVERAGE
 
 LONGEST = 0.1
 """Share of the rows over which errors are looked at for likeness at most."""
+
+BLOCKS, PLACES = 10, 20
+"""Blocks of time, and bins of place and of speed, in which errors may be alike."""
+
+FEWEST = 3.0
+"""Degrees of freedom at least of the scatter between groups, of which some are always much alike: our choice."""
+
+CONFIDENCE = 0.975
+"""Of Student's t at each end of a 95 % interval."""
 
 COLLINEAR = 1e-6
 """Share of the largest eigenvalue below which columns of a Jacobian count as one: differences are no more precise."""
@@ -26,12 +40,32 @@ def correlation_length(residual: np.ndarray) -> int:
     return max(1, round(2 * correlation[:last].sum() - 1))
 
 
-def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def groups_of(position: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Groups in which a motion may make errors alike, of shape (n,) as its position [m], velocity [m/s] and
+    acceleration [m/s^2]: blocks of time, places, and speeds, speeding up and slowing down apart.
+
+    What a model lacks returns with place and speed: a motion that is repeated repeats it, and says nothing new."""
+    return (
+        np.arange(len(position)) * BLOCKS // len(position),
+        _binned(position, PLACES),
+        2 * _binned(velocity, PLACES) + (velocity * acceleration > 0),
+    )
+
+
+def _binned(values: np.ndarray, count: int) -> np.ndarray:
+    """The numbers of the bins, of equal width, that hold the values, shape (n,)."""
+    edges = np.linspace(values.min(), values.max(), count + 1)[1:-1]
+    return np.digitize(values, edges)
+
+
+def spread_of(jacobian: np.ndarray, residual: np.ndarray, groups: Sequence[np.ndarray] = ()) -> np.ndarray:
     """Covariance of the parameters of a fit, shape (p, p), from its Jacobian, shape (n, p), and residual, shape (n,).
 
     Neither equal nor independent errors are assumed: Newey, West 1987, doi:10.2307/1913610, with the window as long as
-    the residuals, or their products with a column, stay correlated. Directions in which the fit does not depend on the
-    parameters have an infinite variance.
+    the residuals, or their products with a column, stay correlated. Errors may besides be alike within each of some
+    `groups` (Cameron, Miller 2015, doi:10.3368/jhr.50.2.317), numbers of shape (n,): a parameter has the largest of the
+    deviations that these give, as large as Student's t of so many groups asks for. Directions in which the fit does not
+    depend on the parameters have an infinite variance.
     """
     count, size = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)
@@ -39,17 +73,41 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     columns = jacobian[:, positive] / scale[positive]
     inverse, alike = _inverse(columns.T @ columns)
     scores = columns * residual[:, None]
+    sandwich = inverse @ _neighbours(scores, residual) @ inverse * count / max(count - size, 1)
+    deviation = np.sqrt(np.diag(sandwich))
+    widest = deviation.copy()
+    for group in groups:
+        widest = np.maximum(widest, np.sqrt(np.diag(inverse @ _together(scores, group) @ inverse)))
+    wider = np.divide(widest, deviation, out=np.ones_like(widest), where=deviation > 0)
+    sandwich = sandwich * np.outer(wider, wider)
+    covariance = np.full((size, size), np.inf)
+    sandwich[alike], sandwich[:, alike] = np.inf, np.inf
+    covariance[np.ix_(positive, positive)] = sandwich / np.outer(scale[positive], scale[positive])
+    return covariance
+
+
+def _neighbours(scores: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """The covariance of the sum of scores, shape (n, p), of which neighbouring ones are alike."""
+    count = len(scores)
     window = max(correlation_length(series) for series in (residual, *scores.T))
     window = min(max(window, 1), max(2, int(LONGEST * count)))
     middle = scores.T @ scores
     for lag in range(1, window):
         shifted = scores[lag:].T @ scores[:-lag]
         middle += (1 - lag / window) * (shifted + shifted.T)
-    sandwich = inverse @ middle @ inverse * count / max(count - size, 1)
-    covariance = np.full((size, size), np.inf)
-    sandwich[alike], sandwich[:, alike] = np.inf, np.inf
-    covariance[np.ix_(positive, positive)] = sandwich / np.outer(scale[positive], scale[positive])
-    return covariance
+    return middle
+
+
+def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """The covariance of the sum of scores, shape (n, p), of which those of a group are alike, for normal intervals of
+    `COVERAGE` deviations; the degrees of freedom are those of as many groups as are equally large."""
+    names, members = np.unique(group, return_inverse=True)
+    sums = np.stack([np.bincount(members, column, len(names)) for column in scores.T], axis=1)
+    power = np.bincount(members, (scores**2).sum(axis=1), len(names))
+    equal = power.sum() ** 2 / (power @ power) if power.any() else 1.0
+    freedom = max(equal - 1, FEWEST)
+    wider = float(student.ppf(CONFIDENCE, freedom)) / COVERAGE
+    return wider**2 * (1 + 1 / freedom) * (sums.T @ sums)
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -19,6 +19,8 @@ BENDING, STRIBECK_VELOCITY = 5e-6, 1e-3
 
 DIGITS = 2
 """Significant digits of an uncertainty, and so of its value."""
+
+NOT_IDENTIFIED = "not identified: all that is possible"
 
 OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
 
@@ -71,6 +73,30 @@ def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str])
             changes[estimate.name] = written(estimate)
     source = f"identified by friso from {', '.join(logs)}"
     return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
+
+
+def origins(stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], from_user: bool) -> dict[str, str]:
+    """Where each key of an identified stage comes from: the estimates that it took, keys that follow another one, and
+    the stage file, or our choice where nothing was given."""
+    known: dict[str, str] = {}
+    for estimate in estimates:
+        known[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
+    known |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
+    rest = "as given" if from_user else "our choice, not identified"
+    tables = {name: table for name, table in stage.given().items() if isinstance(table, dict)}
+    keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
+    return {key: known.get(key, rest) for key in keys}
+
+
+def with_origins(text: str, origins: Mapping[str, str]) -> str:
+    """The text of a stage file with a comment behind each key that says where it comes from."""
+    lines, table = [], ""
+    for line in text.splitlines():
+        key = f"{table}.{line.partition(' = ')[0]}"
+        if line.startswith("["):
+            table = line.strip("[]")
+        lines.append(f"{line}  # {origins[key]}" if key in origins and " = " in line else line)
+    return "\n".join(lines) + "\n"
 
 
 def written(estimate: Estimate) -> str:

@@ -11,20 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from friso import evidence
 from friso.errors import InputError
+from friso.identify.doubts import quality_of
 from friso.identify.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
 from friso.identify.logs.log import Log
+from friso.identify.model_error import all_with_model_error, of_inverse_model
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
 from friso.identify.output_error.fit import OutputErrorFit
 from friso.identify.output_error.identifiable import fit_identifiable
-from friso.identify.output_error.parameters import MASS, keys_of, parameters_of
+from friso.identify.output_error.parameters import MASS, is_free, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking, why_continuous
 from friso.identify.output_error.profile import Profile
+from friso.identify.quality import Quality, noise_of
 from friso.identify.readings.course import Course
 from friso.identify.stage_file import made_up
 from friso.stage import Stage
@@ -53,25 +55,17 @@ class IdentifiedMoves:
     errors: SimulationErrors
     residual: Residual
     loop: Problem | None
+    quality: Quality
 
     @property
     def correlated(self) -> tuple[Estimate, ...]:
         """The estimates that the rows of `correlation` stand for."""
-        return tuple(estimate for estimate in self.estimates if estimate.determined and estimate.half_width > 0)
+        return tuple(estimate for estimate in self.estimates if estimate.determined)
 
     @property
     def flat(self) -> dict[str, Any]:
         """The stage as fitted, as flat keys; what the record does not show is as in the stage given."""
-        return fitted_flat(self.fit)
-
-
-def fitted_flat(fit: OutputErrorFit) -> dict[str, Any]:
-    """The stage of a fit as flat keys."""
-    values = {
-        parameter.name: parameter.outer(inner)
-        for parameter, inner in zip(fit.problem.parameters, fit.inner, strict=True)
-    }
-    return {**fit.problem.flat, **keys_of(fit.problem.flat, values)}
+        return self.fit.stage
 
 
 def identify_moves(
@@ -92,13 +86,20 @@ def identify_moves(
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
-    fit, profiles, identifiable = fit_identifiable(follows, loop, covered, inverse.bandwidth)
-    estimates, correlation = estimates_of(fit, profiles, identifiable, covered)
+    noise = noise_of(log["force"][part])
+    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise)
+    estimates, correlation = estimates_of(answer, covered)
+    fit = answer.fit
+    quality = quality_of(log, inverse, fit, noise, share)
+    if quality.rejected:
+        estimates, correlation = of_inverse_model(inverse, flat, estimates)
+    else:
+        estimates = all_with_model_error(estimates, inverse, flat, quality)
     simulated = (loop or follows).record(fit.inner)
     return IdentifiedMoves(
-        log, part, inverse, by_direction, fit, profiles, estimates, correlation, covered, simulated,
+        log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
         errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
-        residual_of(fit.residual, moved, log.sample_time), loop,
+        residual_of(fit.residual, moved, log.sample_time), loop, quality,
     )  # fmt: skip
 
 
@@ -162,13 +163,9 @@ def _problems(
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
     """The share of the mass that moves with the cart, where that is measured apart from a stage on a free joint."""
-    if not _free(flat) or not ("cart_position" in log or "relative_position" in log):
+    if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
         return 0.0
     return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
-
-
-def _free(flat: Mapping[str, Any]) -> bool:
-    return "joint.stiffness" in flat and not flat["joint.locked"]
 
 
 def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
@@ -177,7 +174,7 @@ def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[st
     It knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free joint whose
     cart is not measured starts at the stage given.
     """
-    if _free(flat) and not _cart_share(log, flat):
+    if is_free(flat) and not _cart_share(log, flat):
         mass = flat["masses.cart"] + flat["masses.stage"]
         return {"mass": mass, "coulomb": flat["friction.coulomb"], "viscous": flat["friction.viscous"], "offset": 0.0}
     levels = {"offset": inverse.value("offset")}
@@ -192,18 +189,13 @@ def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[st
 FEW = 7.0
 """Harmonics, and turns in each period, that moves which are repeated stay below: our choice."""
 
+WITHOUT_CONTROLLER = (
+    "without the machine's own controller the simulated stage follows the logged position; with it (--stage) the "
+    "intervals are narrower, and more is identified"
+)
+
 RESTS = 0.1
 """Share of the time for which the position rests from which on what repeats is taken for moves."""
-
-
-def _without_controller() -> str:
-    """Why the machine's own controller is needed."""
-    covered, reported = (evidence.value("identify.without-controller", name) for name in ("held", "shown"))
-    return (
-        "without the machine's own controller the intervals of friction are too narrow: on randomly drawn machines "
-        f"only {covered:.0f} of {reported:.0f} contained the true value (python -m benchmarks.identify); specify the "
-        "controller with --stage"
-    )
 
 
 def _claims(course: Course) -> str | None:
@@ -238,7 +230,7 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     followed = any(result.loop is None for result in results)
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
-        *([_without_controller()] if followed else []),
+        *([WITHOUT_CONTROLLER] if followed else []),
     ]
 
 
@@ -270,4 +262,6 @@ KIND = ExperimentKind[IdentifiedMoves](
     around=lambda log: made_up(log, inverse_model(log)),
     notes=_notes,
     predictor=Predictor("a log with a reference beside moves", _predict, _check_prediction),
+    doubts=lambda result: result.quality.doubts,
+    failed=lambda result: result.quality.rejected or result.quality.failed,
 )

@@ -9,38 +9,45 @@ import numpy as np
 from friso.identify.estimate import Estimate
 from friso.identify.output_error.coverage import Coverage
 from friso.identify.output_error.fit import OutputErrorFit
-from friso.identify.output_error.identifiable import reason
+from friso.identify.output_error.identifiable import Identified, reason
 from friso.identify.output_error.parameters import MASS, RATIO, SHARE, keys_of
 from friso.identify.output_error.profile import Profile
+from friso.identify.readings.common import LINEARITY
 from friso.intervals import COVERAGE
 
 METHOD = "output error"
 
+MOST = 1.0
+"""Half of a 95 % interval, of the logarithm, from which on a record does not bound a quantity."""
 
-def estimates_of(
-    fit: OutputErrorFit, profiles: Mapping[str, Profile], identifiable: set[str], covered: Coverage
-) -> tuple[tuple[Estimate, ...], np.ndarray]:
+
+def estimates_of(identified: Identified, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The keys of the stage file with their intervals, and the correlation of those shown."""
+    fit = identified.fit
     parameters = fit.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
-    spread[np.ix_(fit.free, fit.free)] = np.where(np.isfinite(fit.covariance), _no_narrower(fit, profiles), 0.0)
+    known = np.isfinite(np.diag(fit.covariance))
+    places = [number for number, finite in zip(fit.free, known, strict=True) if finite]
+    spread[np.ix_(places, places)] = _no_narrower(fit, identified.profiles)[np.ix_(known, known)]
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
-    deviation = np.sqrt(np.diag(covariance))
     values = _keys_at(fit, fit.inner)
-    unknown = _reasons(fit, profiles, identifiable, covered)
+    linear = LINEARITY * np.abs([values[key] for key in keys]) / COVERAGE
+    deviation = np.hypot(np.sqrt(np.diag(covariance)), linear)
+    unknown = _reasons(identified, covered)
     estimates = []
     for i, key in enumerate(keys):
         owner = _OWNERS.get(key, key)
         unit = next((parameter.unit for parameter in parameters if parameter.name in (key, owner)), "")
         unit = "N" if key == "friction.static" else unit
         if key in unknown or owner in unknown:
-            low, high = (-np.inf, np.inf) if key in unknown and owner != key else _range(owner, profiles, values)
+            low, high = (-np.inf, np.inf) if key in unknown and owner != key else _range(fit, owner)
             estimates.append(Estimate.unknown(key, unit, METHOD, unknown.get(key) or unknown[owner], low, high))
         else:
             estimates.append(Estimate.normal(key, unit, values[key], deviation[i], METHOD))
-    certain = [i for i, estimate in enumerate(estimates) if estimate.determined and estimate.half_width > 0]
+    certain = [i for i, estimate in enumerate(estimates) if estimate.determined]
     part = covariance[np.ix_(certain, certain)] / np.outer(deviation[certain], deviation[certain])
+    np.fill_diagonal(part, 1.0)
     return tuple(estimates), (part + part.T) / 2
 
 
@@ -48,19 +55,20 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 """The parameter behind a key that has another name."""
 
 
-def _reasons(
-    fit: OutputErrorFit, profiles: Mapping[str, Profile], identifiable: set[str], covered: Coverage
-) -> dict[str, str]:
+def _reasons(identified: Identified, covered: Coverage) -> dict[str, str]:
     """Why parameters, or keys that hang on them, are not shown."""
+    fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {
         name: reason(name, covered)
         for name, parameter in parameters.items()
-        if name not in identifiable and not parameter.core
+        if name not in identified.shown and not parameter.core
     }
-    for name, parameter in parameters.items():
-        if parameter.core and (profiles[name].open_low or profiles[name].open_high):
-            unknown[name] = "the log does not bound it"
+    for number, deviation in zip(fit.free, np.sqrt(np.diag(fit.covariance)), strict=True):
+        parameter = fit.problem.parameters[number]
+        most = MOST if parameter.logarithmic else (parameter.high - parameter.low) / 2
+        if not COVERAGE * deviation < most:
+            unknown.setdefault(parameter.name, "the log does not bound it")
     if SHARE in unknown:
         why = f"the log shows the sum of both masses, {fit.value(MASS):.4g} kg, not how it is split"
         unknown |= {"masses.cart": why, "masses.stage": why}
@@ -77,9 +85,11 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):
         parameter = fit.problem.parameters[number]
-        interval = profiles[parameter.name]
+        interval = profiles.get(parameter.name)
+        if interval is None or not np.isfinite(spread[i]) or interval.open_low or interval.open_high:
+            continue
         half = float(parameter.inner(interval.high) - parameter.inner(interval.low)) / 2
-        if spread[i] > 0 and not (interval.open_low or interval.open_high):
+        if spread[i] > 0:
             factors[i] = max(1.0, half / (COVERAGE * spread[i]))
     return fit.covariance * np.outer(factors, factors)
 
@@ -99,8 +109,11 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
     return list(at), np.array([[(keys[key] - at[key]) / step for keys in moved] for key in at])
 
 
-def _range(owner: str, profiles: Mapping[str, Profile], values: Mapping[str, float]) -> tuple[float, float]:
-    """What is left possible of a key that is not shown."""
-    low, high = profiles[owner].low, profiles[owner].high
-    scale = values["friction.coulomb"] if owner == RATIO else 1.0
-    return low * scale, high * scale
+def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
+    """What is possible of a key that is not shown: all that is believed of any bearing, since what a fit makes of such
+    a parameter, it makes up for what the model lacks."""
+    parameter = next(one for one in fit.problem.parameters if one.name == owner)
+    if owner != RATIO:
+        return parameter.low, parameter.high
+    coulomb = fit.value("friction.coulomb")
+    return coulomb * parameter.low, coulomb * parameter.high

@@ -1,4 +1,4 @@
-"""The fit: thousands of starts, the best of them refined side by side, and the best of those handed to lmfit."""
+"""The fit: a thousand starts, the best of them refined side by side, and the best of those handed to lmfit."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ import lmfit
 import numpy as np
 from scipy.stats import qmc
 
-from friso.identify.output_error.parameters import FitParameter
+from friso.identify.output_error.parameters import FitParameter, keys_of
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.refine import bounds_of, costs, refine
-from friso.identify.spread import correlation_length, spread_of
+from friso.identify.spread import correlation_length, groups_of, spread_of
 
-STARTS, KEPT = 2048, 6
+STARTS, KEPT = 1024, 6
 """Starts that are simulated, and how many of them are refined."""
 
 NARROW = 0.3
 """Share by which the starts of core parameters are off the inverse model's values, each way."""
 
-SCREENED = 3e7
+SCREENED = 1e7
 """Samples that the starts are simulated over, all together: long records are cut for them."""
 
 ROUGH, FINE = 12, 30
 """Iterations of the refinement of the starts kept, and most evaluations of lmfit times the parameters."""
 
-NEARBY, FAR = 255, 3.0
+NEARBY, FAR = 127, 3.0
 """Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
 hunts has optima of its own, and the fit it starts from is of another problem."""
 
@@ -52,7 +52,14 @@ class OutputErrorFit:
     @property
     def independent(self) -> float:
         """So many independent samples the residual is worth."""
-        return len(self.residual) / correlation_length(self.residual)
+        return max(float(self.problem.counted.sum()), 1.0) / correlation_length(self.residual)
+
+    @property
+    def stage(self) -> dict[str, Any]:
+        """The stage of the fit as flat keys."""
+        parameters = zip(self.problem.parameters, self.inner, strict=True)
+        values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
+        return {**self.problem.flat, **keys_of(self.problem.flat, values)}
 
     def value(self, name: str) -> float:
         """The SI value of a parameter."""
@@ -78,7 +85,7 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErro
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
-    """Thousands of starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
+    """Many starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
     find parameters that not every motion shows."""
     low, high = bounds_of(problem)
     core = np.array([parameter.core for parameter in problem.parameters])
@@ -139,4 +146,7 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Out
     result: Any = lmfit.minimize(residual, parameters, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
     best = numbers(result.params)
     ((rest, slopes),) = problem.jacobians(best[None], mask[None])
-    return OutputErrorFit(problem, best, free, spread_of(slopes, rest), rest)
+    counted = problem.counted > 0
+    velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
+    groups = groups_of(*(signal[counted] for signal in (problem.inputs.reference, velocity, acceleration)))
+    return OutputErrorFit(problem, best, free, spread_of(slopes[counted], rest[counted], groups), rest)

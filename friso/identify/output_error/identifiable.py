@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -20,6 +21,9 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 STEP_OUT = 1.5
 """A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
 
+EXPLAINED = 2.0
+"""A fit that leaves no more than so many times the noise of the record explains it."""
+
 SURE = 0.99
 """Probability that parameters which no motion shows one by one improve the fit all the same."""
 
@@ -27,39 +31,78 @@ SHARP = 3.0
 """Factor between the ends of a profile interval within which a parameter counts as shown."""
 
 
-def fit_identifiable(
-    follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float
-) -> tuple[OutputErrorFit, dict[str, Profile], set[str]]:
-    """The fit, the profile of every parameter, and which of those that not every motion shows it does show; `bandwidth`
-    [Hz] is that of the motion.
+@dataclass(frozen=True)
+class Identified:
+    """The fit, profiles by name of the parameters that not every motion shows, where they were asked about, and which
+    of these the record does show."""
 
-    Which they are is decided by the stage that follows the log, since a closed loop that hunts soon gets out of step;
-    the loop then has the last word, unless it cannot follow. Where the fit is clearly better with those that are not
-    shown it keeps them: their effect is there, and without it friction and mass would have to explain it."""
-    parameters = follows.parameters
-    names = [parameter.name for parameter in parameters]
-    core = {parameter.name for parameter in parameters if parameter.core}
-    optional = {*names} - core
-    plain = fit(follows, _numbers(names, core), first_values(parameters)[None])
-    hopeful = {name for name in optional if _may_show(name, covered, follows)}
-    identifiable: set[str] = set()
-    best = plain
-    if hopeful:
-        every = _numbers(names, core | hopeful)
-        full = fit(follows, every, everywhere(follows, every, plain.inner))
-        identifiable = _complete({name for name in hopeful if _shows(full, names.index(name), covered)}, optional)
-        fitted = hopeful if _pays(full, plain) else identifiable
-        free = _numbers(names, core | fitted)
-        neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
-        best = full if fitted == hopeful else fit(follows, free, neutral[None]) if identifiable else plain
+    fit: OutputErrorFit
+    profiles: Mapping[str, Profile]
+    shown: frozenset[str]
+
+
+def fit_identifiable(
+    follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float, noise: float
+) -> Identified:
+    """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
+
+    A closed loop that explains the record to its noise has the first and last word. Otherwise the stage that follows
+    the log decides which parameters are shown, since a loop that hunts soon gets out of step, and the loop is fitted
+    from there, unless it cannot follow. Where the fit is clearly better with those that are not shown it keeps them:
+    their effect is there, and without it friction and mass would have to explain it."""
+    names = [parameter.name for parameter in follows.parameters]
+    core = {parameter.name for parameter in follows.parameters if parameter.core}
+    plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None])
     if loop is not None:
-        starts = nearby(best)
-        if set(best.free) - set(_numbers(names, core)):
-            starts = np.vstack([starts, everywhere(loop, best.free, plain.inner)])
-        looped = fit(loop, best.free, starts)
-        best = looped if _in_step(looped, best, bandwidth) else best
-    profiles = {name: profile(best, i, _others(names, i, best.free), best.cost) for i, name in enumerate(names)}
-    return best, profiles, identifiable
+        every = tuple(range(len(names)))
+        full = fit(loop, every, np.vstack([nearby(plain), everywhere(loop, every, plain.inner)]))
+        if explains(full, noise):
+            return _believed(full, core, covered, explained=True)
+    along = _along(follows, plain, core, covered)
+    if loop is None:
+        return along
+    starts = nearby(along.fit)
+    if set(along.fit.free) - set(_numbers(names, core)):
+        starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
+    looped = fit(loop, along.fit.free, starts)
+    return replace(along, fit=looped) if _in_step(looped, along.fit, bandwidth) else along
+
+
+def explains(fit: OutputErrorFit, noise: float) -> bool:
+    """Whether a fit in the machine's own loop leaves little more than the noise [N] of the record."""
+    return bool(fit.problem.closed and np.sqrt(fit.cost) < EXPLAINED * noise)
+
+
+def _along(follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage) -> Identified:
+    """What the stage that follows the log shows."""
+    names = [parameter.name for parameter in follows.parameters]
+    hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
+    if not hopeful:
+        return Identified(plain, {}, frozenset())
+    every = _numbers(names, core | hopeful)
+    full = fit(follows, every, everywhere(follows, every, plain.inner))
+    believed = _believed(full, core, covered)
+    if _pays(full, plain) or believed.shown == hopeful:
+        return believed
+    if not believed.shown:
+        return replace(believed, fit=plain)
+    free = _numbers(names, core | believed.shown)
+    neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
+    return replace(believed, fit=fit(follows, free, neutral[None]))
+
+
+def _believed(full: OutputErrorFit, core: set[str], covered: Coverage, explained: bool = False) -> Identified:
+    """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
+    wherever its profiles are sharp."""
+    names = [parameter.name for parameter in full.problem.parameters]
+    asked = [i for i in full.free if names[i] not in core]
+    profiles = {
+        names[i]: profile(full, i, tuple(other for other in full.free if other != i), full.cost) for i in asked
+    }
+    shown = {
+        name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
+    }
+    return Identified(full, profiles, frozenset(_complete(shown, {*names} - core)))
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
@@ -86,12 +129,6 @@ def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
     return identifiable if effect <= identifiable else identifiable - effect
 
 
-def _others(names: Sequence[str], number: int, free: Sequence[int]) -> tuple[int, ...]:
-    """The parameters that follow one that is moved: those fitted, and the one with which it makes a pair."""
-    pair = next((pair for pair in (STRIBECK, BRISTLES) if names[number] in pair), ())
-    return tuple(i for i, name in enumerate(names) if i != number and (i in free or name in pair))
-
-
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     """Whether the motion covers anything that the parameter could show itself in."""
     parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
@@ -102,20 +139,20 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     return parameter.unit != "" or name == SHARE
 
 
-def _shows(full: OutputErrorFit, number: int, covered: Coverage) -> bool:
-    """Whether a parameter has a sharp, closed interval, and the motion covers where it acts."""
-    parameter = full.problem.parameters[number]
-    others = tuple(i for i in full.free if i != number)
-    interval = profile(full, number, others, full.cost)
-    sharp = not (interval.open_low or interval.open_high) and (
-        not parameter.logarithmic or interval.high < SHARP * interval.low
-    )
-    if parameter.name in STRIBECK:
-        return sharp and covered.shows_speed(full.value("friction.stribeck_velocity"))
-    if parameter.name in BRISTLES:
-        length = full.value("friction.coulomb") / full.value("friction.bristle_stiffness")
-        return sharp and covered.shows_length(length)
-    return sharp
+def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
+    """Whether a profile closes on both sides, and near by."""
+    parameter = next(one for one in full.problem.parameters if one.name == seen.name)
+    closed = not (seen.open_low or seen.open_high)
+    return closed and (not parameter.logarithmic or seen.high < SHARP * seen.low)
+
+
+def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
+    """Whether the motion covers where a parameter acts."""
+    if name in STRIBECK:
+        return covered.shows_speed(full.value("friction.stribeck_velocity"))
+    if name in BRISTLES:
+        return covered.shows_length(full.value("friction.coulomb") / full.value("friction.bristle_stiffness"))
+    return True
 
 
 def reason(name: str, covered: Coverage) -> str:

@@ -47,6 +47,11 @@ class FitParameter:
         return np.exp(inner) if self.logarithmic else inner
 
 
+def is_free(flat: Mapping[str, Any]) -> bool:
+    """Whether a stage given as flat keys has a joint that moves."""
+    return "joint.stiffness" in flat and not flat["joint.locked"]
+
+
 def parameters_of(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
@@ -67,7 +72,7 @@ def parameters_of(
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
     if both_ways:
         parameters.append(FitParameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
-    if "joint.stiffness" in flat and not flat["joint.locked"]:
+    if is_free(flat):
         k, d = flat["joint.stiffness"], max(flat["joint.damping"], 1e-3)
         share = flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
         parameters += [
@@ -84,7 +89,7 @@ def _friction(
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     parameters = [
         FitParameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
-        FitParameter("friction.viscous", "N*s/m", viscous, viscous / 1e3, viscous * 20),
+        FitParameter("friction.viscous", "N*s/m", viscous, 0.0, 20 * max(viscous, coulomb / speed), logarithmic=False),
     ]
     if "friction.stribeck_velocity" in flat:
         if both_ways:

@@ -8,17 +8,19 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from friso.engine.arrays import Status
 from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
-from friso.equations.controllers.pid_gains import proportional_derivative
+from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
 from friso.equations.driven import Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.parameters import MASS, FitParameter, stages
+from friso.identify.readings.common import robust
 from friso.stage.controllers import CONTROLLER
 
 STEP = 1e-4
@@ -34,6 +36,15 @@ SLOW = 10.0
 
 FIRST = 10
 """Samples from which the velocity at the beginning is taken."""
+
+REST, STILL = 0.1, 20.0
+"""A stage rests where it goes less than so many standard deviations of the position's noise in this time [s]."""
+
+SETTLED = 3.0
+"""Time constants of the controller that holds a stage to a log, after which it has forgotten where that stood."""
+
+PASSES = 5 / 8
+"""Noise bandwidth [Hz] of a critically damped second-order loop, in units of its natural frequency [rad/s]."""
 
 SAME = 1e-3
 """Share by which the sample time of the log and that of the drive may differ to count as one."""
@@ -56,7 +67,7 @@ class Problem:
     In a `closed` loop the stage has the controller of its machine and follows the log's reference; the target is
     the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
     own whose target is zero: what it has to add is what the model does not explain. `start` holds position
-    [m] and velocity [m/s] at the beginning.
+    [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the fit leaves out.
     """
 
     flat: Mapping[str, Any]
@@ -66,15 +77,25 @@ class Problem:
     parameters: tuple[FitParameter, ...]
     closed: bool
     start: tuple[float, float]
+    counted: np.ndarray
 
     @cached_property
     def kernel(self) -> Kernel:
         return kernel(self.form)
 
+    @property
+    def passes(self) -> float:
+        """The share of the noise of the log's force, RMS, that the residual holds: all of it in closed loop, and of a
+        stage that is held to the log what the controller that holds it, (2 w s + w^2) / (s + w)^2, lets through."""
+        if self.closed:
+            return 1.0
+        omega = 2 * self.flat[KP] / self.flat[KD]
+        return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
+
     def beginning(self, count: int) -> Problem:
         """The same with the first so many samples alone."""
         inputs = replace(self.inputs, reference=self.inputs.reference[:count], force=self.inputs.force[:count])
-        return replace(self, inputs=inputs, target=self.target[:count])
+        return replace(self, inputs=inputs, target=self.target[:count], counted=self.counted[:count])
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
@@ -89,10 +110,11 @@ class Problem:
         return Simulated(record.position[0], record.velocity[0], record.force[0])
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
-        """Wanted minus simulated force [N], shape (runs, n); infinite for runs that failed."""
+        """Wanted minus simulated force [N], shape (runs, n), 0 where it does not count; infinite for runs that
+        failed."""
         residuals = np.empty((len(inner), len(self.target)))
         for numbers, record in self.simulated(inner):
-            residuals[numbers] = self.target - record.force
+            residuals[numbers] = (self.target - record.force) * self.counted
         return np.where(np.isfinite(residuals), residuals, np.inf)
 
     def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -137,6 +159,8 @@ class Problem:
     def _force(self, flat: Mapping[str, Any], runs: Followed) -> np.ndarray:
         """The force of a controller in continuous time, from the states at the samples."""
         count = runs.states.shape[1]
+        if not self.closed:
+            return self._holding_force(runs)
         part = {key: value[runs.numbers] if np.ndim(value) else value for key, value in flat.items()}
         part |= {"motion.size": np.nan, "motion.duration": np.nan}
         values = [np.asarray(value)[:, None] for value in self.kernel.values(part, len(runs.numbers))]
@@ -145,6 +169,15 @@ class Problem:
         modes = self.kernel.modes(states, 0.0, reference, values)
         outputs = self.kernel.module.outputs(states, modes, 0.0, reference, values)
         return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
+
+    def _holding_force(self, runs: Followed) -> np.ndarray:
+        """The force [N] of the controller that holds a stage to a log (`tracking`), shape (runs, n)."""
+        rows = self.inputs.segments[0, : runs.states.shape[1]]
+        off, slip = (
+            rows[:, column] - runs.states[:, :, place]
+            for column, place in ((1, self.kernel.position), (2, self.kernel.velocity))
+        )
+        return self.flat[KP] * off + self.flat[KD] * slip
 
 
 def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
@@ -161,6 +194,7 @@ def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequ
         tuple(parameters),
         True,
         _start(log, part),
+        np.ones(count),
     )
 
 
@@ -198,7 +232,25 @@ def tracking(
         tuple(parameters),
         False,
         _start(log, part),
+        _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega),
     )
+
+
+def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:
+    """1 where a motion, shape (n,) [m], moves, and 0 where it rests.
+
+    A stage that sticks does so within micrometres of the log, and the controller that holds it to the log then shows
+    that distance instead of a force: rests do not count, nor does the time `settling` [s] after each of them and after
+    the beginning."""
+    window = max(3, round(REST / sample_time))
+    way = maximum_filter1d(position, window) - minimum_filter1d(position, window)
+    steps = np.abs(np.diff(position))
+    digit = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
+    resting = way <= STILL * max(robust(position - smooth), digit / np.sqrt(12))
+    resting[0] = True
+    late = round(settling / sample_time)
+    recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
+    return np.where(recent, 0.0, 1.0)
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:

@@ -22,9 +22,6 @@ WIDER = 5.0
 ROUNDS = 3
 """Iterations of each of these fits."""
 
-SPOTS = (0.05, 0.95)
-"""Places in the range of a parameter that is not fitted from where it follows one that is moved."""
-
 WORSE = float(chi2.ppf(0.95, 1))
 """By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
 
@@ -70,18 +67,12 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
 
 
 def _costs(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
-    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted: the least of those from several
-    starts of the ones that are not part of the fit, whose own values mean nothing."""
-    low, high = bounds_of(fit.problem)
-    spots = [fit.inner]
-    for loose in (i for i in others if i not in fit.free):
-        spots += [np.where(np.arange(len(low)) == loose, low + share * (high - low), fit.inner) for share in SPOTS]
-    starts = np.repeat(np.array(spots), len(values), axis=0)
-    starts[:, number] = np.tile(values, len(spots))
+    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted."""
+    starts = np.repeat(fit.inner[None], len(values), axis=0)
+    starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
-    cost = refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
-    return cost.reshape(len(spots), len(values)).min(axis=0)
+    return refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:

@@ -37,7 +37,7 @@ def costs(problem: Problem, inner: np.ndarray) -> np.ndarray:
     """Mean squares of the residuals [N^2], shape (runs,), of fitted numbers of shape (runs, parameters)."""
     costs = np.empty(len(inner))
     for numbers, record in problem.simulated(inner):
-        costs[numbers] = np.mean((problem.target - record.force) ** 2, axis=1)
+        costs[numbers] = np.mean(((problem.target - record.force) * problem.counted) ** 2, axis=1)
     return np.where(np.isfinite(costs), costs, np.inf)
 
 

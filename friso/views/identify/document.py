@@ -29,6 +29,8 @@ def identify_document(
             {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
             for prediction in predictions
         ],
+        "failed": identification.failed,
+        "doubts": list(identification.doubts),
         "warnings": list(identification.warnings),
     }
     return plain_json(document)

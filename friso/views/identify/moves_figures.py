@@ -10,6 +10,7 @@ from friso.identify.logs.log import Log
 from friso.identify.output_error.parameters import FitParameter
 from friso.identify.output_error.problem import Simulated
 from friso.identify.output_error.profile import Profile
+from friso.identify.quality import steady_friction
 from friso.identify.readings.common import cart, on_bearing
 from friso.views.drawing.figure import (
     BLUE,
@@ -44,7 +45,7 @@ def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
     flat = moves.fit.problem.flat
     apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
     friction = [_friction(moves, name)] if not apart or cart(moves.log) is not None else []
-    return [_traces(moves, name), _residual(moves, name), *friction, _profiles(moves, name)]
+    return [_traces(moves, name), _residual(moves, name), *friction, *_profiles(moves, name)]
 
 
 def _traces(moves: IdentifiedMoves, name: str) -> Figure:
@@ -131,25 +132,13 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     return Figure(f"{name}_friction", "Friction over velocity", caption, (panel,))
 
 
-def steady_friction(flat: dict, speeds: Array) -> Array:
-    """Friction [N] of a stage as flat keys at steady velocities [m/s], any shape, less its constant force."""
-    size = np.abs(speeds)
-    coulomb, viscous = flat.get("friction.coulomb", 0.0), flat.get("friction.viscous", 0.0)
-    rise = flat.get("friction.static", coulomb) - coulomb
-    falls = np.exp(
-        -((size / flat.get("friction.stribeck_velocity", 1.0)) ** flat.get("friction.stribeck_exponent", 2.0))
-    )
-    sign = np.sign(speeds)
-    skew = 1 + sign * flat.get("friction.viscous_asymmetry", 0.0)
-    constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
-    return sign * (coulomb + rise * falls) + viscous * skew * speeds - constant
-
-
-def _profiles(moves: IdentifiedMoves, name: str) -> Figure:
+def _profiles(moves: IdentifiedMoves, name: str) -> list[Figure]:
     """How much worse the fit gets as one parameter is moved."""
     best = moves.fit.cost
     parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
     fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
+    if not moves.profiles:
+        return []
     panels = tuple(_profile(profile, parameters[key], best, key in fitted) for key, profile in moves.profiles.items())
     caption = (
         "How much worse the best fit gets with one parameter held and the others refitted; 1 is the end of "
@@ -161,7 +150,7 @@ def _profiles(moves: IdentifiedMoves, name: str) -> Figure:
             " Below 0 the fit is better than the one chosen: the parameter has no effect of its own in this motion and "
             "makes up for other errors of the model."
         )
-    return Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)
+    return [Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)]
 
 
 def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:

@@ -20,6 +20,9 @@ MOST = 4
 LARGE, SMALL = 4, 7
 """Zeros before, and places behind the decimal point, from which on a number has an exponent."""
 
+EXACT = 15
+"""Digits behind the first one that a number has at all."""
+
 FORCES = (1e-2, 1e4)
 """Between these, forces [N], and what is in newtons per something, have no prefix: they are compared with others."""
 
@@ -129,6 +132,7 @@ def _places(estimate: Estimate, factor: float) -> int:
 
 def _written(value: float, factor: float, places: int) -> str:
     if not -LARGE <= places <= SMALL:
-        return f"{value * factor:.{MOST - 1}e}"
+        size = math.floor(math.log10(abs(value * factor))) if value else 0
+        return f"{value * factor:.{max(MOST - 1, min(places + size, EXACT))}e}"
     rounded = round(value * factor, places)
     return f"{rounded + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus before a zero

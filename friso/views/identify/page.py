@@ -7,6 +7,7 @@ from pathlib import Path
 
 from friso.identify.method import Identification, Prediction
 from friso.identify.sources import LogFile
+from friso.identify.stage_file import with_origins
 from friso.stage.correlations import beside, correlations_text
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
@@ -26,7 +27,7 @@ def identify_files(
         correlations = correlations_text(identification.correlations, stage)
     figures = identify_figures(identification, predictions)
     return {
-        STAGE: None if stage is None else stage.to_toml(),
+        STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
         beside(Path(STAGE)).name: correlations,
         "identify.html": identify_html(identification, logs, predictions, figures),
         **pictures(figures),

@@ -28,6 +28,8 @@ NO_STAGE = (
     "identified values replace those in it."
 )
 
+NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
+
 POOR = 0.5
 """Relative error of the force, or of a response, from which on little of another log is predicted."""
 
@@ -56,20 +58,61 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
     """What is identified, and what is not and why; each sentence with its colour."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
+    effects = [estimate for estimate in visible if not _absent(estimate)]
     headlines = [view_of(experiment.kind).headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
-    lines = []
-    if visible:
-        values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in visible)
+    doubts = [(VERMILLION if identification.failed else ORANGE, f"{doubt}.") for doubt in identification.doubts]
+    lines = doubts if identification.failed else []
+    if effects:
+        values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in effects)
         lines.append((GREEN, f"Identified: {values}."))
     elif not headlines:
         lines.append((VERMILLION, "These logs determine no key of the stage file."))
     lines += [(GREEN, sentence) for sentence in headlines]
+    lines += [] if identification.failed else doubts
+    if len(effects) < len(visible):
+        lines.append((GREEN, f"None found: {_none_found(visible)}."))
     if identification.stage is None:
-        lines.append((ORANGE, NO_STAGE))
+        lines.append((ORANGE, NOTHING_HOLDS if identification.failed else NO_STAGE))
     if len(visible) < len(estimates):
         lines.append((ORANGE, f"Not identified: {missing(estimates)}."))
+        lines += [(ORANGE, f"What would show it: {ways}.") for ways in [_ways(estimates)] if ways]
     return lines
+
+
+ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
+"""Keys that are usually 0: an interval that holds that shows no such effect."""
+
+SHOWN_BY = {
+    "masses": "a frequency response (--as frequency; rehearsed by friso rig frf)",
+    "friction.coulomb": "moves in both directions at several speeds",
+    "friction.viscous": "constant speeds (--as constant-speed; rehearsed by friso rig constant-speed)",
+    "friction.static": "force ramps from rest (--as break-away) or slow motion that sticks and slips (--as stick-slip; "
+    "rehearsed by friso rig stiction)",
+    "friction.stribeck_velocity": "slow sliding (--as slow-sliding; rehearsed by friso rig constant-speed)",
+    "friction.bristle_stiffness": "small motion before sliding (--as presliding; rehearsed by friso rig presliding)",
+    "friction.bristle_damping": "small motion before sliding (--as presliding; rehearsed by friso rig presliding)",
+    "joint.stiffness": "steps with the cart fixed (--as steps; rehearsed by friso rig stiffness)",
+}
+"""The experiment that shows a key, or one of a table."""
+
+
+def _absent(estimate: Estimate) -> bool:
+    return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
+
+
+def _none_found(estimates: Sequence[Estimate]) -> str:
+    return ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in estimates if _absent(one))
+
+
+def _ways(estimates: Sequence[Estimate]) -> str:
+    """The experiments that would show what is not identified."""
+    names: dict[str, list[str]] = {}
+    for estimate in estimates:
+        way = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0])
+        if way and not estimate.determined:
+            names.setdefault(way, []).append(within(estimate.name))
+    return "; ".join(f"{', '.join(group)}: {way}" for way, group in names.items())
 
 
 def missing(estimates: Sequence[Estimate]) -> str:

@@ -1,0 +1,68 @@
+"""Why a log may not be described by a mass with friction: a delay, a constant force, a mode in the band."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import welch
+
+from friso.errors import InputError
+from friso.identify.inverse_model import InverseModel, inverse_model
+from friso.identify.logs.log import Log
+
+LAGS = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
+"""Samples by which the force is moved in the search for a delay."""
+
+BETTER = 0.7
+"""Share of the error that is left once a cause is taken away that counts as found."""
+
+PEAK = 0.5
+"""Share of the power of what is left in one peak from which on that counts as an oscillation."""
+
+UNKNOWN = (
+    "a delay, a constant force and a mode in the band were looked for, and none of them explains it: check --scale, "
+    "its sign too, and which channel is which"
+)
+"""What to do where no cause is found."""
+
+
+def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[str]:
+    """What may be wrong with a log that the inverse model does not describe, as far as the log tells."""
+    found = [_delay(log, inverse, cart_share), _constant(inverse), _oscillation(inverse)]
+    named = [sentence for sentence in found if sentence]
+    return named or [UNKNOWN]
+
+
+def _delay(log: Log, inverse: InverseModel, cart_share: float) -> str:
+    """The delay between force and motion that makes the inverse model fit much better, in a sentence, or nothing."""
+    errors = {}
+    for lag in LAGS:
+        moved = replace(log, signals={**log.signals, "force": np.roll(log["force"], lag)})
+        try:
+            errors[lag] = inverse_model(moved, inverse.bandwidth, False, cart_share).error
+        except InputError:
+            continue
+    if not errors or min(errors.values()) > BETTER * inverse.error:
+        return ""
+    lag = min(errors, key=errors.__getitem__)
+    how = "earlier" if lag < 0 else "later"
+    return f"a force {abs(lag) * log.sample_time * 1e3:.3g} ms {how} fits much better: a delay between the channels?"
+
+
+def _constant(inverse: InverseModel) -> str:
+    offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
+    if offset <= max(coulomb, 0.1 * float(np.std(inverse.measured))):
+        return ""
+    return f"a constant force of {inverse.value('offset'):.3g} N is larger than friction: gravity, or an offset?"
+
+
+def _oscillation(inverse: InverseModel) -> str:
+    left = inverse.measured - inverse.fitted
+    step = float(np.median(np.diff(inverse.time)))
+    rates, power = welch(left, 1 / step, nperseg=min(len(left), 256))
+    peak = int(np.argmax(power))
+    share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
+    if share < PEAK or peak == 0:
+        return ""
+    return f"{100 * share:.0f} % of what is left swings at {rates[peak]:.3g} Hz: a mode in the band?"

@@ -1,0 +1,78 @@
+"""What the whole model lacks, in the intervals of its estimates; and the inverse model's estimates in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.inverse_model import InverseModel
+from friso.identify.output_error.parameters import is_free
+from friso.identify.quality import Quality
+
+
+def _of_inverse(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
+    """The quantity of the inverse model behind a key, and the key over it."""
+    bodies = [key for key in ("masses.cart", "masses.stage") if key in flat]
+    total = sum(flat[key] for key in bodies)
+    bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
+    shares = {key: ("mass", flat[key] / total) for key in bodies}
+    return {
+        **shares,
+        "friction.coulomb": ("coulomb", 1.0),
+        "friction.viscous": ("viscous", 1.0),
+        bias: ("offset", -1.0),
+    }
+
+
+def all_with_model_error(
+    estimates: Sequence[Estimate], inverse: InverseModel, flat: Mapping[str, Any], quality: Quality
+) -> tuple[Estimate, ...]:
+    """The estimates of a rigid stage with intervals that allow for what the model lacks."""
+    if is_free(flat):
+        return tuple(estimates)
+    sources, plain = _of_inverse(flat), {estimate.name: estimate for estimate in inverse.estimates}
+    return tuple(
+        with_model_error(estimate, plain[sources[estimate.name][0]], sources[estimate.name][1], quality.lacking)
+        if estimate.name in sources
+        else estimate
+        for estimate in estimates
+    )
+
+
+def of_inverse_model(
+    inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
+) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """What the inverse model shows, where the whole model contradicts the record; all else is not shown."""
+    sources, plain = _of_inverse(flat), {estimate.name: estimate for estimate in inverse.estimates}
+    answers = []
+    for estimate in estimates:
+        name, scale = sources.get(estimate.name, ("", 1.0))
+        if name and not (is_free(flat) and estimate.name.startswith("masses.")):
+            one = plain[name]
+            ends = sorted((scale * one.low, scale * one.high))
+            answers.append(
+                replace(one, name=estimate.name, unit=estimate.unit, value=scale * one.value, low=ends[0], high=ends[1])
+            )
+        else:
+            answers.append(Estimate.unknown(estimate.name, estimate.unit, estimate.method, CONTRADICTED))
+    certain = [answer for answer in answers if answer.determined]
+    return tuple(answers), np.eye(len(certain))
+
+
+CONTRADICTED = "the whole model contradicts the record"
+"""Why nothing but what the inverse model shows is taken from a fit."""
+
+
+def with_model_error(estimate: Estimate, inverse: Estimate, scale: float, lacking: float) -> Estimate:
+    """An estimate of the whole model whose interval allows for what the model lacks: the distance by which it lies
+    outside the interval of the inverse model, times the share of what is left that is not noise. `scale` is the key
+    over the inverse model's quantity."""
+    if not (estimate.determined and inverse.determined):
+        return estimate
+    beyond = abs(estimate.value - scale * inverse.value) - abs(scale) * inverse.half_width
+    more = lacking * max(0.0, beyond)
+    return replace(estimate, low=estimate.low - more, high=estimate.high + more, systematic=estimate.systematic + more)

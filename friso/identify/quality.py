@@ -1,0 +1,98 @@
+"""The quality of a fit of moves: what it leaves unexplained against the noise of the record, and whether inverse model,
+whole model and the halves of the record agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.identify.inverse_model import InverseModel
+from friso.identify.readings.common import NORMAL_MAD
+from friso.identify.spread import spread_of
+
+APART = 3.29
+"""Standard deviations by which the halves of a record differ by chance once in a thousand times."""
+
+
+@dataclass(frozen=True)
+class Quality:
+    """`noise` [N] of the record's force; `left` [N], RMS of what the fit leaves of it where it counts, and what `noise`
+    alone would leave there; relative errors of the force by the inverse model, and on its samples by the steady
+    friction and mass of the whole model; sentences that say what is wrong (`doubts`); whether the whole model was
+    `rejected`, and whether nothing holds (`failed`)."""
+
+    noise: float
+    left: float
+    noise_left: float
+    inverse_error: float
+    whole_error: float
+    doubts: tuple[str, ...] = ()
+    rejected: bool = False
+    failed: bool = False
+
+    @property
+    def ratio(self) -> float:
+        """What is left over what noise alone would leave."""
+        return self.left / self.noise_left if self.noise_left > 0 else np.inf
+
+    @property
+    def lacking(self) -> float:
+        """Share of what is left, RMS, that is not noise: 0 of a model that lacks nothing."""
+        return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
+
+
+def noise_of(force: np.ndarray) -> float:
+    """Standard deviation [N] of the noise of a force, shape (n,): of what neighbouring samples do not share, as its
+    third differences show it, or of its digits."""
+    steps = np.abs(np.diff(force))
+    digit = steps[steps > 0].min() / np.sqrt(12) if (steps > 0).any() else 0.0
+    rough = np.diff(force, 3)
+    white = NORMAL_MAD * float(np.median(np.abs(rough))) / np.sqrt(20) if rough.size else 0.0
+    return max(white, float(digit))
+
+
+def steady_friction(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
+    """Friction [N] of a stage as flat keys at steady velocities [m/s], any shape, less its constant force."""
+    size = np.abs(speeds)
+    coulomb, viscous = flat.get("friction.coulomb", 0.0), flat.get("friction.viscous", 0.0)
+    rise = flat.get("friction.static", coulomb) - coulomb
+    falls = np.exp(
+        -((size / flat.get("friction.stribeck_velocity", 1.0)) ** flat.get("friction.stribeck_exponent", 2.0))
+    )
+    sign = np.sign(speeds)
+    skew = 1 + sign * flat.get("friction.viscous_asymmetry", 0.0)
+    constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
+    return sign * (coulomb + rise * falls) + viscous * skew * speeds - constant
+
+
+def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
+    """The relative error of the force on the samples of the inverse model, by mass and steady friction of a stage as
+    flat keys; dry friction turns as gradually as in the inverse model, whose columns are filtered."""
+    mass = sum(flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
+    acceleration, velocity, sign, _ = inverse.columns.T
+    dry = steady_friction({**flat, "friction.viscous": 0.0, "bias.cart": 0.0, "bias.stage": 0.0}, np.abs(velocity))
+    wet = steady_friction({**flat, "friction.coulomb": 0.0, "friction.static": 0.0}, velocity)
+    left = inverse.measured - mass * acceleration - sign * dry - wet
+    return float(np.linalg.norm(left) / np.linalg.norm(inverse.measured))
+
+
+def halves(inverse: InverseModel) -> list[tuple[str, float, float]]:
+    """Name and the values of mass, viscous and Coulomb friction in both halves of a record, where these differ by more
+    than their spreads."""
+    names = ("mass", "viscous", "coulomb")
+    parts = np.array_split(np.arange(len(inverse.measured)), 2)
+    fits = []
+    for part in parts:
+        columns, force = inverse.columns[part], inverse.measured[part]
+        solution = np.linalg.lstsq(columns, force, rcond=None)[0]
+        fits.append((solution, np.sqrt(np.diag(spread_of(columns, force - columns @ solution)))))
+    (first, off), (second, off_too) = fits
+    apart = np.abs(first - second) > APART * np.hypot(off, off_too)
+    return [
+        (name, float(first[i]), float(second[i]))
+        for i, name in enumerate(names)
+        if apart[i] and np.isfinite([off[i], off_too[i]]).all()
+    ]

@@ -1,0 +1,247 @@
+"""How good an identification is: intervals that cannot be empty, noise, model error, and what is said of a bad log."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from friso.identify.causes import UNKNOWN, causes
+from friso.identify.combine import combined
+from friso.identify.estimate import Estimate
+from friso.identify.inverse_model import inverse_model
+from friso.identify.logs.log import Log
+from friso.identify.model_error import of_inverse_model, with_model_error
+from friso.identify.output_error.parameters import FitParameter, parameters_of
+from friso.identify.output_error.problem import tracking
+from friso.identify.quality import Quality, halves, noise_of, whole_error
+from friso.identify.readings.common import record
+from friso.identify.spread import groups_of, spread_of
+from friso.identify.stage_file import NOT_IDENTIFIED, identified, made_up, origins, with_origins, written
+from friso.views.identify.numbers import interval_text, value_text
+
+DT = 1e-3
+MASS, VISCOUS, COULOMB, OFFSET = 6.0, 20.0, 11.0, 0.5
+NUMBERS = st.floats(allow_nan=True, allow_infinity=True, width=64)
+
+
+def axis(noise: float = 0.05, seconds: float = 8.0, **other: float) -> Log:
+    """Two sines of a mass with friction, with noise on its force."""
+    numbers = {"mass": MASS, "viscous": VISCOUS, "coulomb": COULOMB, "offset": OFFSET} | other
+    time = np.arange(round(seconds / DT)) * DT
+    rates = 2 * np.pi * np.array([[0.5], [1.3]])
+    position = np.sum(0.05 * np.sin(rates * time), axis=0)
+    velocity = np.sum(0.05 * rates * np.cos(rates * time), axis=0)
+    acceleration = np.sum(-0.05 * rates**2 * np.sin(rates * time), axis=0)
+    force = numbers["mass"] * acceleration + numbers["viscous"] * velocity + numbers["offset"]
+    force += numbers["coulomb"] * np.sign(velocity) + noise * np.random.default_rng(4).standard_normal(len(time))
+    return record("axis", DT, position=position, force=force)
+
+
+# --- intervals --------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=2000, deadline=None)
+@given(NUMBERS, NUMBERS, NUMBERS, st.sampled_from(["kg", "N", "m/s"]))
+def test_what_is_determined_has_an_interval_of_some_width(value: float, low: float, high: float, unit: str) -> None:
+    estimate = Estimate("friction.coulomb", unit, value, low, high, "drawn")
+    if estimate.determined:
+        assert all(map(math.isfinite, (estimate.value, estimate.low, estimate.high)))
+        assert estimate.half_width > 0 or estimate.low < estimate.high
+    else:
+        assert estimate.reason
+        assert math.isnan(estimate.value)
+
+
+@settings(max_examples=1000, deadline=None)
+@given(st.floats(1e-9, 1e9), st.floats(1e-12, 10.0))
+def test_what_is_printed_and_written_has_ends_that_differ(value: float, share: float) -> None:
+    estimate = Estimate.normal("friction.coulomb", "N", value, share * value, "drawn")
+    if not estimate.determined:
+        return
+    low, _, rest = interval_text(estimate).partition(" to ")
+    if share > 1e-11:  # beyond, all digits of a double are used up
+        assert low != rest.split(" ")[0]
+        assert value_text(estimate)
+    assert " 0 N" not in written(estimate).partition("+/-")[2]
+
+
+def test_a_mean_of_estimates_is_never_of_no_width() -> None:
+    one = Estimate.normal("masses.cart", "kg", 2.0, 0.0, "a")
+    assert not one.determined
+    (mean,), _ = combined([one, Estimate.normal("masses.cart", "kg", 2.1, 0.1, "b")])
+    assert mean.determined
+    assert mean.value == pytest.approx(2.1)
+
+
+# --- spreads ----------------------------------------------------------------------------------------------------------
+
+
+def test_white_errors_are_spread_as_least_squares_says() -> None:
+    rng = np.random.default_rng(0)
+    columns = rng.standard_normal((20_000, 2))
+    residual = rng.standard_normal(20_000)
+    time = np.arange(20_000) * DT
+    groups = groups_of(np.sin(time), np.cos(time), -np.sin(time))
+    plain = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)))
+    assert np.sqrt(np.diag(spread_of(columns, residual, groups))) == pytest.approx(plain, rel=0.5)
+
+
+def test_a_motion_that_is_repeated_says_nothing_new_of_what_the_model_lacks() -> None:
+    """An error that is a function of the speed does not average out over ten times as many repetitions."""
+
+    def deviation(periods: int) -> float:
+        time = np.arange(periods * 1000) * DT
+        velocity, acceleration = np.cos(2 * np.pi * time), -np.sin(2 * np.pi * time)
+        columns = np.stack([acceleration, velocity, np.sign(velocity)], axis=1)
+        lacking = velocity**3
+        left = lacking - columns @ np.linalg.lstsq(columns, lacking, rcond=None)[0]
+        groups = groups_of(np.sin(2 * np.pi * time), velocity, acceleration)
+        return float(np.sqrt(spread_of(columns, left, groups)[1, 1]))
+
+    assert deviation(20) == pytest.approx(deviation(2), rel=0.3)
+
+
+# --- quality ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("noise", [0.01, 0.05, 0.5])
+def test_the_noise_of_a_force_is_found_beside_its_motion(noise: float) -> None:
+    assert noise_of(axis(noise)["force"]) == pytest.approx(noise, rel=0.1)
+
+
+def test_digits_count_as_noise() -> None:
+    force = np.round(axis(0.0)["force"])
+    assert noise_of(force) >= 1 / math.sqrt(12)
+
+
+def test_a_stage_explains_what_its_own_inverse_model_does() -> None:
+    log = axis()
+    inverse = inverse_model(log, 5.0)
+    flat = {"masses.cart": MASS, "friction.viscous": VISCOUS, "friction.coulomb": COULOMB, "bias.cart": -OFFSET}
+    assert whole_error(flat, inverse) == pytest.approx(inverse.error, rel=0.3)
+    assert whole_error({**flat, "friction.coulomb": 2 * COULOMB}, inverse) > 5 * inverse.error
+    assert whole_error({**flat, "friction.static": 30.0, "friction.stribeck_velocity": 1e-6}, inverse) < 0.1
+
+
+def test_halves_that_differ_are_named() -> None:
+    log = axis()
+    other = axis(coulomb=2 * COULOMB)
+    count = len(log.time) // 2
+    force = np.concatenate([log["force"][:count], other["force"][count:]])
+    assert not halves(inverse_model(log, 5.0))
+    apart = {name: (one, two) for name, one, two in halves(inverse_model(replace(log, signals={
+        **log.signals, "force": force}), 5.0))}  # fmt: skip
+    assert apart["coulomb"] == pytest.approx((COULOMB, 2 * COULOMB), rel=0.1)
+
+
+def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_rest() -> None:
+    whole = Estimate.normal("friction.coulomb", "N", 12.04, 0.02, "output error")
+    inverse = Estimate.normal("coulomb", "N", 10.6, 0.3, "least squares")
+    assert with_model_error(whole, inverse, 1.0, 0.0) == whole
+    wide = with_model_error(whole, inverse, 1.0, 1.0)
+    assert wide.holds(11.2)
+    assert wide.value == whole.value
+    assert wide.systematic > 0.8
+
+
+def test_lacking_is_what_noise_does_not_explain() -> None:
+    assert Quality(1.0, 1.0, 1.0, 0.1, 0.1).lacking == 0.0
+    assert Quality(1.0, 10.0, 1.0, 0.1, 0.1).lacking == pytest.approx(1.0, abs=0.01)
+    assert Quality(0.0, 1.0, 0.0, 0.1, 0.1).ratio == math.inf
+
+
+def test_the_inverse_model_steps_in_with_its_values() -> None:
+    log = axis()
+    inverse = inverse_model(log, 5.0)
+    flat = made_up(log, inverse).flat()
+    asked = [
+        Estimate.normal("masses.cart", "kg", 1.0, 0.1, "output error"),
+        Estimate.normal("friction.coulomb", "N", 1.0, 0.1, "output error"),
+        Estimate.normal("bias.cart", "N", 9.0, 0.1, "output error"),
+        Estimate.normal("friction.static", "N", 11.99, 0.1, "output error"),
+    ]
+    answers, correlation = of_inverse_model(inverse, flat, asked)
+    by_name = {one.name: one for one in answers}
+    assert by_name["masses.cart"].value == pytest.approx(MASS, rel=0.01)
+    assert by_name["friction.coulomb"].value == pytest.approx(COULOMB, rel=0.05)
+    assert by_name["bias.cart"].value == pytest.approx(-OFFSET, abs=0.1)
+    assert by_name["bias.cart"].low < by_name["bias.cart"].high
+    assert not by_name["friction.static"].determined
+    assert correlation.shape == (3, 3)
+
+
+# --- causes -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_delay_is_found() -> None:
+    log = axis()
+    late = replace(log, signals={**log.signals, "force": np.roll(log["force"], 16)})
+    (sentence,) = causes(late, inverse_model(late, 5.0), 0.0)
+    assert "16 ms earlier" in sentence
+
+
+def test_gravity_is_found() -> None:
+    log = axis(offset=60.0)
+    assert "constant force of 60" in " ".join(causes(log, inverse_model(log, 5.0), 0.0))
+
+
+def test_an_oscillation_is_found() -> None:
+    log = axis()
+    force = log["force"] + 8 * np.sin(2 * np.pi * 9.0 * log.time)
+    swinging = replace(log, signals={**log.signals, "force": force})
+    assert "at 9" in " ".join(causes(swinging, inverse_model(swinging, 5.0), 0.0))
+
+
+def test_noise_has_no_cause() -> None:
+    log = axis()
+    noise = 300 * np.random.default_rng(1).standard_normal(len(log.time))
+    other = replace(log, signals={**log.signals, "force": noise + 0.2 * log["force"]})
+    assert causes(other, inverse_model(other, 5.0), 0.0) == [UNKNOWN]
+
+
+# --- rests ------------------------------------------------------------------------------------------------------------
+
+
+def test_rests_do_not_count_for_a_stage_that_follows_the_log() -> None:
+    log = axis()
+    still = np.concatenate([log["position"], np.full(2000, log["position"][-1])])
+    still = still + 1e-7 * np.random.default_rng(2).standard_normal(len(still))
+    whole = record("axis", DT, position=still, force=np.concatenate([log["force"], np.zeros(2000)]))
+    flat = made_up(whole, inverse_model(whole, 5.0)).flat()
+    parameters = [one for one in _parameters(flat) if one.core]
+    problem = tracking(flat, whole, whole.segments[0], parameters, 5.0)
+    assert problem.counted[1000:7000].mean() > 0.99
+    assert problem.counted[8200:].max() == 0
+    assert 0 < problem.passes < 1
+
+
+def _parameters(flat: dict[str, Any]) -> list[FitParameter]:
+    levels = {"mass": MASS, "coulomb": COULOMB, "viscous": VISCOUS, "offset": OFFSET}
+    return parameters_of(flat, levels, 0.5, 0.1, True)
+
+
+# --- the stage file ---------------------------------------------------------------------------------------------------
+
+
+def test_every_key_says_where_it_comes_from() -> None:
+    log = axis()
+    stage = made_up(log, inverse_model(log, 5.0))
+    estimates = [
+        Estimate.normal("friction.coulomb", "N", COULOMB, 0.1, "output error"),
+        Estimate.unknown("friction.static", "N", "output error", "no slow motion", COULOMB, 4 * COULOMB),
+    ]
+    whole = identified(stage, estimates, ["axis"])
+    text = with_origins(whole.to_toml(), origins(whole, estimates, {}, False))
+    assert tomllib.loads(text) == tomllib.loads(whole.to_toml())
+    lines = {line.partition(" = ")[0]: line.partition("  # ")[2] for line in text.splitlines() if " = " in line}
+    assert lines["coulomb"] == "identified: output error"
+    assert lines["static"] == NOT_IDENTIFIED
+    assert "our choice" in lines["bristle_stiffness"]
+    assert all(comment for key, comment in lines.items() if key not in ("name", "source"))
