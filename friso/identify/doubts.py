@@ -47,10 +47,7 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         )
     if poor:
         reasons = "; ".join(causes(log, inverse, cart_share))
-        doubts.append(
-            f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained, so do not rely on "
-            f"these values: {reasons}"
-        )
+        doubts.append(f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained: {reasons}")
     elif not rejected and plain.ratio > NOISY:
         doubts.append(
             f"The fit leaves {left:.3g} N unexplained, {plain.ratio:.3g} times the noise of the record: the model "

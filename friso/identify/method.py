@@ -97,7 +97,7 @@ def identify(
         (*warnings, *fits.notes),
         doubts,
         failed,
-        origins(whole, fits.estimates, fits.follows, base is not None),
+        origins(fitted, fits.estimates, fits.follows, base is not None),
     )
 
 

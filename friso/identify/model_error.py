@@ -43,6 +43,12 @@ def all_with_model_error(
     )
 
 
+def not_described(estimates: Sequence[Estimate]) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """Nothing of what a fit to a record says that no model describes."""
+    answers = (Estimate.unknown(one.name, one.unit, one.method, NOT_DESCRIBED) for one in estimates)
+    return tuple(answers), np.zeros((0, 0))
+
+
 def of_inverse_model(
     inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
@@ -62,6 +68,9 @@ def of_inverse_model(
     certain = [answer for answer in answers if answer.determined]
     return tuple(answers), np.eye(len(certain))
 
+
+NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
+"""Why nothing at all is taken from a fit."""
 
 CONTRADICTED = "the whole model contradicts the record"
 """Why nothing but what the inverse model shows is taken from a fit."""

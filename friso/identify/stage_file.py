@@ -83,7 +83,7 @@ def origins(stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, s
         known[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
     known |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
     rest = "as given" if from_user else "our choice, not identified"
-    tables = {name: table for name, table in stage.given().items() if isinstance(table, dict)}
+    tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
     keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
     return {key: known.get(key, rest) for key in keys}
 

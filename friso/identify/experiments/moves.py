@@ -18,7 +18,7 @@ from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
 from friso.identify.logs.log import Log
-from friso.identify.model_error import all_with_model_error, of_inverse_model
+from friso.identify.model_error import all_with_model_error, not_described, of_inverse_model
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
 from friso.identify.output_error.fit import OutputErrorFit
@@ -91,7 +91,9 @@ def identify_moves(
     estimates, correlation = estimates_of(answer, covered)
     fit = answer.fit
     quality = quality_of(log, inverse, fit, noise, share)
-    if quality.rejected:
+    if quality.failed:
+        estimates, correlation = not_described(estimates)
+    elif quality.rejected:
         estimates, correlation = of_inverse_model(inverse, flat, estimates)
     else:
         estimates = all_with_model_error(estimates, inverse, flat, quality)

@@ -96,9 +96,7 @@ def _believed(full: OutputErrorFit, core: set[str], covered: Coverage, explained
     wherever its profiles are sharp."""
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
-    profiles = {
-        names[i]: profile(full, i, tuple(other for other in full.free if other != i), full.cost) for i in asked
-    }
+    profiles = {names[i]: profile(full, i, tuple(other for other in full.free if other != i), full.cost) for i in asked}
     shown = {
         name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
     }
