@@ -133,7 +133,7 @@ def sampled_in_time(log: Log, machine: Machine) -> Log:
 
 def shown_by(log: Log, machine: Machine) -> set[str]:
     """The keys that the motion of a log shows: by the Cramer-Rao bound of its force's noise, in closed loop."""
-    flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
+    flat = {**machine.flat, "friction.viscous_asymmetry": 1e-6}  # not 0: it is one of the equations
     levels = {name: flat[f"friction.{name}"] for name in ("coulomb", "viscous")}
     levels |= {"mass": mass_of(flat), "offset": -flat["bias.cart"]}
     top = flat["motion.acceleration"] * flat["motion.acceleration_time"]

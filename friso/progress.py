@@ -15,6 +15,19 @@ def silent(done: int, total: int, what: str) -> None:
     """The progress that nobody watches."""
 
 
+def share_of(progress: Progress, number: int, count: int) -> Progress:
+    """The progress of one of `count` equal pieces of work, the one with this number from 0 on, within that of all."""
+
+    def report(done: int, total: int, what: str, /) -> None:
+        progress(PERCENT * number + (PERCENT * done // total if total else 0), PERCENT * count, what)
+
+    return report
+
+
+PERCENT = 100
+"""Steps as which a piece of work counts."""
+
+
 class Tally:
     """Counts the steps of work that is done in pieces, and reports each to a progress."""
 

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 STAGE = "identified.toml"
 
+PIPED = 10.0
+"""Seconds between lines of progress where no terminal shows a bar."""
+
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
 
@@ -86,7 +89,7 @@ def identify(
     sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
     others = _others(inputs[len(logs) :])
     check_predictions(sources, others, assumed)
-    with ProgressBar() as progress:
+    with ProgressBar(lines=PIPED) as progress:
         identified = identification(sources, assumed, settings, progress)
         predictions = [predict_log(identified, log, settings, assumed) for log in others]
         from friso.views.identify.page import identify_files

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+import time
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Self
 
@@ -15,13 +17,15 @@ if TYPE_CHECKING:
 
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """A bar on standard error for as long as the `with` block lasts, nothing where that is no terminal.
+    """A bar on standard error for as long as the `with` block lasts; where that is no terminal, a line every so many
+    seconds (`lines`), by default never.
 
     It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
     """
 
-    def __init__(self, what: str = "") -> None:
-        self.what = what
+    def __init__(self, what: str = "", lines: float = math.inf) -> None:
+        self.what, self.lines = what, lines
+        self.last = time.monotonic()
         self.display: Display | None = None
         self.task: TaskID | None = None
 
@@ -40,6 +44,10 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __call__(self, done: int, total: int, what: str, /) -> None:
         if self.display is not None and self.task is not None:
             self.display.update(self.task, completed=done, total=total or None, description=one_line(what))
+        elif time.monotonic() - self.last > self.lines:
+            self.last = time.monotonic()
+            share = f"{100 * done // total} %, " if total else ""
+            print(f"friso: {share}{one_line(what)}", file=sys.stderr, flush=True)
 
 
 def _display() -> Display:

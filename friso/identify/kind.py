@@ -15,6 +15,7 @@ from friso.identify.logs.joined import together
 from friso.identify.logs.log import Log
 from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.readings.course import Course
+from friso.progress import Progress, silent
 from friso.stage import Stage, parse_set
 from friso.stage.controllers import CONTROLLER
 
@@ -30,11 +31,12 @@ OF_ANY_FORM = ("kind", "force_limit", "anti_windup")
 @dataclass(frozen=True)
 class AnalysisSettings:
     """What the user chose: bandwidth of the moves [Hz] for the inverse model, band [Hz] and period [s] of frequency
-    responses; None where friso is to find them."""
+    responses; None where friso is to find them. `progress` is told how far an analysis is."""
 
     bandwidth: float | None = None
     band: tuple[float, float] | None = None
     period: float | None = None
+    progress: Progress = silent
 
 
 NOTHING_CHOSEN = AnalysisSettings()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from friso.identify.kinds import KINDS, in_order
 from friso.identify.logs.log import Log
 from friso.identify.stage_file import identified, origins
 from friso.identify.stage_keys import Fitting, fitting
-from friso.progress import Progress, silent
+from friso.progress import Progress, share_of, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
@@ -74,10 +74,11 @@ def identify(
     stage = base or _around(logs)
     experiments: list[Experiment] = []
     for number, (kind, group) in enumerate(groups):
-        progress(number, len(groups), f"{kind}: {', '.join(log.name for log in group)}")
+        part = share_of(progress, number, len(groups))
+        part(0, 0, f"{kind}: {', '.join(log.name for log in group)}")
         best = combined(_every_estimate(experiments))[0]
         prior = Prior(stage, base is not None, {estimate.name: estimate for estimate in best if estimate.determined})
-        result = KINDS[kind].analyse(group, prior, settings)
+        result = KINDS[kind].analyse(group, prior, replace(settings, progress=part))
         experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
     estimates, warnings = combined(_every_estimate(experiments))
     doubts = tuple(doubt for experiment in experiments for doubt in KINDS[experiment.kind].doubts(experiment.result))

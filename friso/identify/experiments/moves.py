@@ -29,6 +29,7 @@ from friso.identify.output_error.profile import Profile
 from friso.identify.quality import Quality, noise_of
 from friso.identify.readings.course import Course
 from friso.identify.stage_file import made_up
+from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
@@ -69,7 +70,7 @@ class IdentifiedMoves:
 
 
 def identify_moves(
-    log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None
+    log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None, progress: Progress = silent
 ) -> IdentifiedMoves:
     """Mass, friction and what else the moves of a log show of a stage given as flat keys.
 
@@ -87,7 +88,7 @@ def identify_moves(
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
     noise = noise_of(log["force"][part])
-    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise)
+    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, progress)
     estimates, correlation = estimates_of(answer, covered)
     fit = answer.fit
     quality = quality_of(log, inverse, fit, noise, share)
@@ -222,7 +223,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     assert isinstance(log, Log)
     flat = prior.flat(log)
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
-    return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth)
+    return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:

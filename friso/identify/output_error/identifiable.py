@@ -14,6 +14,7 @@ from friso.identify.output_error.parameters import LONGEST, RATIO, SHARE
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.profile import Profile, profile
 from friso.identify.readings.common import low_pass
+from friso.progress import Progress, silent
 
 STRIBECK = (RATIO, "friction.stribeck_velocity")
 BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
@@ -26,6 +27,9 @@ EXPLAINED = 2.0
 
 SURE = 0.99
 """Probability that parameters which no motion shows one by one improve the fit all the same."""
+
+STEPS = 10
+"""Pieces of about the same work that a fit with its profiles is."""
 
 SHARP = 3.0
 """Factor between the ends of a profile interval within which a parameter counts as shown."""
@@ -42,7 +46,12 @@ class Identified:
 
 
 def fit_identifiable(
-    follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float, noise: float
+    follows: Problem,
+    loop: Problem | None,
+    covered: Coverage,
+    bandwidth: float,
+    noise: float,
+    progress: Progress = silent,
 ) -> Identified:
     """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
 
@@ -52,15 +61,19 @@ def fit_identifiable(
     their effect is there, and without it friction and mass would have to explain it."""
     names = [parameter.name for parameter in follows.parameters]
     core = {parameter.name for parameter in follows.parameters if parameter.core}
+    progress(0, STEPS, "moves: mass and sliding friction along the log")
     plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None])
     if loop is not None:
         every = tuple(range(len(names)))
+        progress(1, STEPS, "moves: all parameters in closed loop")
         full = fit(loop, every, np.vstack([nearby(plain), everywhere(loop, every, plain.inner)]))
         if explains(full, noise):
-            return _believed(full, core, covered, explained=True)
-    along = _along(follows, plain, core, covered)
+            return _believed(full, core, covered, progress, explained=True)
+    progress(3, STEPS, "moves: all parameters along the log")
+    along = _along(follows, plain, core, covered, progress)
     if loop is None:
         return along
+    progress(STEPS - 1, STEPS, "moves: the closed loop from there")
     starts = nearby(along.fit)
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
@@ -73,7 +86,9 @@ def explains(fit: OutputErrorFit, noise: float) -> bool:
     return bool(fit.problem.closed and np.sqrt(fit.cost) < EXPLAINED * noise)
 
 
-def _along(follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage) -> Identified:
+def _along(
+    follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress
+) -> Identified:
     """What the stage that follows the log shows."""
     names = [parameter.name for parameter in follows.parameters]
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
@@ -81,7 +96,7 @@ def _along(follows: Problem, plain: OutputErrorFit, core: set[str], covered: Cov
         return Identified(plain, {}, frozenset())
     every = _numbers(names, core | hopeful)
     full = fit(follows, every, everywhere(follows, every, plain.inner))
-    believed = _believed(full, core, covered)
+    believed = _believed(full, core, covered, progress)
     if _pays(full, plain) or believed.shown == hopeful:
         return believed
     if not believed.shown:
@@ -91,12 +106,17 @@ def _along(follows: Problem, plain: OutputErrorFit, core: set[str], covered: Cov
     return replace(believed, fit=fit(follows, free, neutral[None]))
 
 
-def _believed(full: OutputErrorFit, core: set[str], covered: Coverage, explained: bool = False) -> Identified:
+def _believed(
+    full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
+) -> Identified:
     """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
     wherever its profiles are sharp."""
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
-    profiles = {names[i]: profile(full, i, tuple(other for other in full.free if other != i), full.cost) for i in asked}
+    profiles = {}
+    for number, i in enumerate(asked):
+        progress(4 + min(number, STEPS - 6), STEPS, f"moves: how well {names[i]} is known")
+        profiles[names[i]] = profile(full, i, tuple(other for other in full.free if other != i), full.cost)
     shown = {
         name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
     }
