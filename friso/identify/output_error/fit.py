@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import lmfit
@@ -14,6 +14,7 @@ from friso.identify.output_error.parameters import FitParameter, keys_of
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.refine import bounds_of, costs, refine
 from friso.identify.spread import correlation_length, groups_of, spread_of
+from friso.intervals import COVERAGE
 
 STARTS, KEPT = 1024, 6
 """Starts that are simulated, and how many of them are refined."""
@@ -30,6 +31,9 @@ ROUGH, FINE = 12, 30
 NEARBY, FAR = 127, 3.0
 """Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
 hunts has optima of its own, and the fit it starts from is of another problem."""
+
+ALIKE = 1e-3
+"""Share of the largest singular value below which fitted numbers cannot be distinguished."""
 
 SEED = 7
 
@@ -149,4 +153,20 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Out
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
     groups = groups_of(*(signal[counted] for signal in (problem.inputs.reference, velocity, acceleration)))
-    return OutputErrorFit(problem, best, free, spread_of(slopes[counted], rest[counted], groups), rest)
+    covariance = spread_of(slopes[counted], rest[counted], groups)
+    if not problem.closed:
+        off = _by_half_a_sample(problem, best, slopes, rest) / COVERAGE
+        covariance = covariance + np.outer(off, off)
+    return OutputErrorFit(problem, best, free, covariance, rest)
+
+
+def _by_half_a_sample(problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """By how much the fitted numbers move, shape (free,), if the force of the log is held between its samples instead
+    of following straight lines, or the other way about: half a sample later. A log does not tell which of them."""
+    inputs = replace(problem.inputs, held=not problem.inputs.held)
+    change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
+    if not np.isfinite(change).all():
+        return np.zeros(slopes.shape[1])
+    size = np.linalg.norm(slopes, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    return -np.linalg.lstsq(slopes / size, change, rcond=ALIKE)[0] / size

@@ -130,11 +130,11 @@ def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
-    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, both within
-    the motion's bandwidth [Hz], since the latter knows no noise above it."""
-    step = looped.problem.inputs.sample_time
-    rms = [np.std(low_pass(fit.residual, step, bandwidth)) for fit in (looped, direct)]
-    return bool(rms[0] < STEP_OUT * rms[1])
+    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, where that
+    counts, both within the motion's bandwidth [Hz], since the latter knows no noise above it."""
+    step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
+    powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
+    return bool(powers[0] <= STEP_OUT**2 * powers[1])
 
 
 def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:

@@ -110,7 +110,9 @@ def percent(share: float) -> str:
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
     """Factor and unit with prefix that suit the value, or else the range that is possible."""
-    finite = [estimate.value] if math.isfinite(estimate.value) else [estimate.low, estimate.high]
+    finite = [estimate.low, estimate.high]
+    if math.isfinite(estimate.value):  # of a value next to 0, its interval tells the size
+        finite = [max(abs(estimate.value), estimate.half_width) if estimate.value else 0.0]
     unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
     if unit.startswith("N") and FORCES[0] < size < FORCES[1]:
         return 1.0, pretty(unit)
