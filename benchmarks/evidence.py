@@ -193,7 +193,7 @@ LONG: Mapping[str, Callable[[], Values]] = {
     "reproduce.minutes": lambda: {"all": minutes("reproduce")},
 }
 
-BY_HAND = ("rig.loop", "hunting.limiter", "hunting.supercritical")
+BY_HAND = ("rig.loop", "identify.known-truth", "hunting.limiter", "hunting.supercritical")
 """Entries whose command prints a table that is read by eye."""
 
 
