@@ -196,7 +196,7 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
 
 
 def distinct(speeds: np.ndarray) -> int:
-    """How many speeds there are."""
+    """How many speeds there are, of shape (n,) [m/s]: those within `DISTINCT` count as one."""
     return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum())
 
 
