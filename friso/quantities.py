@@ -8,14 +8,15 @@ import math
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from functools import cache, lru_cache
 from typing import Any, Self
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
+from friso.axis import LINEAR, ROTARY, AxisKind
 from friso.errors import InputError
 
 LARGEST_INTEGER = 10**60
@@ -81,18 +82,28 @@ class Value(float):
 class Quantity:
     """A key that takes number and unit: `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`.
 
-    `unit` is the SI unit of the values. Where it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi.
+    `unit` is the SI unit of the values. Where it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi. Keys are
+    declared as on a linear axis; `on` gives them as on another, named in `axis`.
     """
 
     unit: str
     bound: Bound
     example: str
+    axis: str = field(default="", kw_only=True)
+
+    def on(self, kind: AxisKind) -> Self:
+        """What the key takes on an axis of that kind."""
+        if (unit := kind.unit(self.unit)) == self.unit:
+            return self
+        number, _, written = self.example.partition(" ")
+        return replace(self, unit=unit, example=f"{number} {kind.unit(written)}", axis=kind.described)
 
     @property
     def expected(self) -> str:
         """What the key takes, in words."""
         units = "Hz, rad/s or rpm" if self.unit == "Hz" else self.unit
-        return f"number and unit in quotes, convertible to {units}, {self.bound.text}"
+        axis = f" with {self.axis}" if self.axis else ""
+        return f"number and unit in quotes, convertible to {units}{axis}, {self.bound.text}"
 
     @property
     def written_example(self) -> str:
@@ -118,7 +129,10 @@ class Quantity:
         return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
+        return core_schema.with_info_plain_validator_function(self._read_on_axis)
+
+    def _read_on_axis(self, entry: Any, info: ValidationInfo) -> Value:
+        return self.on(info.context or LINEAR).read(entry)
 
 
 @dataclass(frozen=True)
@@ -129,6 +143,10 @@ class Number:
     example: str
 
     unit = ""
+
+    def on(self, kind: AxisKind) -> Self:
+        """The same on an axis of any kind."""
+        return self
 
     @property
     def expected(self) -> str:
@@ -252,9 +270,21 @@ def _factor(unit: str, si_unit: str) -> float:
     if si_unit == "Hz":
         return _hertz(factor, root, names)
     si_factor, si_root, _ = _root(si_unit)
-    if root != si_root:
-        raise _Refused(f"{unit} is not convertible to {si_unit}")
+    if root != si_root and not _per_radian(root, si_root):
+        raise _Refused(f"{unit} is not convertible to {si_unit}{_of_rotary_axis(root, si_unit)}")
     return float(f"{factor / si_factor:.15g}")  # unit factors are short decimals: drop pint's rounding errors
+
+
+def _per_radian(root: dict[str, float], si_root: dict[str, float]) -> bool:
+    """Whether a unit is one per angle whose radian was left out: N m for N m/rad."""
+    return si_root.get("radian", 0) < 0 and root == {name: p for name, p in si_root.items() if name != "radian"}
+
+
+def _of_rotary_axis(root: dict[str, float], si_unit: str) -> str:
+    """A hint where a unit would do on a rotary axis; "" where it would not."""
+    turned = ROTARY.unit(si_unit)
+    fits = turned != si_unit and root == _root(turned)[1]
+    return f"; it would be of a rotary axis, {ROTARY.described}" if fits else ""
 
 
 def _hertz(factor: float, root: dict[str, float], names: list[str]) -> float:

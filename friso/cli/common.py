@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from click import get_current_context
 
+from friso.axis import spoken_of
 from friso.cli.terminal import console
 from friso.errors import InputError
 from friso.escapes import one_line
@@ -126,9 +128,15 @@ def read_stage(
 
 
 def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:
-    """The stage with the KEY=VALUE of --set. Raises InputError."""
+    """The stage with the KEY=VALUE of --set; from here on the command speaks of its kind of axis. Raises InputError."""
     changes = dict(parse_set(text) for text in overrides or [])
-    return stage.replace(changes) if changes else stage
+    return in_units_of(stage.replace(changes) if changes else stage)
+
+
+def in_units_of(stage: Stage) -> Stage:
+    """The stage, whose kind of axis decides on the units of all that the command shows from here on."""
+    get_current_context().with_resource(spoken_of(stage.axis_kind))
+    return stage
 
 
 def key_values(options: list[tuple[str, str]], example: str) -> dict[str, str]:

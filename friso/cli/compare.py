@@ -33,7 +33,10 @@ Machines = Annotated[
 Seed = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
 ]
-Within = Annotated[str, typer.Option("--within", metavar="LENGTH", help="Deviation that counts as in position.")]
+Within = Annotated[
+    str | None,
+    typer.Option("--within", metavar="LENGTH", help="Deviation that counts as in position; 1 um if not given."),
+]
 
 
 def compare(
@@ -41,7 +44,7 @@ def compare(
     overrides: Overrides = None,
     machines: Machines = 2000,
     seed: Seed = 1,
-    within: Within = "1 um",
+    within: Within = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -55,7 +58,7 @@ def compare(
     from friso.studies.compare.study import compare as compared
 
     stage = read_stage(stage_file, overrides, leaves_out=(), uncertain_too=True)
-    tolerance, correlations = _tolerance(within), _correlations(stage_file, stage)
+    tolerance, correlations = _tolerance(within, stage), _correlations(stage_file, stage)
     target = output_folder("compare", out, overwrite, [stage_file])
     files = []
     with ProgressBar() as progress:
@@ -74,9 +77,10 @@ def compare(
         raise typer.Exit(1)
 
 
-def _tolerance(text: str) -> float:
+def _tolerance(text: str | None, stage: Stage) -> float:
+    length = Quantity("m", positive, "1 um").on(stage.axis_kind)
     try:
-        return float(Quantity("m", positive, "1 um").read(text))
+        return float(length.read(text or length.example))
     except InputError as error:
         raise error.under("--within") from None
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
+from friso.cli.common import AsJson, Overrides, in_units_of, read_stage, read_tolerance, say
 from friso.cli.map_options import (
     Axes,
     CheckStore,
@@ -95,6 +95,7 @@ def map_cells(
             store, metric = out or Path(f"{source.stem}_map.zarr"), metric or "outcome"
             study = _new_study(read_stage(source, overrides), varied, metric, refine, yes, rtol or "1e-6", crew)
             study = as_stored(study, store, metric, overwrite)
+        in_units_of(study.stage)
         refuse_overwriting(store, exports, overwrite)
         runs = _run(study, store, crew, share, overwrite, {"metric": metric, "views": own_views(store)})
     runs, colouring = in_memory(runs) if study.cells <= LARGE else runs, coloured_by(study, metric)

@@ -36,8 +36,8 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
     its shares, cart position and velocity, joint deflection and force, friction force and bristle deflection, as far
     as the stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage
     as TOML text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration;
-    samples are taken from the method's dense output. A run that fails has NaN from there on, and the reason in
-    `status`. Raises InputError for a sample time and ValueError for a tolerance
+    samples are taken from the method's dense output. Units are those of the stage's kind of axis. A run that fails has
+    NaN from there on, and the reason in `status`. Raises InputError for a sample time and ValueError for a tolerance
     that is not usable.
     """
     flat = stage.flat()
@@ -96,7 +96,7 @@ def _dataset(
         results.turn_values[0, turns],
         {"units": "m", "long_name": label},
     )
-    return xr.Dataset(
+    response = xr.Dataset(
         variables,
         coords=time_axis(time),
         attrs={
@@ -109,3 +109,4 @@ def _dataset(
             "rejected": int(runs.statistic("rejected")[0]),
         },
     )
+    return stage.axis_kind.with_units(response)

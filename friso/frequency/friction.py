@@ -14,7 +14,7 @@ from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction
 from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, solved
-from friso.stage.stage import numeric_keys
+from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
 
 if TYPE_CHECKING:
@@ -119,7 +119,7 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Speeds [m/s] from creeping to so fast that friction hardly depends on it, shape (count,)."""
-    units = {key: quantity.unit for key, quantity in numeric_keys(flat).items() if key.startswith("friction.")}
+    units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
     if named:
         return np.geomspace(SLOWEST * min(named), FASTEST * max(named), count)

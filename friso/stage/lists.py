@@ -4,13 +4,14 @@ In `Stage.flat` every element has a key of its own, numbered from 1: friction.el
 """
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import count, takewhile
-from typing import Any
+from typing import Any, Self
 
-from pydantic import GetCoreSchemaHandler
+from pydantic import GetCoreSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, core_schema
 
+from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, quoted
 
@@ -34,6 +35,11 @@ class Several:
     examples: tuple[str, ...]
     least: int = 2
     most: int | None = None
+
+    def on(self, kind: AxisKind) -> Self:
+        """What the key takes on an axis of that kind."""
+        examples = tuple(replace(self.of, example=text).on(kind).example for text in self.examples)
+        return replace(self, of=self.of.on(kind), examples=examples)
 
     @property
     def expected(self) -> str:
@@ -63,7 +69,10 @@ class Several:
         return Values(values)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
+        return core_schema.with_info_plain_validator_function(self._read_on_axis)
+
+    def _read_on_axis(self, raw: Any, info: ValidationInfo) -> Values:
+        return self.on(info.context or LINEAR).read(raw)
 
 
 def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:

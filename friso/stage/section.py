@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from types import NoneType
-from typing import Any, ClassVar, TypeVar, get_args
+from typing import Any, ClassVar, Self, TypeVar, get_args
 
 from pydantic import (
     BaseModel,
@@ -17,6 +17,7 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
+from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, as_toml, quoted
@@ -44,10 +45,20 @@ class Section(BaseModel):
     """What is raised by it, and by the sections in it."""
 
     def __init__(self, /, **data: Any) -> None:
+        self._take(data, LINEAR)
+
+    @classmethod
+    def on(cls, kind: AxisKind, data: Mapping[str, Any]) -> Self:
+        """The section of a stage with that kind of axis, which decides on the units of its keys."""
+        section = cls.__new__(cls)
+        section._take(data, kind)
+        return section
+
+    def _take(self, data: Mapping[str, Any], kind: AxisKind) -> None:
         try:
-            super().__init__(**data)
+            self.__pydantic_validator__.validate_python(dict(data), self_instance=self, context=kind)
         except ValidationError as error:
-            raise self.refusal.of(_problems(type(self), error)) from None
+            raise self.refusal.of(_problems(type(self), error, kind)) from None
 
     def as_written(self) -> dict[str, Any]:
         """The keys that the user gave, with the values as written."""
@@ -61,11 +72,12 @@ class UncertainSection(Section):
     @field_validator("*", mode="wrap")
     @classmethod
     def _read_uncertain(cls, value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-        key, text = str(info.field_name), getattr(value, "text", value)
+        key, text, kind = str(info.field_name), getattr(value, "text", value), info.context or LINEAR
         if (field := numeric_fields(cls).get(key)) and is_range(text):
-            return uncertain_value(text, field)
+            return uncertain_value(text, field.on(kind))
         if several := list_fields(cls).get(key):
-            return several.read(value, lambda item: _perhaps_uncertain(item, several.of))
+            array = several.on(kind)
+            return array.read(value, lambda item: _perhaps_uncertain(item, array.of))
         return read(value)
 
     @property
@@ -101,16 +113,16 @@ class Table:
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str
 
-    def read(self, entry: Any) -> Any:
+    def read(self, entry: Any, info: ValidationInfo) -> Any:
         """The section for a table; a section is left as it is. Raises InputError."""
         if isinstance(entry, Section):
             return entry
         if not isinstance(entry, dict):
             raise InputError("", quoted(entry), "a table of keys", self.example)
-        return self.pick(entry)(**entry)
+        return self.pick(entry).on(info.context or LINEAR, entry)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.read, handler(source))
+        return core_schema.with_info_before_validator_function(self.read, handler(source))
 
 
 class Variants:
@@ -178,7 +190,7 @@ def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError
     return InputError(key, hint, f"one of {', '.join(names)}", example)
 
 
-def _problems(cls: type[Section], error: ValidationError) -> InputError:
+def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> InputError:
     """One InputError from pydantic's list: an unknown key first, since it often explains a missing one, and what else
     is wrong below it."""
     order = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
@@ -187,15 +199,15 @@ def _problems(cls: type[Section], error: ValidationError) -> InputError:
     }
     missing = [problem for problem in order if problem["type"] == "missing" and problem["loc"][0] not in nearest_keys]
     others = [problem for problem in order if problem["type"] != "missing"]
-    problems = [_problem(cls, problem) for problem in others]
+    problems = [_problem(cls, problem, kind) for problem in others]
     if missing:
         keys = [".".join(map(str, problem["loc"])) for problem in missing]
         actual = f"nothing; nor {', '.join(keys[1:])}" if keys[1:] else "nothing"
-        problems.append(InputError(keys[0], actual, *_described(cls, keys[0])))
+        problems.append(InputError(keys[0], actual, *_described(cls, keys[0], kind)))
     return problems[0].together(problems[1:])
 
 
-def _problem(cls: type[Section], problem: Any) -> InputError:
+def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     """The error for one entry of pydantic's list."""
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
@@ -203,8 +215,8 @@ def _problem(cls: type[Section], problem: Any) -> InputError:
         return _complete(cause, key)
     if problem["type"] == "extra_forbidden":
         near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
-        return unknown_key(key, cls.model_fields, _described(cls, near)[1])
-    return InputError(key, quoted(problem["input"]), *_described(cls, key))
+        return unknown_key(key, cls.model_fields, _described(cls, near, kind)[1])
+    return InputError(key, quoted(problem["input"]), *_described(cls, key, kind))
 
 
 def _complete(error: InputError, key: str) -> InputError:
@@ -214,19 +226,20 @@ def _complete(error: InputError, key: str) -> InputError:
     return InputError(error.key, error.actual, error.expected, example, also=error.also).under(key)
 
 
-def _described(cls: type[Section], key: str) -> tuple[str, str]:
+def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
     """What a key takes, and an example of it."""
     field = cls.model_fields[key]
     for item in field.metadata:
         if isinstance(item, Table):
             return f"a table [{key}]", item.example
         if hasattr(item, "written_example"):
+            item = item.on(kind) if hasattr(item, "on") else item
             return item.expected, f"{key} = {item.written_example}"
-    kind = next((part for part in get_args(field.annotation) if part is not NoneType and get_args(part)), None)
-    kind = kind or next((part for part in get_args(field.annotation) if part in (bool, str)), field.annotation)
-    if kind is bool:
+    type_ = next((part for part in get_args(field.annotation) if part is not NoneType and get_args(part)), None)
+    type_ = type_ or next((part for part in get_args(field.annotation) if part in (bool, str)), field.annotation)
+    if type_ is bool:
         return "true or false", f"{key} = true"
-    if kind is str:
+    if type_ is str:
         return "a text in quotes", f'{key} = "Thesis rig"'
-    choices = [as_toml(choice) for choice in get_args(kind) if choice]
+    choices = [as_toml(choice) for choice in get_args(type_) if choice]
     return f"one of {', '.join(choices)}", f"{key} = {choices[0]}"

@@ -6,6 +6,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import field_validator, model_validator
 
+from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, quoted
@@ -25,6 +26,7 @@ from friso.stage.section import Rule, Section, Table, UncertainSection, list_fie
 from friso.stage.tables import (
     FRICTION,
     MOTION,
+    Axis,
     Bias,
     FrictionSection,
     Joint,
@@ -54,6 +56,7 @@ class Stage(Section):
 
     name: str = ""
     source: str = ""
+    axis: Annotated[Axis | None, Table(lambda _: Axis, '[axis] kind = "rotary"')] = None
     masses: Annotated[Masses, Table(lambda _: Masses, '[masses] cart = "1.2 kg"')]
     friction: Annotated[FrictionSection | None, _FRICTION] = None
     joint: Annotated[Joint | None, _JOINT] = None
@@ -82,6 +85,14 @@ class Stage(Section):
         ),
     )
 
+    def __init__(self, /, **data: Any) -> None:
+        self._take(data, _axis_written(data))
+
+    @property
+    def axis_kind(self) -> AxisKind:
+        """Linear or rotary, which decides on the units."""
+        return KINDS[self.axis.kind] if self.axis else LINEAR
+
     @field_validator("name", "source")
     @classmethod
     def _can_be_saved(cls, text: str) -> str:
@@ -96,6 +107,9 @@ class Stage(Section):
         for table, what in (("parasitic", "a parasitic mode"), ("flexure", "leaf springs")):
             if getattr(self, table) and not self.joint:
                 raise StageError(table, f"{what}, but no [joint]", "both or neither", _JOINT.example)
+        if self.flexure and self.axis_kind != LINEAR:
+            text = f"leaf springs on an axis with {self.axis_kind.described}"
+            raise StageError("flexure", text, "[joint] with its stiffness", 'stiffness = "2.4 N*m/mrad"')
         self._has_one_stiffness()
         for body in ("cart", "stage"):
             if self.bias and getattr(self.bias, body) is not None and getattr(self.masses, body) is None:
@@ -207,8 +221,20 @@ class Stage(Section):
         return "\n".join(lines).lstrip() + "\n"
 
 
+def _axis_written(tables: Mapping[str, Any]) -> AxisKind:
+    """The axis that tables of a stage file are of; what is wrong with the table [axis] is found later."""
+    axis = tables.get("axis")
+    name = axis.kind if isinstance(axis, Axis) else axis.get("kind") if isinstance(axis, dict) else None
+    return KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
+
+
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
-    """Unit, bound and example of every numeric key that a stage with these tables can have."""
+    """Unit, bound and example of every numeric key that a stage with these tables can have, on its kind of axis."""
+    return {key: field.on(axis_of(flat)) for key, field in declared_keys(flat).items()}
+
+
+def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
+    """The same in the units in which keys are declared, those of a linear axis."""
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
         keys |= {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
@@ -238,6 +264,7 @@ def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
 def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
     """The classes of the tables in a flat mapping."""
     classes = {
+        "axis": Axis,
         "masses": Masses,
         "friction": friction_law(flat["friction.model"]),
         "flexure": Flexure,  # before what follows from it: the first mistake is the one reported

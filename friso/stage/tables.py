@@ -17,6 +17,12 @@ from friso.quantities import (
 from friso.stage.section import Rule, UncertainSection, Variants
 
 
+class Axis(UncertainSection):
+    """Which units the stage file is in: on a rotary axis kg m^2, N m and rad stand for kg, N and m."""
+
+    kind: Literal["linear", "rotary"] = "linear"
+
+
 class Masses(UncertainSection):
     """What moves; with both masses and no joint they move as one rigid mass."""
 

@@ -9,6 +9,7 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
+from friso.axis import AxisKind
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted
 from friso.stage import Stage, numeric_keys, parse_set
@@ -68,7 +69,7 @@ def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = F
     field = numeric_keys(stage.flat()).get(name)
     if field is None and not free:
         return _words(stage, name, values)
-    reader = _Reader(field)
+    reader = _Reader(field, stage.axis_kind)
     try:
         if isinstance(values, str) and ".." in values:
             return _range(name, values, reader, log)
@@ -83,7 +84,8 @@ class _Reader:
     A free name (`field` None) takes the SI unit of the first key of the same kind that it meets.
     """
 
-    def __init__(self, field: Quantity | Number | None) -> None:
+    def __init__(self, field: Quantity | Number | None, kind: AxisKind) -> None:
+        self.kind = kind
         self.field = None if field is None else replace(field, bound=any_sign)
 
     @property
@@ -108,9 +110,8 @@ class _Reader:
             raise InputError("", f"the unit {unit}", "bare numbers, since the key has no unit", "[0.1, 0.2, 0.3]")
         return 1.0
 
-    @staticmethod
-    def _natural(text: str) -> Quantity:
-        for unit in ("kg", "N", "m", "s", "Hz", "m/s", "m/s^2", "N/m", "N*s/m", "N/(m*s)"):
+    def _natural(self, text: str) -> Quantity:
+        for unit in map(self.kind.unit, ("kg", "N", "m", "s", "Hz", "m/s", "m/s^2", "N/m", "N*s/m", "N/(m*s)")):
             try:
                 Quantity(unit, any_sign, "").read(text)
             except InputError:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.axis import AxisKind
 from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
@@ -79,12 +80,12 @@ INFERRED = "inferred"
 """How the status of a cell begins that was not run, but lies among cells that agree."""
 
 
-def attributes_of(metric: str) -> dict[str, Any]:
-    """The attributes of the variable of a metric."""
-    attributes: dict[str, Any] = {"units": UNITS[metric]} if metric in UNITS else {}
+def attributes_of(metric: str, kind: AxisKind) -> dict[str, Any]:
+    """The attributes of the variable of a metric, of stages with that kind of axis."""
+    attributes: dict[str, Any] = {"units": kind.unit(UNITS[metric])} if metric in UNITS else {}
     bands = {"settling_time": BANDS[0], "settling_time_10um": BANDS[1], "outcome": run_outcome.BAND}
-    attributes |= {"band_m": bands[metric]} if metric in bands else {}
-    return attributes | ({"criterion": CRITERIA[metric]} if metric in CRITERIA else {})
+    attributes |= {kind.suffix("band_m"): bands[metric]} if metric in bands else {}
+    return attributes | ({"criterion": kind.text(CRITERIA[metric])} if metric in CRITERIA else {})
 
 
 def run_cells(

@@ -78,7 +78,7 @@ def harmonic_balance(
         for k, name in enumerate(names)
     }
     coords = {"crossover": ("crossover", rates, {"units": "Hz"}), "highest": list(harmonics)}
-    return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
+    return stage.axis_kind.with_units(xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol}))
 
 
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:

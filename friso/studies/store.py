@@ -97,7 +97,9 @@ class Store:
             name: da.full(study.shape, "" if name in WORDS else np.nan, chunks=-1, dtype=kind)
             for name, kind in kinds.items()
         }
-        variables = {name: (study.names, array, attributes_of(name)) for name, array in empty.items()}
+        variables = {
+            name: (study.names, array, attributes_of(name, study.stage.axis_kind)) for name, array in empty.items()
+        }
         checked = {"filters": [CRC32()]}  # for whoever reads a part of it
         encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
         coordinates = study.coordinates()

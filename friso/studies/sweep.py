@@ -146,5 +146,7 @@ def dataset(study: Study, columns: Columns) -> xr.Dataset:
     """The dataset of a study from its measures, each of the study's shape."""
     import xarray as xr
 
-    variables = {name: (study.names, columns[name], attributes_of(name)) for name in study.metrics}
+    variables = {
+        name: (study.names, columns[name], attributes_of(name, study.stage.axis_kind)) for name in study.metrics
+    }
     return xr.Dataset(variables, coords=study.coordinates(), attrs=study.attributes())

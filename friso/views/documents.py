@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 
+from friso.axis import axis_shown
+
 
 def plain_json(value: Any) -> Any:
-    """What JSON knows: plain numbers, texts, lists and tables; null for infinite and undefined numbers."""
+    """What JSON knows: plain numbers, texts, lists and tables; null for infinite and undefined numbers. The units with
+    which keys end are those of the axis that is spoken of: "amplitude_m" is "amplitude_rad" on a rotary one."""
     if isinstance(value, dict):
-        return {key: plain_json(item) for key, item in value.items()}
+        return {_on_axis(key): plain_json(item) for key, item in value.items()}
     if isinstance(value, np.ndarray | list | tuple):
         return [plain_json(item) for item in value]
     if isinstance(value, bool | np.bool_):
@@ -21,3 +24,7 @@ def plain_json(value: Any) -> Any:
     if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return value
+
+
+def _on_axis(key: Any) -> Any:
+    return axis_shown().suffix(key) if isinstance(key, str) else key

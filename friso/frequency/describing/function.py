@@ -86,7 +86,8 @@ def describing(
     variables = _variables(pairs[0], force, {"gap": motion.gap, "aliasing": aliasing, "status": status})
     shape = (len(sizes), len(rates))
     shaped = {name: (dims, v.reshape(*shape, *v.shape[1:]), words) for name, (dims, v, words) in variables.items()}
-    return xr.Dataset(shaped, coords, {"stage": stage.to_toml(), "rtol": rtol, "samples": samples})
+    attributes = {"stage": stage.to_toml(), "rtol": rtol, "samples": samples}
+    return stage.axis_kind.with_units(xr.Dataset(shaped, coords, attributes))
 
 
 def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> dict[str, Any]:

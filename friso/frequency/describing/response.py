@@ -68,7 +68,7 @@ def plant_response(
         "force": ("force", sizes, _words("N", "amplitude of the actuator force")),
         "frequency": ("frequency", rates, _words("Hz", "frequency")),
     }
-    return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
+    return stage.axis_kind.with_units(xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol}))
 
 
 def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:

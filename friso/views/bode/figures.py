@@ -25,7 +25,7 @@ from friso.views.drawing.figure import (
     Panel,
     Series,
 )
-from friso.views.drawing.prefixes import with_unit
+from friso.views.drawing.prefixes import pretty, with_unit
 
 QUARTER = 90.0
 """Phases are read in quarters of a turn [deg]."""
@@ -97,7 +97,7 @@ def _plant(bode: Bode) -> Figure:
     axis = Axis("Magnitude", "m/N", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
     above = _magnitudes(_hertz(bode), curves, axis, np.abs)
     lines = tuple(
-        Series(_hertz(bode), 1 / (mass * bode.omega**2), f"mass of {mass:.4g} kg", INK, style, 0.9)
+        Series(_hertz(bode), 1 / (mass * bode.omega**2), f"mass of {mass:.4g} {pretty('kg')}", INK, style, 0.9)
         for mass, style in zip(_masses(bode), ("dashed", "dotted"), strict=False)
     )
     caption = (

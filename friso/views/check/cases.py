@@ -6,6 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from friso.axis import axis_shown
 from friso.hunting import BANDS as SETTLING_BANDS
 from friso.views.drawing.figure import BLUE, GREEN, VERMILLION
 
@@ -16,6 +17,11 @@ if TYPE_CHECKING:
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
 LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
 BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
+
+
+def band_text(band: float) -> str:
+    """A band of settling in words."""
+    return axis_shown().text(BANDS[band])
 
 
 @dataclass(frozen=True)

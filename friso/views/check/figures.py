@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.axis import axis_shown
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.criteria.peak_count import RULE
-from friso.views.check.cases import BANDS, ShownCase, shown_cases
+from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.cycle_figures import cycle_figures
 from friso.views.check.traces import common_range, samples, subject, trace_of
 from friso.views.drawing.figure import (
@@ -99,6 +100,7 @@ def _settled(cases: list[ShownCase]) -> Figure:
         "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
         "the lines."
     )
+    caption = axis_shown().text(caption)
     return Figure("settled", "Does it hunt?", caption, (zoom, _settling(cases)), subject=subject(cases))
 
 
@@ -110,7 +112,7 @@ def _settling(cases: list[ShownCase]) -> Panel:
         lines.append(Series(samples(trace_of(item), "time"), size, item.label, item.colour))
     largest = max((float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR)
     dashes: tuple[Dash, ...] = ("dotted", "dashed")
-    bands = tuple(Limit((band,), text, INK, dash) for (band, text), dash in zip(BANDS.items(), dashes, strict=True))
+    bands = tuple(Limit((band,), band_text(band), INK, dash) for band, dash in zip(BANDS, dashes, strict=True))
     axis = Axis("|Deviation|", "m", (_FLOOR, max(2 * largest, 1e-3)), log=True)
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
-from friso.views.check.cases import BANDS, ShownCase, shown_cases
+from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
 
 if TYPE_CHECKING:
@@ -104,10 +104,10 @@ def _transient(case: Case) -> str:
         says.append(f"Transients change slowly, by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
     if judgement.settled_after is None:
         says.append(
-            f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.followed, 's')} either."
+            f"It does not settle to within {band_text(_TEN_MICRON)} in {with_unit(judgement.followed, 's')} either."
         )
     else:
-        says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.settled_after, 's')}.")
+        says.append(f"It settles to within {band_text(_TEN_MICRON)} in {with_unit(judgement.settled_after, 's')}.")
     return " ".join(says)
 
 
@@ -125,11 +125,11 @@ def _unmoved(case: Case) -> str:
 def _settled(case: Case) -> str:
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
     if fine is not None:
-        return f"settles to within {BANDS[_MICRON]} in {with_unit(fine, 's')}."
+        return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}."
     if coarse is not None:
-        within = f"settles to within {BANDS[_TEN_MICRON]} in {with_unit(coarse, 's')}"
-        return f"{within}, but does not stay within {BANDS[_MICRON]}."
-    return f"settles, but not to within {BANDS[_TEN_MICRON]} ({_end(case)})."
+        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}"
+        return f"{within}, but does not stay within {band_text(_MICRON)}."
+    return f"settles, but not to within {band_text(_TEN_MICRON)} ({_end(case)})."
 
 
 def _doubts(case: Case) -> list[str]:

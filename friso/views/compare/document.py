@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria.peak_count import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
@@ -24,7 +25,10 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             "stage": comparison.stage.name,
             "seed": comparison.seed,
             "machines": machines.count,
-            "criteria": {"swings": f"{OUTCOME}; band: within_m", "distinct_peaks": PEAKS},
+            "criteria": {
+                "swings": f"{OUTCOME}; band: {axis_shown().suffix('within_m')}",
+                "distinct_peaks": axis_shown().text(PEAKS),
+            },
             "within_m": comparison.within,
             "deadband_m": comparison.options.deadband,
             "sample_time_s": comparison.stage.flat()["drive.sample_time"],

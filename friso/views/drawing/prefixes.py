@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from friso.axis import unit_shown
 from friso.views.drawing.figure import Array
 
 NOTHING = "–"
@@ -15,7 +16,7 @@ NOTHING = "–"
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
 # times beyond seconds and slow frequencies are read best as they are.
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_PREFIXED = {"m": (-9, 0), "s": (-9, 0), "N": (-9, 9), "Hz": (0, 9)}
+_PREFIXED = {"m": (-9, 0), "rad": (-9, 0), "s": (-9, 0), "N": (-9, 9), "Hz": (0, 9)}
 _SIGNS = str.maketrans({"*": "·"})
 _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 
@@ -23,9 +24,11 @@ _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
     """Factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
 
-    The largest magnitude falls between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle
-    of the range does. Units without prefix (kg, rad, m^2) keep the factor 1. Only finite values count.
+    The unit is shown as it is on the axis that is spoken of: "m" as "rad" on a rotary one. The largest magnitude falls
+    between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle of the range does. Units without
+    prefix (kg, m^2) keep the factor 1. Only finite values count.
     """
+    unit = unit_shown(unit)
     symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
     text = pretty(unit)
     magnitudes = np.abs(values[np.isfinite(values) & (values != 0)])
@@ -42,7 +45,8 @@ def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
 
 
 def pretty(unit: str) -> str:
-    """A unit as it is printed: "N*s/m^2" becomes "N·s/m²"."""
+    """A unit as it is printed: "N*s/m^2" becomes "N·s/m²", and as it is on the axis that is spoken of."""
+    unit = unit_shown(unit)
     for plain, raised in _POWERS.items():
         unit = unit.replace(plain, raised)
     return unit.translate(_SIGNS)

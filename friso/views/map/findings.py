@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.axis import axis_shown
 from friso.hunting.criteria.run_outcome import BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
 from friso.views.drawing.prefixes import listed
@@ -191,7 +192,7 @@ def statement(runs: xr.Dataset, metric: str) -> str:
 def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
     """What the words mean that stand in a map."""
     return [
-        (word, text)
+        (word, axis_shown().text(text))
         for name, texts in MEANINGS.items()
         for word in word_counts(runs, name)
         if (text := (texts | _NO_RESULT).get(word))

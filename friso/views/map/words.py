@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.axis import axis_shown
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.studies.cells import NOTHING, SWING, UNKNOWN
 from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
@@ -108,7 +109,7 @@ def in_sentence(key: Hashable) -> str:
 
 def variable(name: Hashable) -> str:
     """A variable in words: "period" is "Period"."""
-    return _VARIABLES.get(str(name)) or quantity(name)
+    return axis_shown().text(_VARIABLES.get(str(name)) or quantity(name))
 
 
 def word_kind(name: str, word: str) -> Kind:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from friso.axis import unit_shown
 from friso.identify.logs.mapping import Mapping, mapping_text, sidecar
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog
@@ -48,7 +49,7 @@ def stage_text(stage: Stage, seed: int) -> str:
 def write_csv(path: Path, interval: float, signals: abc.Mapping[str, np.ndarray], heading: str) -> None:
     """Write signals of shape (n,) by role, every `interval` [s], below a line of comment (OSError where that is
     impossible). Twelve digits: a nanometre in a kilometre."""
-    names = ["time [s]", *(f"{role} [{UNITS.get(role, 'm')}]" for role in signals)]
+    names = ["time [s]", *(f"{role} [{unit_shown(UNITS.get(role, 'm'))}]" for role in signals)]
     count = len(next(iter(signals.values())))
     columns = np.column_stack([np.arange(count) * interval, *signals.values()])
     with path.open("w", encoding="utf-8", newline="\n") as file:

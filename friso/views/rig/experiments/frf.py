@@ -27,7 +27,7 @@ from friso.views.drawing.figure import (
     Panel,
     Series,
 )
-from friso.views.drawing.prefixes import listed, with_unit
+from friso.views.drawing.prefixes import listed, pretty, with_unit
 from friso.views.rig.outcome_view import OutcomeView
 
 COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
@@ -49,8 +49,8 @@ def sentences(outcome: Outcome) -> list[str]:
         f"Joint free: first mode near {with_unit(result.free.first_mode, 'Hz')}, above it a mass of "
         f"{_mass(result.free.mass)}.",
         f"A motor that gives {RATIOS[1]:g} of the assumed force makes these masses {result.apparent[0, 1]:.3g} and "
-        f"{result.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
-        f"{result.apparent[0, 2]:.3g} and {result.apparent[1, 2]:.3g} kg: a machine that appears heavier has a motor "
+        f"{result.apparent[1, 1]:.3g} {pretty('kg')}; one that gives {RATIOS[2]:g} times the force makes them "
+        f"{result.apparent[0, 2]:.3g} and {result.apparent[1, 2]:.3g} {pretty('kg')}: a machine that appears heavier has a motor "
         "weaker than assumed.",
         f"Joint locked, open loops cross 0 dB as follows: tuned to {tuned}; at the highest setting {above}.{unstable}",
         f"Joint free, the loop tuned to {with_unit(result.free_loop.tuned, 'Hz')} crosses at "
@@ -88,7 +88,7 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
             Series(
                 reach,
                 1 / (plant.mass.value * (2 * np.pi * reach) ** 2),
-                f"mass line, {plant.mass.value:.3g} kg",
+                f"mass line, {plant.mass.value:.3g} {pretty('kg')}",
                 INK,
                 "dashed",
             )
@@ -153,7 +153,11 @@ def _frequency(hertz: Array) -> Axis:
 
 
 def _mass(mass: Estimate) -> str:
-    return f"{mass.value:.3g} kg ({mass.low:.3g} to {mass.high:.3g})" if mass.determined else f"nothing ({mass.reason})"
+    return (
+        f"{mass.value:.3g} {pretty('kg')} ({mass.low:.3g} to {mass.high:.3g})"
+        if mass.determined
+        else f"nothing ({mass.reason})"
+    )
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:

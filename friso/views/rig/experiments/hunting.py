@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.axis import axis_shown
 from friso.hunting.criteria.peak_count import COUNTED_ABOVE, CRITERION, DISTINCT_CRITERION
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
@@ -185,7 +186,7 @@ def _shares(moves: HuntingResult) -> Figure:
     return Figure(
         "hunting_shares",
         f"Share of {len(moves.rails)} rails with counted peaks after the move",
-        f"{CRITERION[0].upper()}{CRITERION[1:]}.",
+        axis_shown().text(f"{CRITERION[0].upper()}{CRITERION[1:]}."),
         (Panel(panel.title, panel.x, panel.y, panel.series, bands=tuple(bands[:1])),),
     )
 
@@ -234,7 +235,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     }
     started = {"displacements_m": moves.displacements}
     return {
-        "criteria": CRITERIA,
+        "criteria": {**CRITERIA, "distinct_peaks": axis_shown().text(DISTINCT_CRITERION)},
         "distance_m": moves.distance,
         "crossovers_hz": moves.crossovers,
         "rail_seeds": moves.rails,

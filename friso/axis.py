@@ -1,0 +1,101 @@
+"""Linear and rotary axes. Everything is declared in the units of a linear axis; on a rotary one angles stand for
+lengths, torques for forces and moments of inertia for masses, in the same equations. Every text of a unit comes from
+here: of keys (`AxisKind.unit`), and of whatever is shown (`unit_shown`, of the axis that is `spoken_of`)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import Any
+
+AXIS_KIND = "axis.kind"
+"""Stage-file key."""
+
+LENGTH, FORCE, MASS = "m", "N", "kg"
+
+
+@dataclass(frozen=True)
+class AxisKind:
+    """A kind of axis: its name, and what stands for metre, newton and kilogram."""
+
+    name: str
+    length: str = LENGTH
+    force: str = FORCE
+    mass: str = MASS
+
+    @property
+    def described(self) -> str:
+        """In a message about a unit."""
+        return f'[axis] kind = "{self.name}"'
+
+    def unit(self, unit: str) -> str:
+        """The unit on this axis for one of a linear axis: "N*s/m" is "N*m*s/rad" on a rotary one. A unit that is of
+        this axis already stays as it is."""
+        if self.length == LENGTH or _TURNED.search(unit):
+            return unit
+        return _BELOW.sub(r"(\1)", _PARTS.sub(self._part, unit))
+
+    def text(self, sentence: str) -> str:
+        """A sentence with lengths, forces and masses in numbers, on this axis: "0.1 mm" is "0.1 mrad"."""
+        return sentence if self.length == LENGTH else _NUMBERS.sub(lambda match: self.unit(match[0]), sentence)
+
+    def with_units(self, dataset: Any) -> Any:
+        """An xarray.Dataset on this axis, the units of whose variables are those of a linear one."""
+        for array in dataset.variables.values():
+            array.attrs.update({key: self.unit(array.attrs[key]) for key in ("units",) if key in array.attrs})
+            array.attrs.update({key: self.text(array.attrs[key]) for key in ("criterion",) if key in array.attrs})
+        return dataset
+
+    def _part(self, match: re.Match[str]) -> str:
+        prefix, base = match["prefix"], match["base"]
+        return prefix + {LENGTH: self.length, FORCE: self.force, MASS: self.mass}[base]
+
+    def suffix(self, key: str) -> str:
+        """A key of a JSON document with the unit that it ends with, "force_n", as it is on this axis: "force_n_m"."""
+        if self.length == LENGTH:
+            return key
+        name, unit = _SUFFIX.fullmatch(key).group("name", "unit")  # type: ignore[union-attr]
+        return name + "".join(_IN_KEYS.get(part, part) for part in re.split("(_)", unit))
+
+
+_TURNED = re.compile(r"rad|N[*· ]m|kg[*· ]m")
+_PARTS = re.compile(r"(?<![A-Za-zµ^])(?P<prefix>[numµkM]??)(?P<base>kg|N|m)(?![A-Za-z])")
+_BELOW = re.compile(r"(?<=/)(N\*m|kg\*m\^2)")
+_NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z])(?:/m?s)?")
+_SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
+_IN_KEYS: Mapping[str, str] = {"m": "rad", "n": "n_m", "ns": "n_m_s", "kg": "kg_m2"}
+
+LINEAR = AxisKind("linear")
+ROTARY = AxisKind("rotary", "rad", "N*m", "kg*m^2")
+KINDS: Mapping[str, AxisKind] = {kind.name: kind for kind in (LINEAR, ROTARY)}
+
+
+def axis_of(flat: Mapping[str, Any]) -> AxisKind:
+    """The kind of axis of a stage given as flat keys."""
+    return KINDS[flat.get(AXIS_KIND, LINEAR.name)]
+
+
+_SPOKEN_OF: ContextVar[AxisKind] = ContextVar("axis", default=LINEAR)
+
+
+@contextmanager
+def spoken_of(kind: AxisKind) -> Iterator[None]:
+    """Within this, what is shown is in the units of an axis of that kind."""
+    token = _SPOKEN_OF.set(kind)
+    try:
+        yield
+    finally:
+        _SPOKEN_OF.reset(token)
+
+
+def axis_shown() -> AxisKind:
+    """The kind of the axis that is spoken of."""
+    return _SPOKEN_OF.get()
+
+
+def unit_shown(unit: str) -> str:
+    """The unit, on the axis that is spoken of, for one of a linear axis."""
+    return axis_shown().unit(unit)
