@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from friso.axis import ROTARY
 from friso.quantities import Quantity, any_sign
 from friso.stage.stage import Stage
 
@@ -45,10 +46,25 @@ _USUAL: Mapping[str, _Usual] = {
 }
 
 
+_INERTIA = _Usual(1e-9, 1e4, "kg*m^2", ("kg*m^2", "g*m^2", "kg*cm^2", "g*cm^2", "kg*mm^2"))
+_TORQUE = _Usual(1e-7, 1e5, "N*m", ("N*m", "mN*m", "uN*m", "kN*m"))
+_ANGLE = _Usual(1e-8, 1e3, "rad", ("rad", "mrad", "urad", "deg"))
+
+_ROTARY: Mapping[str, _Usual] = {
+    **{key: usual for key, usual in _USUAL.items() if usual.unit in ("Hz", "s")},
+    **dict.fromkeys(("masses.cart", "masses.stage"), _INERTIA),
+    **dict.fromkeys(("joint.stroke", "motion.size", "motion.displacement"), _ANGLE),
+    **dict.fromkeys(("friction.static", "friction.coulomb"), _TORQUE),
+    "friction.stribeck_velocity": _Usual(1e-7, 100.0, "rad/s", ("rad/s", "mrad/s", "urad/s", "deg/s")),
+}
+"""What rotary axes have, from a mirror to a telescope."""
+
+
 def doubts(stage: Stage) -> Iterator[str]:
     """A sentence on each value that is hardly meant: key, value, and the unit that probably was."""
     flat = stage.flat()
-    for key, usual in _usual(flat).items():
+    usual_values = _ROTARY if stage.axis_kind == ROTARY else _usual(flat)
+    for key, usual in usual_values.items():
         value = flat.get(key)
         if value and not usual.low <= value <= usual.high:
             written = _written(stage, key) or f"{value:.6g} {usual.unit}"

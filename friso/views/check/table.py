@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from friso.axis import axis_shown
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.views.check.cases import BANDS, ShownCase
 from friso.views.check.words import at_the_end, edge_text
@@ -18,7 +19,7 @@ _WINDOWS = 4  # windows of kicks that are listed, at most
 
 def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some case has something to say."""
-    texts = [(name, [text(item.case) for item in cases]) for name, text in _COLUMNS.items()]
+    texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in _COLUMNS.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
