@@ -1,12 +1,11 @@
 """Linear and rotary axes. Everything is declared in the units of a linear axis; on a rotary one angles stand for
 lengths, torques for forces and moments of inertia for masses, in the same equations. Every text of a unit comes from
-here: of keys (`AxisKind.unit`), and of whatever is shown (`unit_shown`, of the axis that is `spoken_of`)."""
+here: of keys (`AxisKind.unit`), and of whatever is shown (`unit_shown`, of the axis that a command speaks of)."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
@@ -81,14 +80,9 @@ def axis_of(flat: Mapping[str, Any]) -> AxisKind:
 _SPOKEN_OF: ContextVar[AxisKind] = ContextVar("axis", default=LINEAR)
 
 
-@contextmanager
-def spoken_of(kind: AxisKind) -> Iterator[None]:
-    """Within this, what is shown is in the units of an axis of that kind."""
-    token = _SPOKEN_OF.set(kind)
-    try:
-        yield
-    finally:
-        _SPOKEN_OF.reset(token)
+def speak_of(kind: AxisKind) -> None:
+    """What is shown in this context (`contextvars`) is in the units of an axis of that kind from here on."""
+    _SPOKEN_OF.set(kind)
 
 
 def axis_shown() -> AxisKind:

@@ -9,6 +9,7 @@ import io
 import logging
 import sys
 from collections.abc import Callable, Iterable
+from contextvars import copy_context
 from typing import Annotated, Any, NoReturn
 
 import typer
@@ -120,7 +121,7 @@ def _run() -> int:
     logging.getLogger("friso").addHandler(messages)
     if {"-h", "--help"} & {*sys.argv[1:2]}:
         app.info.epilog = _plug_ins()
-    return app(standalone_mode=False) or 0
+    return copy_context().run(app, standalone_mode=False) or 0
 
 
 def _failed(error: BaseException) -> int:

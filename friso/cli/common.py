@@ -10,9 +10,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from click import get_current_context
 
-from friso.axis import spoken_of
+from friso.axis import speak_of
 from friso.cli.terminal import console
 from friso.errors import InputError
 from friso.escapes import one_line
@@ -135,7 +134,7 @@ def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:
 
 def in_units_of(stage: Stage) -> Stage:
     """The stage, whose kind of axis decides on the units of all that the command shows from here on."""
-    get_current_context().with_resource(spoken_of(stage.axis_kind))
+    speak_of(stage.axis_kind)
     return stage
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.axis import axis_of
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import Kernel, kernel
@@ -65,9 +66,9 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
 
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
     """The model's outputs from its states, shape (states, samples), at the times [s], as variables over "time"."""
-    arrays = sampled_outputs(shape, flat, states, time)
+    arrays, kind = sampled_outputs(shape, flat, states, time), axis_of(flat)
     return {
-        name: ("time", array, {"units": unit, "long_name": label})
+        name: ("time", array, {"units": kind.unit(unit), "long_name": label})
         for (name, (unit, label)), array in zip(shape.outputs.items(), arrays, strict=True)
     }
 

@@ -1,0 +1,221 @@
+"""A rotary axis has the numbers of a linear one with the same SI values, in other units, through every command."""
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from inside import friso_inside
+
+import friso
+from friso.axis import LINEAR, ROTARY, speak_of, unit_shown
+from friso.errors import InputError, StageError
+from friso.intervals import UncertainValue
+from friso.stage import Stage, numeric_keys
+from friso.stage.plausible import doubts
+from friso.views.drawing.prefixes import with_unit
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+LENGTHS = re.compile(r"[0-9]\s(?:[mnµu]?m|k?N|kg)(?![a-zA-Z·*])")
+"""Numbers in units of a linear axis."""
+
+
+def turned(value: Any) -> Any:
+    """What is written in a stage file, on a rotary axis."""
+    if isinstance(value, dict):
+        return {key: turned(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [turned(item) for item in value]
+    number, _, unit = value.partition(" ") if isinstance(value, str) else ("", "", "")
+    return f"{number} {ROTARY.unit(unit)}" if unit and number[:1].isdigit() else value
+
+
+def rotary(stage: Stage) -> Stage:
+    tables = stage.as_written()
+    tables = {key: turned(item) if isinstance(item, dict) else item for key, item in tables.items()}
+    return Stage(**{**tables, "axis": {"kind": "rotary"}})
+
+
+def numbers(document: Any) -> Any:
+    """A document without its texts, its keys as on a rotary axis."""
+    if isinstance(document, dict):
+        return {ROTARY.suffix(key): numbers(item) for key, item in document.items() if key not in ("files", "written")}
+    if isinstance(document, list):
+        return [numbers(item) for item in document]
+    return None if isinstance(document, str) else document
+
+
+@pytest.fixture(scope="module")
+def pair() -> tuple[Stage, Stage]:
+    linear = friso.load(EXAMPLES / "thesis_drive.toml").replace(
+        {"joint.locked": True, "parasitic": None, "motion": {"kind": "step", "size": "5 mm", "duration": "10 s"}}
+    )
+    return linear, rotary(linear)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory, pair: tuple[Stage, Stage]) -> Path:
+    folder = tmp_path_factory.mktemp("rotary")
+    for name, stage in zip(("linear", "rotary"), pair, strict=True):
+        (folder / f"{name}.toml").write_text(stage.to_toml(), encoding="utf-8")
+    return folder
+
+
+def test_the_numbers_are_those_of_a_linear_axis_in_other_units(pair: tuple[Stage, Stage]) -> None:
+    linear, turntable = pair
+    flat = turntable.flat()
+    assert flat.pop("axis.kind") == "rotary"
+    assert flat == linear.flat()
+    assert friso.loads(turntable.to_toml()) == turntable
+    units = {key: field.unit for key, field in numeric_keys(turntable.flat()).items()}
+    assert units["masses.cart"] == "kg*m^2"
+    assert units["friction.bristle_damping"] == "N*m*s/rad"
+    assert units["drive.encoder_resolution"] == "rad"
+    assert units["controller.crossover"] == "Hz"
+    assert not [*doubts(turntable)]
+    again = turntable.with_numbers({"friction.static": 2.5})
+    assert again.flat()["friction.static"] == 2.5
+
+
+def test_uncertain_and_other_units_are_read(pair: tuple[Stage, Stage]) -> None:
+    changed = pair[1].replace(
+        {
+            "friction.static": "300 N*cm +/- 10 %",
+            "friction.stribeck_velocity": "0.1 deg/s",
+            "friction.bristle_stiffness": "1e5 N*m",
+            "masses.cart": "1.2e4 kg*cm^2",
+        }
+    )
+    flat = changed.flat()
+    assert flat["friction.static"] == pytest.approx(3.0)
+    assert isinstance(changed.friction.static, UncertainValue)  # type: ignore[union-attr]
+    assert flat["friction.stribeck_velocity"] == pytest.approx(np.radians(0.1))
+    assert flat["friction.bristle_stiffness"] == 1e5
+    assert flat["masses.cart"] == pytest.approx(1.2)
+
+
+@pytest.mark.parametrize("entry", ["3 N", "3 N/rad", "3 rad", "3 kg*m^2"])
+def test_a_force_is_no_torque(pair: tuple[Stage, Stage], entry: str) -> None:
+    with pytest.raises(StageError) as wrong:
+        pair[1].replace({"friction.static": entry})
+    message = str(wrong.value)
+    assert "friction.static" in message
+    assert "N*m" in message
+    assert '[axis] kind = "rotary"' in message
+    assert "also" not in message
+
+
+def test_a_torque_is_no_force(pair: tuple[Stage, Stage]) -> None:
+    with pytest.raises(StageError, match=r'it would be of a rotary axis, \[axis\] kind = "rotary"'):
+        pair[0].replace({"friction.static": "3 N*m"})
+    with pytest.raises(InputError, match="given"):
+        pair[0].replace({"axis.kind": "round"})
+    with pytest.raises(StageError, match="leaf springs on an axis"):
+        rotary(friso.load(EXAMPLES / "thesis_leaves.toml"))
+
+
+@pytest.mark.parametrize(
+    ("linear", "turned"),
+    [
+        ("N*s/m", "N*m*s/rad"),
+        ("N/(m*s)", "N*m/(rad*s)"),
+        ("m/N", "rad/(N*m)"),
+        ("kg", "kg*m^2"),
+        ("um", "urad"),
+        ("N/mm", "N*m/mrad"),
+        ("m/s^2", "rad/s^2"),
+        ("ms", "ms"),
+        ("Hz", "Hz"),
+        ("1", "1"),
+    ],
+)
+def test_units(linear: str, turned: str) -> None:
+    assert ROTARY.unit(linear) == turned
+    assert ROTARY.unit(turned) == turned
+    assert LINEAR.unit(linear) == linear
+
+
+def test_prefixes() -> None:
+    try:
+        speak_of(ROTARY)
+        assert with_unit(5.2e-4, "m") == "0.520 mrad" or with_unit(5.2e-4, "m") == "520 µrad"
+        assert with_unit(1.7e-6, "m") == "1.70 µrad"
+        assert with_unit(3e-3, "N") == "3.00 mN·m"
+        assert with_unit(2400.0, "N/m") == "2.40 kN·m/rad"
+        assert with_unit(2.0, "kg") == "2.00 kg·m²"
+        assert unit_shown("N*s/m") == "N*m*s/rad"
+    finally:
+        speak_of(LINEAR)
+    assert with_unit(1.7e-6, "m") == "1.70 µm"
+
+
+def test_time_responses(folder: Path) -> None:
+    documents = []
+    for name in ("linear", "rotary"):
+        answer = friso_inside(folder, "simulate", f"{name}.toml", "--sample-time", "10 ms", "--out", name, "--json")
+        assert answer.returncode == 0
+        documents.append(json.loads(answer.stdout))
+    assert numbers(documents[0]) == without_files(documents[1])
+    tables = [pd.read_csv(folder / name / f"{name}_response.csv") for name in ("linear", "rotary")]
+    assert (tables[0].values == tables[1].values).all()
+    assert {"position [rad]", "velocity [rad/s]", "force [N*m]", "bristle_deflection [rad]"} <= {*tables[1]}
+    assert not LENGTHS.search(documents[1]["conclusion"])
+
+
+def without_files(document: Any) -> Any:
+    return {key: blank(item) for key, item in document.items() if key not in ("files", "written")}
+
+
+def blank(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: blank(item) for key, item in value.items() if key not in ("files", "written")}
+    if isinstance(value, list):
+        return [blank(item) for item in value]
+    return None if isinstance(value, str) else value
+
+
+COMMANDS = {
+    "check": (),
+    "bode": (),
+    "boundary": ("--x", "controller.crossover=6 Hz..12 Hz"),
+    "map": ("--x", "controller.crossover=6 Hz..12 Hz:2", "--y", "{static}:2"),
+}
+
+
+@pytest.mark.parametrize("command", [*COMMANDS])
+def test_commands(folder: Path, command: str) -> None:
+    documents = []
+    for name, static in (("linear", "friction.static=2 N..3 N"), ("rotary", "friction.static=2 N*m..3 N*m")):
+        options = [option.format(static=static) for option in COMMANDS[command]]
+        out = folder / f"{command}_{name}{'.zarr' if command == 'map' else ''}"
+        answer = friso_inside(folder, command, f"{name}.toml", *options, "--out", out, "--json")
+        assert answer.returncode == 0, answer.stderr
+        documents.append(json.loads(answer.stdout))
+        pages = [*out.rglob("*.html"), *folder.glob(f"{command}_{name}*.html")]
+        assert pages
+        if name == "rotary":
+            said = LENGTHS.search(answer.stderr + " ".join(texts(documents[1])))
+            assert not said, said
+    assert numbers(documents[0]) == without_files(documents[1])
+
+
+def texts(value: Any) -> list[str]:
+    if isinstance(value, dict):
+        return [text for item in value.values() for text in texts(item)]
+    if isinstance(value, list):
+        return [text for item in value for text in texts(item)]
+    return [value] if isinstance(value, str) else []
+
+
+def test_logs_of_the_rig_are_in_its_units(folder: Path) -> None:
+    answer = friso_inside(folder, "rig", "presliding", "rotary.toml", "--out", "log", "--json")
+    assert answer.returncode == 0, answer.stderr
+    first = next(path for path in (folder / "log").glob("*.csv"))
+    heading = first.read_text(encoding="utf-8").splitlines()[1]
+    assert "position [rad]" in heading
+    assert "force [N*m]" in heading
+    assert not LENGTHS.search(" ".join(texts(json.loads(answer.stdout))))
