@@ -7,8 +7,8 @@ in the flat stage and a derivative with respect to it is a sensitivity to that k
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, cast
+from dataclasses import dataclass, field, replace
+from typing import Any, Self, cast
 
 import sympy as sp
 
@@ -124,6 +124,10 @@ class Kink:
     def at_start(self) -> sp.Expr:
         """Positive in the states from which a run begins beyond."""
         return self.surface
+
+    def called(self, name: str) -> Self:
+        """The same with another name; `beyond` is to be replaced in what contains it."""
+        return replace(self, name=name)
 
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
         """The same with expressions put in the place of others."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sympy as sp
 
 from friso.equations.component import Component, Kink, Output, key
+from friso.equations.masses import beyond_stops, stops
 from friso.equations.structure import JointForm
 
 
@@ -27,12 +28,8 @@ def joint(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr,
         force = leaves + contact
     else:
         stroke = key("joint.stroke")
-        ahead, behind = kinks = touching(deflection)
-        force = (
-            leaves
-            + (ahead.beyond + behind.beyond) * contact
-            + (behind.beyond - ahead.beyond) * key("joint.limiter_stiffness") * stroke
-        )
+        kinks = touching(deflection)
+        force = leaves + beyond_stops(kinks, contact, key("joint.limiter_stiffness") * stroke)
     outputs = {
         "joint_deflection": Output(deflection, "m", "joint deflection"),
         "joint_force": Output(force, "N", "joint force"),
@@ -42,5 +39,4 @@ def joint(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr,
 
 def touching(deflection: sp.Expr) -> tuple[Kink, Kink]:
     """Where the limiter of a free joint touches, ahead and behind, for a deflection [m]."""
-    stroke = key("joint.stroke")
-    return Kink("stroke_ahead", deflection - stroke), Kink("stroke_behind", -deflection - stroke)
+    return stops(deflection, key("joint.stroke"), "stroke")

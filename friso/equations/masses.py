@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from friso.equations.component import STEADY, Component, Output, Role, State, key, state
+from friso.equations.component import STEADY, Component, Kink, Output, Role, State, key, state
 
 
 @dataclass(frozen=True)
@@ -49,3 +49,15 @@ def position_outputs(prefix: str, name: str, body: Body) -> Component:
             f"{prefix}velocity": Output(body.velocity, "m/s", f"{name} velocity"),
         }
     )
+
+
+def stops(deflection: sp.Expr, reach: sp.Expr, name: str) -> tuple[Kink, Kink]:
+    """Where two bodies touch, ahead and behind, that may move against each other by a reach [m] to either side."""
+    return Kink(f"{name}_ahead", deflection - reach), Kink(f"{name}_behind", -deflection - reach)
+
+
+def beyond_stops(stops: tuple[Kink, Kink], contact: sp.Expr, reached: sp.Expr) -> sp.Expr:
+    """Force [N] between them: what the `contact` would exert [N] if it always touched, less what it has `reached` at
+    the stops [N]; nothing between these."""
+    ahead, behind = stops
+    return (ahead.beyond + behind.beyond) * contact + (behind.beyond - ahead.beyond) * reached

@@ -16,7 +16,9 @@ from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.structure import ControllerForm, Structure
+from friso.equations.transmission import BACKLASH, at_motor, transmission
 from friso.stage.tables import friction_law
+from friso.stage.transmission import MOTOR_MASS
 
 REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
 """Position, velocity and acceleration of the reference at its last corner."""
@@ -121,20 +123,22 @@ def assemble(structure: Structure, external: External | None = None, control: Co
 
     Instead of the structure's controller in continuous time there may be another one.
     """
-    cart, stage, parasitic = _bodies(structure)
-    friction = friction_law(structure.friction).declare(cart.velocity, structure.friction_variant)
+    chain = _bodies(structure)
+    friction = friction_law(structure.friction).declare(chain.cart.velocity, structure.friction_variant)
+    motor_friction = _motor_friction(structure, chain)
     position, velocity, acceleration = REFERENCE
     reference = position + velocity * TIME + acceleration * TIME**2 / 2
     reference_velocity = velocity + acceleration * TIME
-    moving = cart.mass + (stage.mass if stage is not cart else 0) + (parasitic.mass if parasitic else 0)
-    length, rate = _scales(structure, friction, moving)
-    loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity, acceleration)
+    breakaway = _breakaway(structure, friction, motor_friction)
+    length, rate = _scales(structure, breakaway, chain.mass)
+    stage, rated = chain.measured(structure)
+    loop = Loop(reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration)
     form = structure.controller
     if control is None and form is not None:
         control = partial(continuous_controller, form)
     acting = control(loop, length, rate) if control else None
-    forces = (acting.force if acting else sp.S.Zero) + (external(stage) if external else sp.S.Zero)
-    bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, forces, (length, rate))
+    forces = Forces(acting.force if acting else sp.S.Zero, external(chain.stage) if external else sp.S.Zero)
+    bodies, parts = _mechanics(structure, chain, (friction, motor_friction), forces, (length, rate))
     if acting:
         parts.append(acting.component)
     outputs = {
@@ -147,14 +151,14 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     return Model(
         states=(*bodies, *(part_state for part in parts for part_state in part.states)),
         stage=stage,
-        cart=cart,
+        cart=chain.cart,
         kinks=kinks,
         outputs=outputs,
         deviation=stage.position - reference,
         deviation_rate=stage.velocity - reference_velocity,
         length=length,
         rate=rate,
-        breakaway=friction.breakaway if friction else sp.S.Zero,
+        breakaway=breakaway,
         stiffness=loop_stiffness(structure.controller),
         jumps=resets(kinks),
         held=acting.held if acting else (),
@@ -166,28 +170,87 @@ def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
     return form.law.stiffness(Continuous(sp.S.One), form.variant) if form else sp.S.Zero
 
 
-def _bodies(structure: Structure) -> tuple[Body, Body, Body | None]:
-    """Cart, stage (the same body when rigid) and parasitic mass."""
+@dataclass(frozen=True)
+class Chain:
+    """The bodies: cart, stage (the same when rigid), parasitic mass and motor."""
+
+    cart: Body
+    stage: Body
+    parasitic: Body | None = None
+    motor: Body | None = None
+
+    @property
+    def mass(self) -> sp.Expr:
+        """All that moves [kg]."""
+        mass = self.cart.mass + (self.stage.mass if self.stage is not self.cart else 0)
+        mass += self.parasitic.mass if self.parasitic else 0
+        return mass + (self.motor.mass if self.motor else 0)
+
+    def measured(self, structure: Structure) -> tuple[Body, Body]:
+        """Those whose position and whose velocity the controller acts on."""
+        form = structure.transmission
+        sides = (form.position, form.velocity) if form else ("load", "load")
+        on_position, on_velocity = (self.motor if side == "motor" and self.motor else self.stage for side in sides)
+        return on_position, on_velocity
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Forces [N] of the actuator, and from outside on the stage."""
+
+    actuator: sp.Expr
+    external: sp.Expr
+
+
+def _bodies(structure: Structure) -> Chain:
+    motor = Body.named("motor_", key(MOTOR_MASS)) if structure.transmission else None
     if structure.joint == "rigid":
         rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero))
-        return rigid, rigid, None
+        return Chain(rigid, rigid, motor=motor)
     cart = Body.named("cart_", key("masses.cart"))
     if not structure.parasitic:
-        return cart, Body.named("", key("masses.stage")), None
+        return Chain(cart, Body.named("", key("masses.stage")), motor=motor)
     part = key("parasitic.mass")
-    return cart, Body.named("", key("masses.stage") - part), Body.named("parasitic_", part)
+    return Chain(cart, Body.named("", key("masses.stage") - part), Body.named("parasitic_", part), motor)
 
 
-def _scales(structure: Structure, friction: Friction | None, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+def _positions(structure: Structure, chain: Chain) -> list[Component]:
+    """Position and velocity of the stage; behind a transmission, of the side that is measured, and of the other."""
+    if not (structure.transmission and chain.motor):
+        return [position_outputs("", "stage", chain.stage)]
+    sides = {"load": chain.stage, "motor": chain.motor}
+    measured = sides.pop(structure.transmission.position)
+    own = position_outputs("", structure.transmission.position, measured)
+    return [own, *(position_outputs(f"{side}_", side, body) for side, body in sides.items())]
+
+
+def _motor_friction(structure: Structure, chain: Chain) -> Friction | None:
+    """The friction law at the motor."""
+    form = structure.transmission
+    if form is None or chain.motor is None:
+        return None
+    velocity = chain.cart.velocity
+    friction = friction_law(form.friction).declare(velocity, form.friction_variant)
+    return at_motor(friction, velocity, chain.motor.velocity) if friction else None
+
+
+def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
+    """The largest force [N] with which the controller may pull while nothing moves that it measures: the friction
+    forces at rest, and what it exerts half a backlash off its reference."""
+    force = sum((friction.breakaway for friction in frictions if friction), start=sp.S.Zero)
+    return force + (loop_stiffness(structure.controller) * BACKLASH / 2 if structure.plays else 0)
+
+
+def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
     """Length [m] by which the break-away force deflects the control loop (about the motion itself where that is
     shorter), and the natural frequency of mass and loop [1/s]: a hunting cycle is a few of the one in size and period.
     Without friction the length is that of the motion, or else the deflection by the forces of [bias]."""
     stiffness = loop_stiffness(structure.controller)
-    if friction is None:
+    if breakaway == 0:
         bias = sum((sp.Abs(key(f"bias.{name}")) for name in structure.biased), start=sp.S.Zero)
         length, still = MOTION_SIZE, bias / stiffness if bias else sp.S.Zero
     else:
-        still = friction.breakaway / stiffness
+        still = breakaway / stiffness
         length = sp.Max(sp.Min(MOTION_SIZE, still), SMALLEST_LENGTH * MOTION_SIZE)
     length = sp.Piecewise((length, MOTION_SIZE > 0), (still, True))
     return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
@@ -195,18 +258,26 @@ def _scales(structure: Structure, friction: Friction | None, mass: sp.Expr) -> t
 
 def _mechanics(
     structure: Structure,
-    bodies: tuple[Body, Body, Body | None],
-    friction: Friction | None,
-    force: sp.Expr,
+    chain: Chain,
+    frictions: tuple[Friction | None, Friction | None],
+    forces: Forces,
     scales: tuple[sp.Expr, sp.Expr],
 ) -> tuple[list[State], list[Component]]:
-    """Newton's law for every body, a `force` [N] on the stage, and the components that bring the other forces."""
-    cart, stage, parasitic = bodies
+    """Newton's law for every body, and the components that bring the forces between them; `frictions` on the cart and
+    at the motor."""
+    cart, stage, parasitic, motor = chain.cart, chain.stage, chain.parasitic, chain.motor
+    friction, motor_friction = frictions
     bias = {name: key(f"bias.{name}") for name in structure.biased}
     drag = (friction.force if friction else sp.S.Zero) - bias.get("cart", sp.S.Zero)
-    on_stage = force + bias.get("stage", sp.S.Zero)
-    parts = [position_outputs("", "stage", stage), position_outputs("cart_", "cart", cart)]
+    parts = [*_positions(structure, chain), position_outputs("cart_", "cart", cart)]
     states: list[State] = []
+    driven = forces.actuator
+    if structure.transmission and motor:
+        driven, part = transmission(structure.plays, motor, stage)
+        resisting = motor_friction.force if motor_friction else sp.S.Zero
+        states += motor.under(forces.actuator - driven - resisting, *scales)
+        parts += [part, *([motor_friction.component] if motor_friction else [])]
+    on_stage = driven + forces.external + bias.get("stage", sp.S.Zero)
     if parasitic:
         inner = parasitic_force(parasitic, stage)
         on_stage -= inner

@@ -19,6 +19,7 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.tables import friction_law
+from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
 
@@ -41,6 +42,18 @@ class ControllerForm:
 
 
 @dataclass(frozen=True)
+class TransmissionForm:
+    """Whether there is a backlash; the law of the friction at the motor ("none": there is no such friction), with what
+    else its equations depend on; and on which sides position and velocity are measured."""
+
+    backlash: bool
+    friction: str
+    friction_variant: Hashable
+    position: Side
+    velocity: Side
+
+
+@dataclass(frozen=True)
 class Structure:
     """The choices that decide which states, terms and kinks there are.
 
@@ -55,6 +68,12 @@ class Structure:
     friction_variant: Hashable
     controller: ControllerForm | None
     biased: tuple[str, ...] = ()
+    transmission: TransmissionForm | None = None
+
+    @property
+    def plays(self) -> bool:
+        """Whether there is a backlash."""
+        return self.transmission is not None and self.transmission.backlash
 
 
 def structure(flat: Mapping[str, Any]) -> Structure:
@@ -68,6 +87,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         friction_variant=friction_law(law).variant(flat),
         controller=controller_form(flat) if KIND in flat else None,
         biased=tuple(name for name in ("cart", "stage") if flat.get(f"bias.{name}", 0.0) != 0),
+        transmission=_transmission_form(flat) if MOTOR_MASS in flat else None,
     )
 
 
@@ -79,8 +99,12 @@ def shared_structure(flat: Mapping[str, Any]) -> Structure:
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
     law, control = friction_law(flat["friction.model"]), controller_of(flat)
-    of_stage = ("joint.stroke", "bias.cart", "bias.stage")
-    return (*of_stage, *map(control.key, control.decisive), *law.decisive)
+    of_stage = ("joint.stroke", "bias.cart", "bias.stage", BACKLASH)
+    at_motor: tuple[str, ...] = ()
+    if f"{MOTOR_FRICTION}.model" in flat:
+        names = friction_law(flat[f"{MOTOR_FRICTION}.model"]).decisive
+        at_motor = tuple(name.replace("friction.", f"{MOTOR_FRICTION}.", 1) for name in names)
+    return (*of_stage, *map(control.key, control.decisive), *law.decisive, *at_motor)
 
 
 def _joint_form(flat: Mapping[str, Any]) -> JointForm:
@@ -89,6 +113,18 @@ def _joint_form(flat: Mapping[str, Any]) -> JointForm:
     if flat["joint.locked"]:
         return "locked"
     return "touching" if flat["joint.stroke"] == 0 else "free"
+
+
+def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
+    at_motor = {"friction.model": "none", **as_friction(flat)}
+    law = at_motor["friction.model"]
+    return TransmissionForm(
+        backlash=flat.get(BACKLASH, 0.0) != 0,
+        friction=law,
+        friction_variant=friction_law(law).variant(at_motor),
+        position=flat[f"{ENCODER}.position"],
+        velocity=flat[f"{ENCODER}.velocity"],
+    )
 
 
 def controller_form(flat: Mapping[str, Any]) -> ControllerForm:

@@ -1,6 +1,7 @@
 """The stage: all tables together, and the flat SI mapping that the equations read."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -26,7 +27,7 @@ from friso.stage.section import Rule, Section, Table, UncertainSection, list_fie
 from friso.stage.tables import (
     FRICTION,
     MOTION,
-    Axis,
+    AxisTable,
     Bias,
     FrictionSection,
     Joint,
@@ -35,8 +36,12 @@ from friso.stage.tables import (
     Parasitic,
     friction_law,
 )
+from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, as_friction, motor_mass
 
 _FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
+_TRANSMISSION = Table(lambda _: Transmission, '[transmission] inertia = "1.2e-4 kg*m^2", lead = "10 mm" ...')
+_MOTOR_FRICTION = Table(FRICTION.pick, '[motor_friction] model = "stribeck" ...')
+_ENCODER = Table(lambda _: Encoder, '[encoder] position = "load", velocity = "motor"')
 _JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
 _FLEXURE = Table(lambda _: Flexure, '[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
@@ -56,9 +61,12 @@ class Stage(Section):
 
     name: str = ""
     source: str = ""
-    axis: Annotated[Axis | None, Table(lambda _: Axis, '[axis] kind = "rotary"')] = None
+    axis: Annotated[AxisTable | None, Table(lambda _: AxisTable, '[axis] kind = "rotary"')] = None
     masses: Annotated[Masses, Table(lambda _: Masses, '[masses] cart = "1.2 kg"')]
     friction: Annotated[FrictionSection | None, _FRICTION] = None
+    transmission: Annotated[Transmission | None, _TRANSMISSION] = None
+    motor_friction: Annotated[FrictionSection | None, _MOTOR_FRICTION] = None
+    encoder: Annotated[Encoder | None, _ENCODER] = None
     joint: Annotated[Joint | None, _JOINT] = None
     flexure: Annotated[Flexure | None, _FLEXURE] = None  # type: ignore[valid-type]
     parasitic: Annotated[Parasitic | None, _PARASITIC] = None
@@ -110,6 +118,7 @@ class Stage(Section):
         if self.flexure and self.axis_kind != LINEAR:
             text = f"leaf springs on an axis with {self.axis_kind.described}"
             raise StageError("flexure", text, "[joint] with its stiffness", 'stiffness = "2.4 N*m/mrad"')
+        self._has_a_whole_transmission()
         self._has_one_stiffness()
         for body in ("cart", "stage"):
             if self.bias and getattr(self.bias, body) is not None and getattr(self.masses, body) is None:
@@ -120,6 +129,22 @@ class Stage(Section):
             if broken:
                 raise StageError(", ".join(rule.keys), self._written(rule), rule.expected, rule.example)
         return self
+
+    def _has_a_whole_transmission(self) -> None:
+        """Encoders and friction at the motor belong to a transmission, which has encoders on one side or both."""
+        if self.transmission is None:
+            for table, what in (("encoder", "a choice of encoders"), ("motor_friction", "friction at the motor")):
+                if getattr(self, table):
+                    raise StageError(table, f"{what}, but no [transmission]", "both or neither", _TRANSMISSION.example)
+            return
+        if self.encoder is None:
+            expected = "the sides on which position and velocity are measured"
+            raise StageError("encoder", "a [transmission], but no [encoder]", expected, _ENCODER.example)
+        kind = self.axis_kind
+        name, other = ("ratio", 'lead = "10 mm"') if kind == LINEAR else ("lead", "ratio = 5")
+        if getattr(self.transmission, name) is not None:
+            actual = f"a {name} on an axis with {kind.described}"
+            raise StageError(f"transmission.{name}", actual, "what one turn of the motor does there", other)
 
     def _has_one_stiffness(self) -> None:
         """A joint has its stiffness, or leaf springs from which it follows."""
@@ -224,8 +249,11 @@ class Stage(Section):
 def _axis_written(tables: Mapping[str, Any]) -> AxisKind:
     """The axis that tables of a stage file are of; what is wrong with the table [axis] is found later."""
     axis = tables.get("axis")
-    name = axis.kind if isinstance(axis, Axis) else axis.get("kind") if isinstance(axis, dict) else None
+    name = axis.kind if isinstance(axis, AxisTable) else axis.get("kind") if isinstance(axis, dict) else None
     return KINDS.get(name, LINEAR) if isinstance(name, str) else LINEAR
+
+
+_MOTOR_LAW = f"{MOTOR_FRICTION}.model"
 
 
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
@@ -256,17 +284,23 @@ def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
 
 def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
     """Each rule between keys, and where it is broken."""
-    for owner in (Stage, *_tables(flat).values()):
+    for name, owner in (("", Stage), *_tables(flat).items()):
+        at_motor = name == MOTOR_FRICTION
         for rule in owner.rules:
-            yield rule, np.logical_not(rule.holds(flat))
+            keys = tuple(key.replace("friction.", f"{name}.", 1) for key in rule.keys) if at_motor else rule.keys
+            holds = rule.holds({**flat, **as_friction(flat)} if at_motor else flat)
+            yield replace(rule, keys=keys), np.logical_not(holds)
 
 
 def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
     """The classes of the tables in a flat mapping."""
     classes = {
-        "axis": Axis,
+        "axis": AxisTable,
         "masses": Masses,
         "friction": friction_law(flat["friction.model"]),
+        "transmission": Transmission,
+        "encoder": Encoder,
+        **({MOTOR_FRICTION: friction_law(flat[_MOTOR_LAW])} if _MOTOR_LAW in flat else {}),
         "flexure": Flexure,  # before what follows from it: the first mistake is the one reported
         "joint": Joint,
         "parasitic": Parasitic,
@@ -298,6 +332,8 @@ def _plain(value: Any) -> Any:
 
 def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
     """Fill in the defaults that follow other keys."""
+    if (mass := motor_mass(flat)) is not None:
+        flat.setdefault(MOTOR_MASS, mass)
     for key, value in controller_of(flat).with_defaults(flat).items():
         flat.setdefault(key, value)
     if FORCE_LIMIT in flat:

@@ -17,7 +17,7 @@ from friso.quantities import (
 from friso.stage.section import Rule, UncertainSection, Variants
 
 
-class Axis(UncertainSection):
+class AxisTable(UncertainSection):
     """Which units the stage file is in: on a rotary axis kg m^2, N m and rad stand for kg, N and m."""
 
     kind: Literal["linear", "rotary"] = "linear"

@@ -11,6 +11,7 @@ from friso.quantities import Number, Quantity, Value, at_least_1, inside_0_1, po
 from friso.stage import Rule, register_controller
 from friso.stage.controllers import KIND
 from friso.stage.tables import ROUNDING
+from friso.stage.transmission import moving_mass
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -53,7 +54,7 @@ class VanDijk(Pid):
     @classmethod
     def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
         """It is tuned for what moves."""
-        return {TUNED_MASS: flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)}
+        return {TUNED_MASS: moving_mass(flat)}
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:

@@ -1,0 +1,80 @@
+"""Screw, belt or gear between motor and load: a spring and a damper, which a backlash leaves idle while it is crossed.
+
+The motor is a body of its own, its mass and motion taken at the load: one turn of the motor moves the load by a lead.
+Friction at the motor is a friction law of its own, of the table [motor_friction].
+"""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import sympy as sp
+
+from friso.equations.component import Component, Output, State, key
+from friso.equations.friction.common import Friction
+from friso.equations.masses import Body, beyond_stops, stops
+from friso.stage.transmission import MOTOR_FRICTION, STATE_PREFIX
+
+BACKLASH = key("transmission.backlash")
+"""The whole play [m], from one flank to the other."""
+
+
+def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Component]:
+    """Force of the transmission on the load [N], and its kinks. Within the backlash, where there is one, there is no
+    force; on a flank the spring carries what exceeds half of it, and the damper acts beside it."""
+    deflection, rate = motor.position - load.position, motor.velocity - load.velocity
+    stiffness = key("transmission.stiffness")
+    contact = stiffness * deflection + key("transmission.damping") * rate
+    force, kinks = contact, ()
+    if backlash:
+        kinks = stops(deflection, BACKLASH / 2, "flank")
+        force = beyond_stops(kinks, contact, stiffness * BACKLASH / 2)
+    outputs = {
+        "transmission_deflection": Output(deflection, "m", "motor minus load"),
+        "transmission_force": Output(force, "N", "transmission force"),
+    }
+    return force, Component(kinks=kinks, outputs=outputs)
+
+
+def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol) -> Friction:
+    """A law that was declared for a body with a `velocity`, on the motor, with names and keys of its own."""
+    component = friction.component
+    names = {x: _renamed(str(x)) for x in (part.symbol for part in component.states)}
+    names |= {kink.beyond: _renamed(kink.name, "beyond_") for kink in component.kinks}
+    symbols: dict[Any, Any] = {old: sp.Symbol(new, real=True) for old, new in names.items()}
+    symbols[velocity] = motor_velocity
+    for expression in _expressions(friction):
+        for symbol in expression.free_symbols:
+            name = str(symbol)
+            if name.startswith("friction."):
+                symbols[symbol] = key(f"{MOTOR_FRICTION}.{name.removeprefix('friction.')}")
+
+    def put(expression: sp.Expr) -> sp.Expr:
+        return cast(sp.Expr, expression.xreplace(symbols))
+
+    states = tuple(
+        State(put(x.symbol), put(x.derivative), x.unit, put(x.scale), x.role, put(x.settled), x.controlled)  # type: ignore[arg-type]
+        for x in component.states
+    )
+    kinks = tuple(kink.with_values(symbols).called(f"{STATE_PREFIX}{kink.name}") for kink in component.kinks)
+    outputs = {
+        f"{STATE_PREFIX}{name}": Output(put(output.expression), output.unit, f"motor: {output.label}")
+        for name, output in component.outputs.items()
+    }
+    outputs["motor_friction_force"] = Output(put(friction.force), "N", "friction force at the motor")
+    return Friction(put(friction.force), put(friction.breakaway), Component(states, kinks, outputs))
+
+
+def _renamed(name: str, before: str = "") -> str:
+    return f"{before}{STATE_PREFIX}{name}"
+
+
+def _expressions(friction: Friction) -> list[sp.Expr]:
+    """All that a law declares."""
+    component = friction.component
+    expressions = [friction.force, friction.breakaway]
+    expressions += [e for part in component.states for e in (part.derivative, part.scale, part.settled)]
+    expressions += [output.expression for output in component.outputs.values()]
+    for kink in component.kinks:
+        expressions += [kink.surface, kink.narrow, kink.at_start, *getattr(kink, "becomes", {}).values()]
+    return expressions

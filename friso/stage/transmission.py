@@ -1,0 +1,79 @@
+"""The tables [transmission], [motor_friction] and [encoder]: what stands between the motor and the load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from math import pi
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+
+from friso.errors import StageError
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage.section import UncertainSection
+
+TRANSMISSION, MOTOR_FRICTION, ENCODER = "transmission", "motor_friction", "encoder"
+MOTOR_MASS, INERTIA, LEAD, RATIO, BACKLASH = (
+    f"{TRANSMISSION}.{name}" for name in ("mass", "inertia", "lead", "ratio", "backlash")
+)
+STATE_PREFIX = "motor_"
+"""How names begin of what belongs to the motor."""
+
+Side = Literal["motor", "load"]
+"""Of the transmission."""
+
+
+class Transmission(UncertainSection):
+    """A screw, belt or gear: what the motor weighs at the load, and the spring that connects them."""
+
+    mass: Annotated[Value | None, Quantity("kg", positive, "2 kg")] = None
+    """Of all that moves with the motor, taken at the load; or else its `inertia` with `lead` or `ratio`."""
+    inertia: Annotated[Value | None, Quantity("kg*m^2", positive, "1.2e-4 kg*m^2")] = None
+    """Of motor, coupling and screw, about the motor's axis, on linear and rotary axes alike."""
+    lead: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None
+    """By how much one turn of the motor moves the load."""
+    ratio: Annotated[float | None, Number(positive, "5")] = None
+    """Turns of the motor for one of the load, of a rotary axis."""
+    stiffness: Annotated[Value, Quantity("N/m", positive, "120 N/um")]
+    damping: Annotated[Value, Quantity("N*s/m", non_negative, "2e3 N*s/m")]
+    backlash: Annotated[Value | None, Quantity("m", non_negative, "5 um")] = None
+    """The whole play, from one flank to the other."""
+
+    @model_validator(mode="after")
+    def _motor_has_one_mass(self) -> Self:
+        geared = [name for name in ("lead", "ratio") if getattr(self, name) is not None]
+        either = 'mass = "2 kg", or inertia = "1.2e-4 kg*m^2" with lead = "10 mm"'
+        if self.mass is not None and (self.inertia is not None or geared):
+            actual = f"mass together with {'inertia' if self.inertia is not None else geared[0]}"
+            raise StageError("mass", actual, "the mass of the motor at the load, or what it follows from", either)
+        if self.mass is None and self.inertia is None:
+            raise StageError("mass", "neither mass nor inertia of the motor", "one of the two", either)
+        if self.inertia is not None and len(geared) != 1:
+            actual = "an inertia with both lead and ratio" if geared else "an inertia without lead or ratio"
+            expected = "the lead of a linear axis, or the ratio of a rotary one"
+            raise StageError("inertia", actual, expected, 'inertia = "1.2e-4 kg*m^2", lead = "10 mm"')
+        return self
+
+
+class Encoder(UncertainSection):
+    """On which side of the transmission position and velocity are measured that the controller acts on."""
+
+    position: Side
+    velocity: Side
+
+
+def motor_mass(flat: Mapping[str, Any]) -> Any:
+    """The mass of the motor at the load [kg] that follows from its inertia; None where none does."""
+    lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
+    return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
+
+
+def moving_mass(flat: Mapping[str, Any]) -> Any:
+    """All that the controller moves [kg], at the load."""
+    return sum(flat.get(key, 0.0) for key in ("masses.cart", "masses.stage", MOTOR_MASS))
+
+
+def as_friction(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of [motor_friction] as a friction law knows them."""
+    before = f"{MOTOR_FRICTION}."
+    return {f"friction.{key.removeprefix(before)}": value for key, value in flat.items() if key.startswith(before)}
