@@ -137,7 +137,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     if control is None and form is not None:
         control = partial(continuous_controller, form)
     acting = control(loop, length, rate) if control else None
-    forces = Forces(acting.force if acting else sp.S.Zero, external(chain.stage) if external else sp.S.Zero)
+    forces = Pushes(acting.force if acting else sp.S.Zero, external(chain.stage) if external else sp.S.Zero)
     bodies, parts = _mechanics(structure, chain, (friction, motor_friction), forces, (length, rate))
     if acting:
         parts.append(acting.component)
@@ -171,7 +171,7 @@ def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
 
 
 @dataclass(frozen=True)
-class Chain:
+class Bodies:
     """The bodies: cart, stage (the same when rigid), parasitic mass and motor."""
 
     cart: Body
@@ -195,26 +195,26 @@ class Chain:
 
 
 @dataclass(frozen=True)
-class Forces:
-    """Forces [N] of the actuator, and from outside on the stage."""
+class Pushes:
+    """Pushes [N] of the actuator, and from outside on the stage."""
 
     actuator: sp.Expr
     external: sp.Expr
 
 
-def _bodies(structure: Structure) -> Chain:
+def _bodies(structure: Structure) -> Bodies:
     motor = Body.named("motor_", key(MOTOR_MASS)) if structure.transmission else None
     if structure.joint == "rigid":
         rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero))
-        return Chain(rigid, rigid, motor=motor)
+        return Bodies(rigid, rigid, motor=motor)
     cart = Body.named("cart_", key("masses.cart"))
     if not structure.parasitic:
-        return Chain(cart, Body.named("", key("masses.stage")), motor=motor)
+        return Bodies(cart, Body.named("", key("masses.stage")), motor=motor)
     part = key("parasitic.mass")
-    return Chain(cart, Body.named("", key("masses.stage") - part), Body.named("parasitic_", part), motor)
+    return Bodies(cart, Body.named("", key("masses.stage") - part), Body.named("parasitic_", part), motor)
 
 
-def _positions(structure: Structure, chain: Chain) -> list[Component]:
+def _positions(structure: Structure, chain: Bodies) -> list[Component]:
     """Position and velocity of the stage; behind a transmission, of the side that is measured, and of the other."""
     if not (structure.transmission and chain.motor):
         return [position_outputs("", "stage", chain.stage)]
@@ -224,7 +224,7 @@ def _positions(structure: Structure, chain: Chain) -> list[Component]:
     return [own, *(position_outputs(f"{side}_", side, body) for side, body in sides.items())]
 
 
-def _motor_friction(structure: Structure, chain: Chain) -> Friction | None:
+def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
     """The friction law at the motor."""
     form = structure.transmission
     if form is None or chain.motor is None:
@@ -258,9 +258,9 @@ def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp
 
 def _mechanics(
     structure: Structure,
-    chain: Chain,
+    chain: Bodies,
     frictions: tuple[Friction | None, Friction | None],
-    forces: Forces,
+    forces: Pushes,
     scales: tuple[sp.Expr, sp.Expr],
 ) -> tuple[list[State], list[Component]]:
     """Newton's law for every body, and the components that bring the forces between them; `frictions` on the cart and
