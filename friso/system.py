@@ -8,7 +8,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
@@ -41,10 +41,20 @@ if sys.platform == "win32":
     def replace_file(draft: Path, path: Path) -> None:
         """Give a file another's name and place. Raises OSError; one that another program holds open for longer than
         `PATIENCE` is a PermissionError that says so."""
+        _once_closed(draft.replace, path)
+
+    def rename_folder(folder: Path, path: Path) -> None:
+        """Give a folder another's name and place, in which no file is open. Raises OSError, where there is something
+        but an empty folder too; as for `replace_file`."""
+        with suppress(OSError):
+            path.rmdir()  # which elsewhere a renamed folder replaces
+        _once_closed(folder.rename, path)
+
+    def _once_closed(rename: Callable[[Path], object], path: Path) -> None:
         end = time.monotonic() + PATIENCE
         while True:
             try:
-                draft.replace(path)
+                rename(path)
                 return
             except PermissionError as error:
                 if time.monotonic() > end:
@@ -86,6 +96,10 @@ else:
     def replace_file(draft: Path, path: Path) -> None:
         """Give a file another's name and place. Raises OSError."""
         draft.replace(path)
+
+    def rename_folder(folder: Path, path: Path) -> None:
+        """Give a folder another's name and place. Raises OSError, where there is something but an empty folder too."""
+        folder.rename(path)
 
     def device_in(path: Path) -> str:
         """ "": a device is a file like others."""
@@ -144,6 +158,9 @@ else:
         """Number of processor cores; neither macOS nor Windows confines a process to some of them by default."""
         return os.cpu_count() or 1
 
+
+MOVES_OPEN_FOLDERS = sys.platform != "win32"
+"""Whether a folder can be renamed, or deleted, in which a file is open: not on Windows."""
 
 LIMITS_MEMORY = sys.platform == "linux"
 """Whether a process can be held to an amount of memory: Windows has no such limit, and macOS does not keep it."""

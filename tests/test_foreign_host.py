@@ -49,22 +49,24 @@ SPAN = ("--x", "controller.crossover=10 Hz..30 Hz:9", "--y", "masses.stage=2 kg.
 pytestmark = pytest.mark.parametrize("host", ["win32", "darwin"])
 
 
-def started(host: str, folder: Path, *arguments: object, **variables: str) -> subprocess.Popen[str]:
-    """`friso ARGUMENTS` in a folder, on the host."""
+def started(
+    host: str, folder: Path, *arguments: object, command: tuple[str, ...] = ("-m", "friso.cli"), **variables: str
+) -> subprocess.Popen[str]:
+    """`friso ARGUMENTS`, or another command of Python's, in a folder, on the host."""
     paths = os.pathsep.join([str(PRELOAD), *(path for path in sys.path if path)])
     console = "cp1252" if host == "win32" else "utf-8"
     environ = {**os.environ, "PYTHONPATH": paths, "FRISO_FOREIGN_HOST": host, "PYTHONIOENCODING": console, **variables}
-    command = [sys.executable, "-m", "friso.cli", *map(str, arguments)]
+    words = [sys.executable, *command, *map(str, arguments)]
     pipe = subprocess.PIPE
-    return subprocess.Popen(command, cwd=folder, env=environ, stdout=pipe, stderr=pipe, text=True, encoding=console)
+    return subprocess.Popen(words, cwd=folder, env=environ, stdout=pipe, stderr=pipe, text=True, encoding=console)
 
 
-def friso(host: str, folder: Path, *arguments: object, **variables: str) -> str:
-    """What it prints; it must succeed."""
+def friso(host: str, folder: Path, *arguments: object, status: int = 0, **variables: str) -> str:
+    """What it prints, or on which it says why it fails; the status is that."""
     with started(host, folder, *arguments, **variables) as process:
         out, err = process.communicate()
-    assert process.returncode == 0, err
-    return out
+    assert process.returncode == status, err
+    return err if status else out
 
 
 def with_stage(folder: Path) -> Path:
@@ -111,6 +113,56 @@ def test_a_map_is_killed_resumed_and_drawn_again(host: str, axis: Path, whole: P
     friso(host, axis, "map", "axis.toml", *SPAN, "--out", "killed.zarr")
     with xr.open_zarr(whole) as one, xr.open_zarr(axis / "killed.zarr") as other:
         assert one.identical(other)
+
+
+STORES = """
+import shutil, sys
+from pathlib import Path
+import friso
+from friso.studies.request import Request
+from friso.studies.store import Store, read_store
+
+def opened(text, **options):
+    study = Request(stage, {"controller.crossover": text}).study()
+    with Store.opened(store, study, **options) as other:
+        return len(other.read()["controller.crossover"])
+
+if __name__ == "__main__":
+    stage, store = friso.load("axis.toml"), Path("a.zarr")
+    store.mkdir()
+    assert opened("10 Hz, 20 Hz") == 2
+    shutil.copytree(store, f".a.zarr.{'a' * 32}/store")  # a killed process left this
+    assert opened("1 Hz, 2 Hz, 3 Hz", overwrite=True) == 3
+    store.rename(f".a.zarr.{'b' * 32}.old")  # one was killed while it replaced the store
+    assert opened("1 Hz, 2 Hz, 3 Hz") == 3
+    with Store.opened(store, Request(stage, {"controller.crossover": "1 Hz, 2 Hz, 3 Hz"}).study()):
+        try:
+            opened("10 Hz, 20 Hz", overwrite=True)
+        except friso.StoreError as error:
+            assert "another friso" in str(error), error
+        else:
+            raise AssertionError("replaced while it was in use")
+"""
+
+
+def test_a_store_is_made_in_an_empty_folder_replaced_and_put_back(host: str, axis: Path) -> None:
+    """The lock of a store is a file in it, and Windows renames and deletes no folder with a file that is open."""
+    (axis / "stores.py").write_text(STORES)
+    with started(host, axis, command=("stores.py",)) as process:
+        _, err = process.communicate()
+    assert process.returncode == 0, err
+    assert {path.name for path in axis.iterdir()} == {"axis.toml", "stores.py", "a.zarr"}
+
+
+def test_names_of_devices_are_refused_on_windows_alone(host: str, axis: Path) -> None:
+    there = {*axis.iterdir()}
+    span = ("--x", "controller.crossover=10 Hz, 20 Hz", "--verify", "0")
+    for command in (("map", "axis.toml", *span, "--out", "com1.zarr"), ("bode", "axis.toml", "--out", "Nul/report")):
+        if host == "win32":
+            assert f"{Path(command[-1]).parts[0]} is a device" in friso(host, axis, *command, status=2)
+    friso(host, axis, "init", "con.toml", status=2 if host == "win32" else 0)
+    friso(host, axis, "init", "console.toml")
+    assert {path.name for path in {*axis.iterdir()} - there} == {"console.toml", *(["con.toml"] * (host == "darwin"))}
 
 
 def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:

@@ -81,7 +81,9 @@ def interrupted(rng: random.Random, folder: Path) -> None:
     number = rng.choice([signal.SIGINT, signal.SIGTERM])
     _prepare(name, folder)
     with _started(folder, WRITING[name]) as process:
-        _moment(rng, folder, process, 0.5)
+        while process.poll() is None and not _takes_signals(process.pid):
+            time.sleep(0.01)  # Python itself starts, and ends in its own way
+        _moment(rng, folder, process)
         process.send_signal(number)
         err = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode in (0, 128 + number), f"{name}: status {process.returncode}: {err[-300:]}"
@@ -195,11 +197,17 @@ def _finished(folder: Path, arguments: list[str]) -> subprocess.CompletedProcess
     return subprocess.run([*FRISO, *arguments], cwd=folder, capture_output=True, text=True)
 
 
-def _moment(rng: random.Random, folder: Path, process: subprocess.Popen[str], earliest: float = 0.2) -> None:
-    """Wait for a moment at random: after the start, or once something is written."""
+def _takes_signals(number: int) -> bool:
+    """Whether friso's own code runs in a process, and has taken the signals that end it."""
+    status = Path(f"/proc/{number}/status").read_text()
+    caught = int(next(line.split()[1] for line in status.splitlines() if line.startswith("SigCgt")), 16)
+    return bool(caught & 1 << (signal.SIGTERM - 1))
+
+
+def _moment(rng: random.Random, folder: Path, process: subprocess.Popen[str]) -> None:
+    """Wait for a moment at random, or until something is written."""
     at_writing = rng.random() < 0.5
-    end, after = time.monotonic() + (LONGEST if at_writing else rng.uniform(earliest, LONGEST)), rng.expovariate(5.0)
-    time.sleep(earliest)
+    end, after = time.monotonic() + (LONGEST if at_writing else rng.uniform(0.0, LONGEST)), rng.expovariate(5.0)
     while time.monotonic() < end and process.poll() is None:
         if at_writing and any(folder.glob(f"**/{DRAFTS}*")):
             time.sleep(after)

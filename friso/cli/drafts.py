@@ -14,9 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from filelock import FileLock, Timeout
+from filelock import FileLock
 
 from friso.interrupts import held
+from friso.leftovers import remove_leftover
 from friso.system import foreign_writers, replace_file
 
 if TYPE_CHECKING:
@@ -119,10 +120,9 @@ def _remove_leftovers(root: Path) -> None:
             status = folder.lstat()
             if not stat.S_ISDIR(status.st_mode) or foreign_writers(status):
                 continue  # put there by others, to have a lock made in a folder of this user
-            with FileLock(folder / _LOCK, blocking=False):
-                shutil.rmtree(folder, ignore_errors=True)
-        except (OSError, Timeout):  # it is written to, or nobody may delete it
+        except OSError:  # another process was quicker
             continue
+        remove_leftover(folder, _LOCK)
 
 
 def made(folder: Path) -> list[Path]:

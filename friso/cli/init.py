@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.output import Overwrite, write
+from friso.cli.output import Overwrite, refuse_device, write
 from friso.errors import InputError
 
 
@@ -21,6 +21,7 @@ def init(
     Example: friso init my_stage.toml
     """
     template = files("friso").joinpath("templates/stage.toml").read_text(encoding="utf-8")
+    refuse_device("STAGE.toml", path)
     if path.exists() and not overwrite:
         expected = "a new file, or --overwrite; nothing was overwritten"
         raise InputError("STAGE.toml", f"{path}, which already exists", expected, "friso init new.toml")

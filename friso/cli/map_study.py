@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.cli.common import key_values
+from friso.cli.output import refuse_device
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
 from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
@@ -100,7 +101,9 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     """The study with all that the store holds, where that is the same but for measures beyond those asked for. Raises
     InputError where the store lacks just some of them and is not to be replaced."""
     from friso.studies.store import read_store
+    from friso.studies.store_folder import remove_leftovers
 
+    remove_leftovers(store)  # one that was being replaced is put back
     try:
         with read_store(store) as runs:
             stored, equations = study_of(runs), str(runs.attrs.get("equations"))
@@ -156,7 +159,10 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 
 
 def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> None:
-    """Refuse to write over files that are no earlier result of this study. Raises InputError."""
+    """Refuse to write over files that are no earlier result of this study, or to Windows' devices. Raises
+    InputError."""
+    for option, path in (("--out", store), *(("--export", path) for path in exports)):
+        refuse_device(option, path)
     views = [store.parent / name for name in own_views(store) if name not in _claimed(store)]
     for path in [*views, *exports]:
         if path == store or (path.exists() and not overwrite):

@@ -21,6 +21,7 @@ from friso.errors import InputError
 from friso.escapes import one_line
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
+from friso.system import device_in
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -45,6 +46,7 @@ class OutputFolder:
     def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
         """Raises InputError where the command must not write there, or cannot."""
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
+        refuse_device("--out", folder)
         _check_writable(folder)
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
@@ -92,6 +94,13 @@ class OutputFolder:
         gone = {name for name, content in files.items() if content is None}
         names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
         return marker(self.command, names)
+
+
+def refuse_device(option: str, path: Path) -> None:
+    """Raises InputError where Windows takes a part of a path for a device: nothing would be there afterwards."""
+    if device := device_in(path):
+        expected = f"another name: for Windows, {device} is a device whatever folder and suffix it has"
+        raise InputError(option, str(path), expected, f"{option} report" if option.startswith("--") else "")
 
 
 def output_folder(

@@ -78,11 +78,11 @@ class Store:
 
     def _replace(self) -> None:
         """Put this study in place of the store that is there, unless it is that of this study already."""
-        with locked(self.path):
+        with locked(self.path) as lock:
             try:
                 _refuse_other(self.path, self.study)
             except StoreError:
-                exchange(self.path, self._fill)
+                exchange(self.path, self._fill, lock)
 
     def _fill(self, folder: Path) -> None:
         """Write the store without results into a folder that is not there yet."""

@@ -11,7 +11,7 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from glob import escape
 from pathlib import Path
 
@@ -19,7 +19,9 @@ from filelock import FileLock, Timeout
 
 from friso.errors import StoreError
 from friso.interrupts import held
+from friso.leftovers import is_leftover, remove_leftover
 from friso.studies.metadata import PARTIAL
+from friso.system import MOVES_OPEN_FOLDERS, rename_folder
 
 LOCK = ".friso.lock"
 """The file that is locked while a store is written to."""
@@ -35,39 +37,39 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
     remove_leftovers(path)
     with _made_aside(path, fill) as new:
         try:
-            new.rename(path)
+            rename_folder(new, path)
         except OSError:
             if not path.exists():
                 raise  # else another process was quicker; whose study that is will be seen
 
 
-def exchange(path: Path, fill: Callable[[Path], object]) -> None:
-    """Put what `fill` writes in place of the store at `path`, which is deleted once that stands there. Raises OSError,
-    with the store as it was."""
+def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
+    """Put what `fill` writes in place of the store at `path`, whose lock is held, and which is deleted once that stands
+    there. Raises OSError, with the store as it was."""
     with _made_aside(path, fill) as new:
         old = _beside(path, _OLD)
-        path.rename(old)
+        if not MOVES_OPEN_FOLDERS:
+            lock.release()  # whoever takes it now keeps the folder from being renamed
+        rename_folder(path, old)
         try:
-            new.rename(path)
+            rename_folder(new, path)
         except BaseException:
-            old.rename(path)
+            rename_folder(old, path)
             raise
     shutil.rmtree(old, ignore_errors=True)
 
 
 def remove_leftovers(path: Path) -> None:
     """Remove what killed processes left beside the store at `path`, or put it back where it was being replaced:
-    nobody holds their lock."""
+    nobody holds their lock. Raises OSError where it cannot be put back."""
     for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
-        with _unless_locked(old) as free:
-            if free and not path.exists():
-                old.rename(path)
-            elif free:
-                shutil.rmtree(old, ignore_errors=True)
+        if path.exists():
+            remove_leftover(old, LOCK)
+        elif is_leftover(old, LOCK):
+            with suppress(FileNotFoundError):  # another process was quicker
+                rename_folder(old, path)
     for draft in path.parent.glob(f".{escape(path.name)}.{_DIGITS}"):
-        with _unless_locked(draft) as free:
-            if free:
-                shutil.rmtree(draft, ignore_errors=True)
+        remove_leftover(draft, LOCK)
 
 
 def remove_partial_files(path: Path) -> None:
@@ -82,8 +84,8 @@ _PARTIAL = re.compile(rf".*\.[0-9a-f]{{32}}{re.escape(PARTIAL)}")
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[None]:
-    """Keep other processes out of a store. Raises StoreError if one is in."""
+def locked(path: Path) -> Iterator[FileLock]:
+    """Keep other processes out of a store; the lock. Raises StoreError if one is in."""
     lock = FileLock(path / LOCK)
     try:
         lock.acquire(timeout=0)
@@ -94,7 +96,7 @@ def locked(path: Path) -> Iterator[None]:
         expected = f"a store that can be written to ({error.strerror})"
         raise StoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
     try:
-        yield
+        yield lock
     finally:
         lock.release()
 
@@ -113,23 +115,6 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
             yield new
     finally:
         shutil.rmtree(draft, ignore_errors=True)
-
-
-@contextmanager
-def _unless_locked(folder: Path) -> Iterator[bool]:
-    """Whether nobody else held the lock of a folder (no link to one), which is held within."""
-    lock = FileLock(folder / LOCK)
-    try:
-        if folder.is_symlink():
-            raise NotADirectoryError(folder)
-        lock.acquire(timeout=0)
-    except (OSError, Timeout):
-        yield False
-        return
-    try:
-        yield True
-    finally:
-        lock.release()
 
 
 def _beside(path: Path, suffix: str = "") -> Path:
