@@ -137,20 +137,24 @@ if sys.platform == "linux":
         return max(1, math.ceil(min(len(os.sched_getaffinity(0)), _share_of_time())))
 
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
-        """How many cores' time the control groups of this process (cgroup v2) leave it; infinite without a limit."""
+        """How many cores' time the control groups of this process leave it, of either version; infinite without a
+        limit."""
         try:
-            own = next(line[3:] for line in proc.read_text(encoding="utf-8").splitlines() if line.startswith("0::"))
-        except (OSError, StopIteration):
+            lines = [line.split(":", 2) for line in proc.read_text(encoding="utf-8").splitlines()]
+        except OSError:
             return math.inf
-        group = root / own.strip("/")
-        return min(_quota(folder) for folder in (group, *group.parents) if folder.is_relative_to(root))
+        tops = {"": root, "cpu": root / "cpu"}  # of version 2, and of version 1, with a folder for every controller
+        groups = [tops[name] / path.strip("/") for _, names, path in lines for name in names.split(",") if name in tops]
+        return min((_quota(above) for group in groups for above in (group, *group.parents)), default=math.inf)
 
     def _quota(group: Path) -> float:
-        try:
-            quota, period = (group / "cpu.max").read_text(encoding="ascii").split()
-            return float(quota) / float(period)
-        except (OSError, ValueError):  # no limit ("max"), or no such file
-            return math.inf
+        """Cores' time of one group; infinite without a limit ("max", or -1)."""
+        for names in (("cpu.max",), ("cpu.cfs_quota_us", "cpu.cfs_period_us")):
+            with suppress(OSError, ValueError):
+                quota, period = " ".join((group / name).read_text(encoding="ascii") for name in names).split()
+                if float(quota) > 0:
+                    return float(quota) / float(period)
+        return math.inf
 
 else:
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -36,6 +35,7 @@ from friso.cli.map_options import (
 from friso.cli.output import print_document, print_written, write
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
+from friso.system import usable_cores
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -149,9 +149,9 @@ def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
 def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
     if workers is not None and scheduler is not None:
         raise InputError("--workers", "--workers and --scheduler", "one of the two", "--workers 4")
-    most = os.cpu_count() or 1
+    most = usable_cores()
     if workers is not None and not 1 <= workers <= most:
-        expected = f"1 worker or more, up to the {most} processors"
+        expected = f"1 worker or more, up to the {most} cores that may be used"
         raise InputError("--workers", str(workers), expected, "--workers 1")
     if scheduler is not None:
         from friso.studies.distribute import connected

@@ -93,13 +93,11 @@ DEVELOPMENT = ("test", "bench")
 
 
 def _processor() -> str:
-    """The processor as the compiler knows it, and how wide its registers are."""
-    import llvmlite.binding as llvm
+    """The processor that code is compiled for, and how wide its registers are."""
+    from friso.engine.processor import processor
 
-    features = llvm.get_host_cpu_features()
-    widths = (("avx512f", 512), ("avx2", 256), ("avx", 256), ("sve", 128), ("neon", 128), ("sse2", 128))
-    name, width = next(((n.upper(), w) for n, w in widths if features.get(n)), ("unknown instructions", 64))
-    return f"{llvm.get_host_cpu_name()}, {name}: registers of {width} bits"
+    chosen = processor()
+    return f"{chosen.name}, {chosen.triple}: registers of {chosen.lanes} numbers ({64 * chosen.lanes} bits)"
 
 
 def _cores() -> str:
@@ -145,7 +143,7 @@ def _running() -> str:
     swings = measure(flat, runs).peak_to_peak
     if not abs(swings / SWING - 1).max() < WITHIN:
         raise RuntimeError(f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not by {SWING:g} m")
-    return f"{steps / seconds / 1e6:.1f} million steps of the solver per second on one core; the result is right"
+    return f"{steps / seconds / 1e6:.2g} million steps of the solver per second on one core; the result is right"
 
 
 def _stage() -> Stage:
