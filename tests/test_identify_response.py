@@ -168,6 +168,28 @@ def test_realisations_that_do_not_belong_together_are_refused(refused: Refused) 
         multisine([])
 
 
+def test_clocks_that_differ_by_100_ppm_are_accepted_and_named() -> None:
+    rng, lines = np.random.default_rng(31), np.arange(2, 60)
+    records = [played(rng, rig, lines, noise=1e-3) for _ in range(2)]
+    fast = [records[0], ResponseRecord(records[1].input, records[1].output, DT * (1 + 1e-4))]
+    response = multisine(fast)
+    assert any("100 ppm" in text for text in response.warnings)
+    assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
+    assert not any("ppm" in text for text in multisine(records).warnings)
+
+
+def test_a_generator_whose_clock_is_not_that_of_the_recorder() -> None:
+    """A period of 1000.1 samples, twenty times: the record slips by two samples in all."""
+    rng, lines = np.random.default_rng(32), np.arange(2, 60)
+    record = played(rng, rig, lines, 20)
+    instants = np.arange(len(record.input)) / (1 + 1e-4)
+    phases = 2j * np.pi * np.outer(lines, instants / PERIOD)
+    spectra = [np.fft.rfft(signal[:PERIOD])[lines] for signal in (record.input, record.output)]
+    slow = [2 / PERIOD * np.real(spectrum @ np.exp(phases)) for spectrum in spectra]
+    response = multisine([ResponseRecord(slow[0], slow[1], DT)])
+    assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
+
+
 @pytest.mark.parametrize(
     "spoilt",
     [
@@ -409,6 +431,23 @@ def test_the_number_of_modes_is_found_and_said(refused: Refused) -> None:
     assert found.high_level.value == pytest.approx(1.3, rel=0.02)
     with refused("band"):
         fit_modes(exact(three, np.arange(3.0, 10.0), 0.02, None))
+
+
+def test_a_resonance_that_an_antiresonance_nearly_cancels_is_flagged() -> None:
+    def with_pair(zero: float) -> Response:
+        def response(frequency: np.ndarray) -> np.ndarray:
+            s, pole = 2j * np.pi * frequency, 2 * np.pi * 30.0
+            one, two = 2 * np.pi * zero, 0.02
+            return (s**2 + 2 * two * one * s + one**2) / (s**2 + 2 * two * pole * s + pole**2) / s**2
+
+        return response
+
+    lines = np.geomspace(3, 100, 300)
+    near, far = (
+        fit_modes(exact(with_pair(zero), lines, 1e-3, np.random.default_rng(25)), rigid=True) for zero in (30.4, 36.0)
+    )
+    assert any("nearly cancel" in text and "30 Hz" in text for text in near.warnings)
+    assert not any("nearly cancel" in text for text in far.warnings)
 
 
 # Two masses

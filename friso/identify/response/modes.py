@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,14 @@ MOST = 4
 
 LEAST = 0.01
 """Relative error of the response below which no model is trusted; keeps a few strong lines from ruling the fit."""
+
+
+EXPLAINED = 3.0
+"""Sum of squares over degrees of freedom up to which a fit counts as right."""
+
+CANCELS = 1.0
+"""Distance of a resonance from an antiresonance, over the larger of their half-widths, up to which they nearly cancel:
+the response then changes by a factor of two at most, over so narrow a band that any unevenness may look like it."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,9 @@ def fit_modes(
     fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
     low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
-    warnings = (f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})",)
+    warnings = [*_cancelling(fit, shape, scale, limits)]
+    if fit.reduced > EXPLAINED:
+        warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
     estimates = _pairs(fit, shape, scale, limits)
     return Modes(
         shape,
@@ -80,7 +90,7 @@ def fit_modes(
         high_level,
         _described(shape, rows),
         limits,
-        warnings if fit.reduced > 3 else (),
+        tuple(warnings),
     )
 
 
@@ -88,6 +98,20 @@ def _described(shape: RationalShape, rows: list[Row]) -> str:
     """How the order was chosen."""
     tried = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({tried})"
+
+
+def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
+    """A sentence for each resonance within the band that an antiresonance nearly cancels."""
+    poles, zeros = roots(fit.parameters, shape)
+    for pole in sorted(poles, key=abs):
+        if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
+            continue
+        zero = zeros[np.argmin(np.abs(zeros - pole))]
+        if abs(zero - pole) <= CANCELS * max(-pole.real, -zero.real):
+            yield (
+                f"a resonance at {abs(pole) * scale:.4g} Hz and an antiresonance at {abs(zero) * scale:.4g} Hz nearly "
+                "cancel: an unevenness of the response looks like this, too, and may be no mode"
+            )
 
 
 def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:

@@ -8,6 +8,7 @@ an external reference (closed loop, indirect) both spectra are taken relative to
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from friso.identify.response.response import Channels, FrequencyResponse
 
 LINES = 5
 """Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
+
+CLOCKS, TOLD = 1e-3, 1e-6
+"""Share by which the periods of realisations may differ, as those of clocks do, and from which on that is said."""
 
 FEW = 10
 """Real degrees of freedom per line from which a variance stands on its own."""
@@ -32,7 +36,7 @@ def multisine(
     noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises InputError for
     records that are not periodic or do not belong together.
     """
-    every = _together([spectra(record, period) for record in records])
+    every, remarks = _together([spectra(record, period) for record in records])
     excited = np.logical_and.reduce([realisation.excited for realisation in every])
     if not excited.any():
         raise InputError(
@@ -48,7 +52,7 @@ def multisine(
         distortion = _at_free_lines(every[0], excited, response)
         distortion_known = bool(np.isfinite(distortion).any())
     deviation = np.hypot(noise, np.nan_to_num(distortion))
-    warnings = dict.fromkeys(text for realisation in every for text in realisation.warnings)
+    warnings = dict.fromkeys([*remarks, *(text for realisation in every for text in realisation.warnings)])
     if not distortion_known:
         warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
     frequency = every[0].frequency[excited]
@@ -58,15 +62,21 @@ def multisine(
     )
 
 
-def _together(every: list[Spectra]) -> list[Spectra]:
-    """The realisations, if they have the same lines. Raises InputError."""
+def _together(every: list[Spectra]) -> tuple[list[Spectra], list[str]]:
+    """The realisations, if they have the same lines, and what to say of their clocks. Raises InputError."""
     if not every:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
-    spacings = [realisation.frequency[0] for realisation in every]
-    if np.ptp(spacings) > 1e-6 * spacings[0] or len({len(realisation.frequency) for realisation in every}) > 1:
+    spacings = np.array([realisation.frequency[0] for realisation in every])
+    apart = float(np.ptp(spacings) / spacings.min())
+    if apart > CLOCKS or len({len(realisation.frequency) for realisation in every}) > 1:
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
-    return every
+    if apart <= TOLD:
+        return every, []
+    mean = float(spacings.mean())
+    lines = np.arange(1, len(every[0].frequency) + 1) * mean
+    remark = f"the periods of the records differ by {1e6 * apart:.3g} ppm, as clocks do: {1 / mean:.6g} s is used"
+    return [replace(realisation, frequency=lines) for realisation in every], [remark]
 
 
 def _averaged(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
