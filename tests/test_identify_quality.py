@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from friso.identify.causes import UNKNOWN, causes
+from friso.identify.causes import causes
 from friso.identify.combine import combined
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import inverse_model
@@ -28,7 +27,7 @@ from friso.views.identify.numbers import interval_text, value_text
 
 DT = 1e-3
 MASS, VISCOUS, COULOMB, OFFSET = 6.0, 20.0, 11.0, 0.5
-NUMBERS = st.floats(allow_nan=True, allow_infinity=True, width=64)
+DRAWN = 10_000
 
 
 def axis(noise: float = 0.05, seconds: float = 8.0, **other: float) -> Log:
@@ -47,29 +46,33 @@ def axis(noise: float = 0.05, seconds: float = 8.0, **other: float) -> Log:
 # --- intervals --------------------------------------------------------------------------------------------------------
 
 
-@settings(max_examples=2000, deadline=None)
-@given(NUMBERS, NUMBERS, NUMBERS, st.sampled_from(["kg", "N", "m/s"]))
-def test_what_is_determined_has_an_interval_of_some_width(value: float, low: float, high: float, unit: str) -> None:
-    estimate = Estimate("friction.coulomb", unit, value, low, high, "drawn")
-    if estimate.determined:
+def drawn_estimates() -> Iterator[Estimate]:
+    """10 000 estimates, with all that arithmetic can make of a value and its ends."""
+    rng = np.random.default_rng(9)
+    odd = np.array([0.0, -0.0, np.nan, np.inf, -np.inf, 1e-30, 1e30, 1.0])
+    for _ in range(DRAWN // 2):
+        value = float(10 ** rng.uniform(-9, 9)) * rng.choice([-1, 1])
+        deviation = abs(value) * float(10 ** rng.uniform(-18, 1)) * rng.choice([0, 1, 1, 1])
+        yield Estimate.normal("friction.coulomb", "N", value, deviation, "drawn")
+        numbers = np.where(rng.random(3) < 0.5, rng.choice(odd, 3), value * (1 + deviation * rng.standard_normal(3)))
+        yield Estimate("friction.coulomb", "N", *map(float, numbers), "drawn")
+
+
+def test_what_is_determined_has_an_interval_of_some_width_in_numbers_and_in_print() -> None:
+    for estimate in drawn_estimates():
+        if not estimate.determined:
+            assert estimate.reason
+            assert math.isnan(estimate.value)
+            continue
         assert all(map(math.isfinite, (estimate.value, estimate.low, estimate.high)))
-        assert estimate.half_width > 0 or estimate.low < estimate.high
-    else:
-        assert estimate.reason
-        assert math.isnan(estimate.value)
-
-
-@settings(max_examples=1000, deadline=None)
-@given(st.floats(1e-9, 1e9), st.floats(1e-12, 10.0))
-def test_what_is_printed_and_written_has_ends_that_differ(value: float, share: float) -> None:
-    estimate = Estimate.normal("friction.coulomb", "N", value, share * value, "drawn")
-    if not estimate.determined:
-        return
-    low, _, rest = interval_text(estimate).partition(" to ")
-    if share > 1e-11:  # beyond, all digits of a double are used up
-        assert low != rest.split(" ")[0]
+        assert estimate.low < estimate.high
+        low, _, rest = interval_text(estimate).partition(" to ")
+        if estimate.half_width > 1e-11 * max(
+            abs(estimate.low), abs(estimate.high)
+        ):  # beyond, all digits of a double are used up
+            assert low != rest.split(" ")[0]
         assert value_text(estimate)
-    assert " 0 N" not in written(estimate).partition("+/-")[2]
+        assert " 0 N" not in written(estimate).partition("+/-")[2]
 
 
 def test_a_mean_of_estimates_is_never_of_no_width() -> None:
@@ -151,6 +154,15 @@ def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_re
     assert wide.systematic > 0.8
 
 
+def test_what_both_models_lack_moves_both() -> None:
+    """A fit that leaves as much as the inverse model is no more certain than that; one that leaves a tenth may be."""
+    whole = Estimate.normal("masses.cart", "kg", 95.4, 0.1, "output error")
+    inverse = Estimate.normal("mass", "kg", 95.1, 0.5, "least squares")
+    assert with_model_error(whole, inverse, 1.0, 1.0).half_width == pytest.approx(inverse.half_width)
+    assert with_model_error(whole, inverse, 1.0, 1.0, 0.1).half_width == pytest.approx(whole.half_width)
+    assert with_model_error(whole, inverse, 1.0, 0.0) == whole
+
+
 def test_lacking_is_what_noise_does_not_explain() -> None:
     assert Quality(1.0, 1.0, 1.0, 0.1, 0.1).lacking == 0.0
     assert Quality(1.0, 10.0, 1.0, 0.1, 0.1).lacking == pytest.approx(1.0, abs=0.01)
@@ -203,7 +215,7 @@ def test_noise_has_no_cause() -> None:
     log = axis()
     noise = 300 * np.random.default_rng(1).standard_normal(len(log.time))
     other = replace(log, signals={**log.signals, "force": noise + 0.2 * log["force"]})
-    assert causes(other, inverse_model(other, 5.0), 0.0) == [UNKNOWN]
+    assert causes(other, inverse_model(other, 5.0), 0.0) == []
 
 
 # --- rests ------------------------------------------------------------------------------------------------------------

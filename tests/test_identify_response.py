@@ -446,8 +446,8 @@ def test_a_resonance_that_an_antiresonance_nearly_cancels_is_flagged() -> None:
     near, far = (
         fit_modes(exact(with_pair(zero), lines, 1e-3, np.random.default_rng(25)), rigid=True) for zero in (30.4, 36.0)
     )
-    assert any("nearly cancel" in text and "30 Hz" in text for text in near.warnings)
-    assert not any("nearly cancel" in text for text in far.warnings)
+    assert any(text.startswith("a resonance at 29.9") and "nearly cancel" in text for text in near.warnings)
+    assert not any(text.startswith("a resonance at 29.9") for text in far.warnings)
 
 
 # Two masses

@@ -473,6 +473,21 @@ def test_profiles_are_1_where_the_interval_ends() -> None:
     )
 
 
+@pytest.mark.parametrize("own_loop", [True, False])
+def test_the_force_that_opens_the_page_is_of_the_stretch_that_moves_most(own_loop: bool) -> None:
+    found, log = moves(own_loop, own_loop)
+    still = np.minimum(log.time, 2.0)  # at rest in the second half
+    place = np.interp(still, log.time, log["position"])
+    halved = replace(log, signals={**log.signals, "position": place})
+    quick = replace(found, log=halved, inverse=replace(found.inverse, bandwidth=40.0))
+    (panel,) = named(moves_figures(quick, "identify_m"), "identify_m_force").panels
+    measured = line(panel, "measured")
+    assert measured.x[-1] - measured.x[0] == pytest.approx(1.0, abs=2 * DT)
+    assert 0.4 < measured.x[0] < 0.6  # about the fastest point, at 1 s
+    other = line(panel, "simulated" if own_loop else "needed")
+    assert np.std(measured.y - other.y) == pytest.approx(0.2, rel=0.1)
+
+
 def test_traces_with_a_disturbance_and_of_a_stage_that_follows() -> None:
     found, log = moves(own_loop=True, fitted_in_loop=True)
     pulses = np.where(log.time > 2, 5.0, 0.0)
@@ -552,8 +567,9 @@ def test_every_figure_can_be_drawn_and_its_axes_have_their_units(figures: list[F
 
 def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tuple, figures: list[Figure]) -> None:
     found, files, predictions = case
-    some = [each for each in figures if each.name.endswith(("intervals", "moves1_friction", "frequency1_bode"))]
-    assert len(some) == 3
+    ends = ("intervals", "moves1_force", "moves1_friction", "frequency1_bode")
+    some = [each for each in figures if each.name.endswith(ends)]
+    assert len(some) == 4
     html = identify_html(found, files, predictions, some)
     assert html == identify_html(found, files, predictions, some)
     page = Page(html)
@@ -566,6 +582,8 @@ def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tupl
         assert all(sentence in text for sentence in part.sentences)
     for figure in some:
         assert html.count(f'id="figure-{figure.name}"') == 1
+    places = [html.index(f'id="figure-identify_{name}"') for name in ("moves1_force", "intervals", "moves1_friction")]
+    assert places == sorted(places)  # the force opens the page
     assert "something <to> know" in text
     assert all(prediction_line(prediction)[1] in text for prediction in predictions)
     assert found.stage.to_toml().strip() in page.text

@@ -11,7 +11,7 @@ from friso.errors import InputError
 from friso.identify.inverse_model import InverseModel, inverse_model
 from friso.identify.logs.log import Log
 
-LAGS = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
+LAGS = (-16, -8, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 8, 16)
 """Samples by which the force is moved in the search for a delay."""
 
 BETTER = 0.7
@@ -28,10 +28,10 @@ UNKNOWN = (
 
 
 def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[str]:
-    """What may be wrong with a log that the inverse model does not describe, as far as the log tells."""
-    found = [_delay(log, inverse, cart_share), _constant(inverse), _oscillation(inverse)]
-    named = [sentence for sentence in found if sentence]
-    return named or [UNKNOWN]
+    """What may be wrong with a log that the inverse model does not describe, as far as the log tells; nothing where
+    none of these explains it."""
+    looked_for = (_delay(log, inverse, cart_share), _constant(inverse, log.unit("force")), _oscillation(inverse))
+    return [sentence for sentence in looked_for if sentence]
 
 
 def _delay(log: Log, inverse: InverseModel, cart_share: float) -> str:
@@ -50,11 +50,11 @@ def _delay(log: Log, inverse: InverseModel, cart_share: float) -> str:
     return f"a force {abs(lag) * log.sample_time * 1e3:.3g} ms {how} fits much better: a delay between the channels?"
 
 
-def _constant(inverse: InverseModel) -> str:
+def _constant(inverse: InverseModel, unit: str) -> str:
     offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
     if offset <= max(coulomb, 0.1 * float(np.std(inverse.measured))):
         return ""
-    return f"a constant force of {inverse.value('offset'):.3g} N is larger than friction: gravity, or an offset?"
+    return f"a constant force of {inverse.value('offset'):.3g} {unit} is larger than friction: gravity, or an offset?"
 
 
 def _oscillation(inverse: InverseModel) -> str:

@@ -9,6 +9,7 @@ decimated to 2.5 times that bandwidth by one more filter.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -17,7 +18,7 @@ from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
-from friso.identify.logs.log import Log
+from friso.identify.logs.log import ROLES, Log
 from friso.identify.readings.common import cart
 from friso.identify.spread import groups_of, spread_of
 
@@ -146,14 +147,32 @@ def inverse_model(
     covariance = spread_of(columns, force - fitted, groups_of(position, velocity, columns[:, 0]))
     names = _NAMES[by_direction]
     estimates = tuple(
-        _estimate(name, unit, value, variance if both or name != "coulomb" else np.inf)
+        _estimate(name, unit_of(unit, log), value, variance if both or name != "coulomb" else np.inf)
         for (name, unit), value, variance in zip(names, solution, np.diag(covariance), strict=True)
     )
     if estimates[0].high < 0:
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
-        raise InputError("force", f"a mass of {solution[0]:.3g} kg", expected, '--scale force="-35 N/V"', log.name)
+        actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
+        raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)
     numbers = dict(zip((name for name, _ in names), map(float, solution), strict=True))
     return InverseModel(estimates, numbers, columns, covariance, time, force, fitted, band)
+
+
+def _other_sign(log: Log) -> str:
+    """The scale with which the force of a log was read, with the other sign."""
+    scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
+    scale = next((match for match in scales if match), None)
+    if scale is None:
+        return "-1 N/N" if log.unit("force") == ROLES["force"] else f"-NUMBER N/{log.unit('force')}"
+    return scale[2] if scale[1] == "-" else f"-{scale[2]}"
+
+
+def unit_of(unit: str, log: Log) -> str:
+    """The unit of a quantity of mechanics where the force of a log stands in the newton's place: with a force in volts
+    a mass is in V*s^2/m instead of kg."""
+    if log.unit("force") == ROLES["force"]:
+        return unit
+    return re.sub(r"\bN\b", log.unit("force"), unit.replace("kg", "N*s^2/m"))
 
 
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:

@@ -115,13 +115,13 @@ class ExperimentKind(Generic[Result]):
     `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
     about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
     uses. `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the
-    last. `si`: they have to be in SI units. `partial`: whether a log shows too little for a result of its own, such as
-    one event; logs like that count as one log with gaps. `together`: all its logs are realisations of one experiment;
-    `responses`: it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody
-    said what it is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes`
-    are what the engineer should know of all its results, the stage being given or not; `doubts` what speaks against
-    believing a result, in sentences, and `failed` whether its analysis failed, whatever of it still holds. Functions
-    raise InputError for logs that cannot be used."""
+    last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts). `partial`: whether a log
+    shows too little for a result of its own, such as one event; logs like that count as one log with gaps. `together`:
+    all its logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured
+    them, too. `claims` answers why a log of which nobody said what it is may be of this kind, or None; `around` makes
+    up a stage around a log where none is given. `notes` are what the engineer should know of all its results, the stage
+    being given or not; `doubts` what speaks against believing a result, in sentences, and `failed` whether its analysis
+    failed, whatever of it still holds. Functions raise InputError for logs that cannot be used."""
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
     estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
@@ -129,11 +129,12 @@ class ExperimentKind(Generic[Result]):
     after: tuple[str, ...] = ()
     roles: tuple[str, ...] = ("position", "force")
     si: bool = True
+    foreign: tuple[str, ...] = ()
     partial: Callable[[Log], bool] = lambda log: False
     together: bool = False
     responses: bool = False
     claims: Callable[[Course], str | None] | None = None
-    around: Callable[[Log], Stage] | None = None
+    around: Callable[[Log], Stage | None] | None = None
     notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
     predictor: Predictor[Result] | None = None
     doubts: Callable[[Result], Sequence[str]] = lambda result: ()

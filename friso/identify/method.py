@@ -166,8 +166,8 @@ def _around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
     """A stage around the first log that shows enough of a machine; None without one."""
     for log, kind in logs:
         around = KINDS[kind].around
-        if around is not None and isinstance(log, Log):
-            return around(log)
+        if around is not None and isinstance(log, Log) and (stage := around(log)) is not None:
+            return stage
     return None
 
 

@@ -35,8 +35,10 @@ def all_with_model_error(
     if is_free(flat):
         return tuple(estimates)
     sources, plain = _of_inverse(flat), {estimate.name: estimate for estimate in inverse.estimates}
+    plainly_left = float(np.sqrt(np.mean((inverse.measured - inverse.fitted) ** 2)))
+    alike = min(1.0, quality.left / plainly_left) if plainly_left > 0 else 1.0
     return tuple(
-        with_model_error(estimate, plain[sources[estimate.name][0]], sources[estimate.name][1], quality.lacking)
+        with_model_error(estimate, plain[sources[estimate.name][0]], sources[estimate.name][1], quality.lacking, alike)
         if estimate.name in sources
         else estimate
         for estimate in estimates
@@ -76,12 +78,16 @@ CONTRADICTED = "the whole model contradicts the record"
 """Why nothing but what the inverse model shows is taken from a fit."""
 
 
-def with_model_error(estimate: Estimate, inverse: Estimate, scale: float, lacking: float) -> Estimate:
-    """An estimate of the whole model whose interval allows for what the model lacks: the distance by which it lies
-    outside the interval of the inverse model, times the share of what is left that is not noise. `scale` is the key
-    over the inverse model's quantity."""
+def with_model_error(
+    estimate: Estimate, inverse: Estimate, scale: float, lacking: float, alike: float = 1.0
+) -> Estimate:
+    """An estimate of the whole model whose interval allows for what the model lacks, by the share of what is left that
+    is not noise (`lacking`): as much wider as it lies outside of the inverse model's interval, and no narrower than
+    that where both models leave `alike` much, 1 for as much as the inverse model: what both lack moves both. `scale` is
+    the key over the inverse model's quantity."""
     if not (estimate.determined and inverse.determined):
         return estimate
-    beyond = abs(estimate.value - scale * inverse.value) - abs(scale) * inverse.half_width
-    more = lacking * max(0.0, beyond)
+    half = abs(scale) * inverse.half_width
+    beyond = abs(estimate.value - scale * inverse.value) - half
+    more = lacking * max(0.0, beyond) + max(0.0, lacking * alike * half - estimate.half_width)
     return replace(estimate, low=estimate.low - more, high=estimate.high + more, systematic=estimate.systematic + more)

@@ -148,7 +148,8 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
 
 def named(path: Path, mapping: Mapping, kind: str) -> Log:
     """The log with the signals that the kind of experiment needs."""
-    return read_log(path, mapping, strict=KINDS[kind].si, needed=KINDS[kind].needed(mapping.roles))
+    chosen = KINDS[kind]
+    return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:

@@ -78,14 +78,14 @@ def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str])
 def origins(stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], from_user: bool) -> dict[str, str]:
     """Where each key of an identified stage comes from: the estimates that it took, keys that follow another one, and
     the stage file, or our choice where nothing was given."""
-    known: dict[str, str] = {}
+    sources: dict[str, str] = {}
     for estimate in estimates:
-        known[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
-    known |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
+        sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
+    sources |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
     rest = "as given" if from_user else "our choice, not identified"
     tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
     keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
-    return {key: known.get(key, rest) for key in keys}
+    return {key: sources.get(key, rest) for key in keys}
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:

@@ -6,18 +6,19 @@ First the inverse model by least squares, then the whole model by its output err
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from friso.errors import InputError
+from friso.identify.combine import Correlated
 from friso.identify.doubts import quality_of
 from friso.identify.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
-from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
+from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
-from friso.identify.logs.log import Log
+from friso.identify.logs.log import ROLES, Log
 from friso.identify.model_error import all_with_model_error, not_described, of_inverse_model
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
@@ -64,6 +65,11 @@ class IdentifiedMoves:
         return tuple(estimate for estimate in self.estimates if estimate.determined)
 
     @property
+    def force_unit(self) -> str:
+        """The unit of the force, which estimates hold in the newton's place."""
+        return self.log.unit("force")
+
+    @property
     def flat(self) -> dict[str, Any]:
         """The stage as fitted, as flat keys; what the record does not show is as in the stage given."""
         return self.fit.stage
@@ -75,10 +81,11 @@ def identify_moves(
     """Mass, friction and what else the moves of a log show of a stage given as flat keys.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
-    else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default.
-    Raises InputError for a log without position or force.
+    else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default. Where
+    the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. Raises InputError for
+    a log without position or force.
     """
-    _has(log, ("position", "force", *(("reference",) if own_loop else ())))
+    _has(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
     part = log.longest
     share = _cart_share(log, flat)
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
@@ -115,9 +122,9 @@ class SimulatedLog:
     errors: SimulationErrors
 
 
-def simulated_log(moves: IdentifiedMoves, log: Log, known: Mapping[str, Any] | None = None) -> SimulatedLog:
-    """Another log of the same axis simulated with the estimates; `known` are the flat keys of the stage as it was set
-    up for that log, whose controller and changed keys count.
+def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
+    """Another log of the same axis simulated with the estimates; `set_up` are the flat keys of the stage as it was
+    set up for that log, whose controller and changed keys count.
 
     Raises InputError where the machine's own loop is not known.
     """
@@ -125,28 +132,28 @@ def simulated_log(moves: IdentifiedMoves, log: Log, known: Mapping[str, Any] | N
         expected = "the machine's own controller, with which another record can be simulated"
         raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
     part = log.longest
-    problem = _same_kind(moves.loop, log, part, known, {*log.setup, *moves.log.setup})
+    problem = _same_kind(moves.loop, log, part, set_up, {*log.setup, *moves.log.setup})
     simulated = problem.record(moves.fit.inner)
     return SimulatedLog(part, simulated, errors_of(log, part, simulated, moves.inverse.bandwidth))
 
 
-def _same_kind(problem: Problem, log: Log, part: slice, known: Mapping[str, Any] | None, changed: set[str]) -> Problem:
-    """The same stage and parameters on another log, with the controller and the `changed` keys that are `known` of
-    it."""
+def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
+    """The same stage and parameters on another log, with the controller and the `changed` keys of its set-up."""
     _has(log, ("position", "force", "reference"))
     flat = dict(problem.flat)
-    if known is not None:
+    if set_up is not None:
         flat = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
-        flat |= {key: value for key, value in known.items() if key.startswith(f"{CONTROLLER}.") or key in changed}
+        flat |= {key: value for key, value in set_up.items() if key.startswith(f"{CONTROLLER}.") or key in changed}
     return closed_loop(flat, log, part, problem.parameters)
 
 
-def _has(log: Log, roles: Sequence[str]) -> None:
+def _has(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> None:
+    """Raises InputError for a role that a log does not have, or in another unit than SI, but for the `foreign`."""
     for role in roles:
         if role not in log:
             actual = f"a log with {', '.join(log.signals) or 'no signals'}"
             raise InputError(role, actual, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
-        if role in log.units:
+        if role in log.units and role not in foreign:
             example = f'--scale {role}="35 {"N" if role == "force" else "mm"}/{log.unit(role)}"'
             raise InputError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
 
@@ -158,7 +165,8 @@ def _problems(
     speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
-    parameters = parameters_of(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
+    every = parameters_of(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
+    parameters = [replace(parameter, unit=unit_of(parameter.unit, log)) for parameter in every]
     full = {**flat, **keys_of(flat, {parameter.name: parameter.start for parameter in parameters})}
     follows = tracking(full, log, part, parameters, inverse.bandwidth)
     return follows, closed_loop(full, log, part, parameters) if own_loop else None
@@ -221,9 +229,30 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
     (log,) = logs
     assert isinstance(log, Log)
-    flat = prior.flat(log)
+    if prior.from_user:
+        _has(log, ("force",))
+    flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
     return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
+
+
+def _in_newtons(log: Log) -> bool:
+    return log.unit("force") == ROLES["force"]
+
+
+def _around(log: Log) -> Stage | None:
+    """A stage around a log whose force is in newtons."""
+    return made_up(log, inverse_model(log)) if _in_newtons(log) else None
+
+
+def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Keys of the stage file, which are in newtons."""
+    return result.estimates if _in_newtons(result.log) else ()
+
+
+def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
+    """Those that are shown, as the fit correlates them."""
+    return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
@@ -258,11 +287,12 @@ def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
 
 KIND = ExperimentKind[IdentifiedMoves](
     _analyse,
-    lambda result, stage: result.estimates,
-    lambda result, estimates: (result.correlated, result.correlation),
+    _estimates,
+    _correlated,
     after=("frequency", "steps"),
     claims=_claims,
-    around=lambda log: made_up(log, inverse_model(log)),
+    foreign=("force", "disturbance"),
+    around=_around,
     notes=_notes,
     predictor=Predictor("a log with a reference beside moves", _predict, _check_prediction),
     doubts=lambda result: result.quality.doubts,

@@ -11,6 +11,7 @@ from friso.errors import InputError, LogError
 from friso.identify.logs import checks, delays
 from friso.identify.logs.format import FORMATS
 from friso.identify.logs.gaps import check_gaps
+from friso.identify.logs.integrated import NOTE, integrated, is_needed
 from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping, option
 from friso.identify.logs.read import file_format
@@ -24,18 +25,27 @@ LEAST_SAMPLES = 50
 
 
 def read_log(
-    path: Path | str, mapping: Mapping | None = None, strict: bool = True, needed: Sequence[str] = ("position",)
+    path: Path | str,
+    mapping: Mapping | None = None,
+    strict: bool = True,
+    needed: Sequence[str] = ("position",),
+    foreign: Sequence[str] = (),
 ) -> Log:
     """The log in a file: signals by role, SI, on one time base; with what was read and what is doubtful, line by line.
 
-    With `strict`, every signal must be in the SI unit of its role; without, others are kept and listed in `Log.units`.
-    `needed` are the roles that must be there. Raises LogError (one message) for what cannot be read or used.
+    With `strict`, every signal must be in the SI unit of its role, but those of the `foreign` roles, which may be in
+    another unit of their own; without, all are kept as they are, and listed in `Log.units`. `needed` are the roles that
+    must be there; a position may be the integral of the velocity. Raises LogError (one message) for what cannot be read
+    or used.
     """
     path, mapping = Path(path), mapping or Mapping()
     form = FORMATS[file_format(path)]
     table = with_user_units(form.read(path), mapping, form.times, str(path))
-    reading = Reading(table, mapping, strict, not form.units, str(path))
+    reading = Reading(table, mapping, strict, not form.units, str(path), tuple(foreign))
     proposal = propose(table, mapping.roles, str(path))
+    by_velocity = is_needed(table, proposal, needed)
+    if by_velocity:
+        needed = [*(role for role in needed if role != "position"), "velocity"]
     check_gaps(reading, proposal, needed)
     chosen = proposal.chosen
     unused(mapping, chosen, str(path))
@@ -46,6 +56,11 @@ def read_log(
         notes.read += base.read
         notes.warnings += base.warnings
         _check(base, signals, needed)
+        if by_velocity:
+            signals["position"] = integrated(signals["velocity"], base.period, base.segments)
+            notes.warnings.append(NOTE)
+            if "velocity" in notes.units:
+                notes.units["position"] = notes.units["velocity"].removesuffix("/s")
     except InputError as error:
         raise error.found_in(str(path)) from None
     notes.warnings += _doubts(base, signals, notes)

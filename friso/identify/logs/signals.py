@@ -16,7 +16,7 @@ from friso.identify.logs.mapping import Mapping, option
 from friso.identify.logs.preamble import RATES, STEPS
 from friso.identify.logs.roles import AssignedRole, find
 from friso.identify.logs.text import with_times
-from friso.identify.logs.units import factor, in_si, is_unit, read_scale
+from friso.identify.logs.units import FOREIGN, factor, in_si, is_unit, read_scale
 from friso.quantities import quoted
 
 LARGEST = 1e30
@@ -35,13 +35,19 @@ class Notes:
 @dataclass(frozen=True)
 class Reading:
     """How channels are read: the table, what the user said, whether only the units of the roles will do, whether the
-    file is of a kind that cannot hold units, and where it lies."""
+    file is of a kind that cannot hold units, where it lies, and the roles that may have a `foreign` unit all the same
+    (a force in volts)."""
 
     table: ChannelTable
     mapping: Mapping
     strict: bool
     bare: bool
     origin: str
+    foreign: tuple[str, ...] = ()
+
+    def takes(self, role: str, si: str) -> bool:
+        """Whether a signal of a role may stand in a unit that is not the role's."""
+        return si == ROLES[role] or not self.strict or (role in self.foreign and si in FOREIGN)
 
 
 def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
@@ -83,7 +89,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
         value, si = in_si(unit, ROLES[role])
         line = f"in {unit}" if unit else "without a unit"
         if si != ROLES[role]:
-            if reading.strict:
+            if not reading.takes(role, si):
                 raise _wrong_unit(choice, unit, si, reading)
             notes.units[role] = si
     notes.read.append(f"{role}: {channel.name} ({channel.source}), {choice.reason}; {line}")
@@ -110,9 +116,9 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
     scale = reading.mapping.scales.get(choice.role)
     if scale is not None:
         _scaled(choice.role, scale, choice.channel.unit, reading.origin)
-    if not reading.strict or scale is not None or _taken_as_si(choice, reading):
+    if scale is not None or reading.takes(choice.role, si) or _taken_as_si(choice, reading):
         return None
-    return None if si == ROLES[choice.role] else _wrong_unit(choice, choice.channel.unit, si, reading)
+    return _wrong_unit(choice, choice.channel.unit, si, reading)
 
 
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:

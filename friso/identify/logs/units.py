@@ -18,6 +18,8 @@ OTHERS = {
     "N": ("A", "V", "N*m"),
 }
 """What may stand in place of the SI unit of a role where the caller allows it: turned into these units."""
+FOREIGN = (*OTHERS["N"], "count")
+"""Units in which a force may stand where estimates per such a unit are an answer."""
 _SPELLINGS = {
     "sec": "s",
     "secs": "s",

@@ -26,9 +26,9 @@ def estimates_of(identified: Identified, covered: Coverage) -> tuple[tuple[Estim
     fit = identified.fit
     parameters = fit.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
-    known = np.isfinite(np.diag(fit.covariance))
-    places = [number for number, finite in zip(fit.free, known, strict=True) if finite]
-    spread[np.ix_(places, places)] = _no_narrower(fit, identified.profiles)[np.ix_(known, known)]
+    finite_variance = np.isfinite(np.diag(fit.covariance))
+    places = [number for number, finite in zip(fit.free, finite_variance, strict=True) if finite]
+    spread[np.ix_(places, places)] = _no_narrower(fit, identified.profiles)[np.ix_(finite_variance, finite_variance)]
     keys, slopes = _slopes(fit)
     covariance = slopes @ spread @ slopes.T
     values = _keys_at(fit, fit.inner)
@@ -38,8 +38,8 @@ def estimates_of(identified: Identified, covered: Coverage) -> tuple[tuple[Estim
     estimates = []
     for i, key in enumerate(keys):
         owner = _OWNERS.get(key, key)
-        unit = next((parameter.unit for parameter in parameters if parameter.name in (key, owner)), "")
-        unit = "N" if key == "friction.static" else unit
+        like = "friction.coulomb" if key == "friction.static" else owner
+        unit = next((parameter.unit for parameter in parameters if parameter.name in (key, like)), "")
         if key in unknown or owner in unknown:
             low, high = (-np.inf, np.inf) if key in unknown and owner != key else _range(fit, owner)
             estimates.append(Estimate.unknown(key, unit, METHOD, unknown.get(key) or unknown[owner], low, high))
@@ -73,7 +73,7 @@ def _reasons(identified: Identified, covered: Coverage) -> dict[str, str]:
         why = f"the log shows the sum of both masses, {fit.value(MASS):.4g} kg, not how it is split"
         unknown |= {"masses.cart": why, "masses.stage": why}
     if "friction.coulomb" in parameters and not any(name.startswith("bias.") for name in parameters):
-        total = f"{fit.value('friction.coulomb'):.4g} N"
+        total = f"{fit.value('friction.coulomb'):.4g} {parameters['friction.coulomb'].unit}"
         why = f"the log moves in one direction only: its sum with a constant force is {total}"
         unknown |= {"friction.coulomb": why, "friction.static": why}
     return unknown

@@ -134,9 +134,8 @@ def _record(log: Log, output: str) -> ResponseRecord:
 def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
     """By averaging over periods, or where nothing repeats by the local polynomial method; names are the log's."""
     channels = from_log(log, "force", output)[1]
-    driving = records[0].input if records[0].reference is None else records[0].reference
     try:
-        find_periods(driving, None if period is None else period / records[0].sample_time)
+        find_periods(records[0].driving, None if period is None else period / records[0].sample_time)
     except InputError:
         if len(records) > 1:
             raise
@@ -213,8 +212,7 @@ def _friction(
 
 def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
     """The input over the last whole period. Raises InputError where nothing repeats."""
-    driving = record.input if record.reference is None else record.reference
-    periods = find_periods(driving, None if period is None else period / record.sample_time)
+    periods = find_periods(record.driving, None if period is None else period / record.sample_time)
     return record.input[periods.stop - periods.samples : periods.stop]
 
 

@@ -26,7 +26,7 @@ EXPLAINED = 3.0
 """Sum of squares over degrees of freedom up to which a fit counts as right."""
 
 CANCELS = 1.0
-"""Distance of a resonance from an antiresonance, over the larger of their half-widths, up to which they nearly cancel:
+"""Distance of a resonance from an antiresonance, over the smaller of their half-widths, up to which they nearly cancel:
 the response then changes by a factor of two at most, over so narrow a band that any unevenness may look like it."""
 
 
@@ -107,7 +107,7 @@ def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tupl
         if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
             continue
         zero = zeros[np.argmin(np.abs(zeros - pole))]
-        if abs(zero - pole) <= CANCELS * max(-pole.real, -zero.real):
+        if abs(zero - pole) <= CANCELS * min(-pole.real, abs(zero.real)):
             yield (
                 f"a resonance at {abs(pole) * scale:.4g} Hz and an antiresonance at {abs(zero) * scale:.4g} Hz nearly "
                 "cancel: an unevenness of the response looks like this, too, and may be no mode"

@@ -16,6 +16,11 @@ LIKE = 0.2
 """Mean squared change from one period to the next, in units of twice the variance, of an input that repeats."""
 
 
+SLIP, GROWS = 0.02, 2.0
+"""Such a change from one period to the next that at least so many times as much has changed after two is a slip of the
+generator's clock against the recorder's, by a share of a sample each period: two in a row change four times as much."""
+
+
 @dataclass(frozen=True)
 class Periods:
     """Whole periods of `samples` each, `count` of them, from sample `start` to `stop`."""
@@ -81,7 +86,15 @@ def _shortest(change: np.ndarray) -> int:
     if not lags.size or change[lags].min() > LIKE:
         raise _not_periodic("an input that does not repeat within half the record")
     good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
-    return int(_lowest(change, int(good[0])))
+    return min([_lowest(change, int(good[0])), *_slipping(change, lags)[:1]])
+
+
+def _slipping(change: np.ndarray, lags: np.ndarray) -> list[int]:
+    """The lags, of those given, at which a signal repeats but for a slip of its clock."""
+    inner = lags[2 * lags < len(change)]
+    inner = inner[inner + 1 < len(change)]
+    lowest = (change[inner] <= change[inner - 1]) & (change[inner] <= change[inner + 1]) & (change[inner] < SLIP)
+    return [int(lag) for lag in inner[lowest] if change[2 * lag] > GROWS * change[lag]]
 
 
 def _lowest(change: np.ndarray, lag: int) -> int:

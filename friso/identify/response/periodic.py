@@ -19,8 +19,8 @@ from friso.identify.response.response import Channels, FrequencyResponse
 LINES = 5
 """Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
 
-CLOCKS, TOLD = 1e-3, 1e-6
-"""Share by which the periods of realisations may differ, as those of clocks do, and from which on that is said."""
+CLOCKS, EQUAL = 1e-3, 1e-6
+"""Share by which the periods of realisations may differ, as those of clocks do, and up to which they are equal."""
 
 FEW = 10
 """Real degrees of freedom per line from which a variance stands on its own."""
@@ -71,7 +71,7 @@ def _together(every: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     if apart > CLOCKS or len({len(realisation.frequency) for realisation in every}) > 1:
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
-    if apart <= TOLD:
+    if apart <= EQUAL:
         return every, []
     mean = float(spacings.mean())
     lines = np.arange(1, len(every[0].frequency) + 1) * mean

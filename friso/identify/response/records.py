@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from friso.errors import InputError
 from friso.identify.logs.log import Log
@@ -21,6 +22,9 @@ CLEAR = 3.0
 GAP, SHARE = 2.5, 0.95
 """A step down between line amplitudes that parts those meant from the rest, if the former hold that power."""
 
+SLIPPED = 0.05
+"""Samples by which a generator's clock slips over the record from which on it is taken anew."""
+
 FAR = 1.5
 """A leading period is a transient if it lies this much further off than any period of the second half."""
 
@@ -33,6 +37,11 @@ class ResponseRecord:
     output: np.ndarray
     sample_time: float
     reference: np.ndarray | None = None
+
+    @property
+    def driving(self) -> np.ndarray:
+        """The external signal: the reference, or in open loop the input."""
+        return self.input if self.reference is None else self.reference
 
     def checked(self, least: int = 8) -> ResponseRecord:
         """The record as floats. Raises InputError for NaN, unequal lengths, constant signals, too few samples."""
@@ -102,17 +111,25 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     Raises InputError for what does not repeat and for fewer than two periods that are left.
     """
     record = record.checked()
-    external = record.input if record.reference is None else record.reference
     expected = None if period is None else period / record.sample_time
-    periods = find_periods(external, expected)
-    driven, reaction, driving = (_harmonics(signal, periods) for signal in (record.input, record.output, external))
+    periods = find_periods(record.driving, expected)
+    driving = _harmonics(record.driving, periods)
+    warnings = periods.warnings
+    slip = _slip(driving, periods.samples)
+    if abs(slip) * periods.count > SLIPPED:
+        text = f"a period has {periods.samples + slip:.7g} samples, since clocks differ: taken anew at whole ones"
+        warnings = (*warnings, text)
+        record = _at_other_rate(record, 1 + slip / periods.samples)
+        periods = find_periods(record.driving, periods.samples)
+        driving = _harmonics(record.driving, periods)
+    driven, reaction = (_harmonics(signal, periods) for signal in (record.input, record.output))
     alike = _alike(driving)
     excited = _excited(driving[alike])
     if not excited.any():
         raise InputError("excitation", "no line above the noise", "a periodic input with lines", "a multisine")
     first = _settled(reaction[alike][:, excited])
     stationary = np.flatnonzero(alike)[first:]
-    warnings = (*periods.warnings, *_left_out(alike, first))
+    warnings = (*warnings, *_left_out(alike, first))
     if len(stationary) < 2:
         raise InputError("period", f"{len(stationary)} period without transient", "at least two", "a longer record")
     frequency = np.arange(1, driven.shape[1] + 1) / (periods.samples * record.sample_time)
@@ -126,6 +143,27 @@ def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
         yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, in which the input is another"
     if first:
         yield f"the first {first} of {np.count_nonzero(alike)} periods left out as transient"
+
+
+def _slip(driving: np.ndarray, samples: int) -> float:
+    """By how many samples a period is longer than whole `samples`: by how much the harmonics of the external signal,
+    shape (periods, lines), turn from one period to the next, in proportion to their numbers."""
+    turned = np.sum(driving[1:] * driving[:-1].conj(), axis=0)
+    number, weight = np.arange(1, driving.shape[1] + 1), np.abs(turned)
+    most = float(weight @ number**2)
+    return -float(weight * np.angle(turned) @ number) / most * samples / (2 * np.pi) if most > 0 else 0.0
+
+
+def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
+    """A record taken anew every `step` samples, by cubic splines: what these lose of high frequencies, all of its
+    signals lose."""
+    at = np.arange(int((len(record.input) - 1) / step) + 1) * step
+
+    def taken(signal: np.ndarray) -> np.ndarray:
+        return CubicSpline(np.arange(len(signal)), signal)(at)
+
+    reference = None if record.reference is None else taken(record.reference)
+    return ResponseRecord(taken(record.input), taken(record.output), record.sample_time * step, reference)
 
 
 def _harmonics(signal: np.ndarray, periods: Periods) -> np.ndarray:

@@ -43,6 +43,7 @@ class KindView(Generic[Result]):
     the unit in the key's suffix or beside; `figures`, whose names begin with the text given. `headline` is a sentence
     for the head of the page beside the estimates of keys, "" for none. `longest`: of a log with gaps, the longest
     stretch without any is all that is used.
+    `opening` is the last part of the name of the figure that opens the page, "" for none.
     """
 
     title: str
@@ -53,6 +54,7 @@ class KindView(Generic[Result]):
     warnings: Callable[[Any], tuple[str, ...]] = lambda result: result.warnings
     headline: Callable[[Result], str] = lambda result: ""
     longest: bool = False
+    opening: str = ""
     prediction: PredictionView[Any] | None = None
 
 

@@ -31,11 +31,17 @@ from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.kind_view import TIME
 from friso.views.identify.numbers import name_of, unit_of
 
+FORCE = "force"
+"""Name of the figure that opens the page."""
+
 WORST = 5.0
 """How much worse a fit is seen in a profile, in units of what ends the 95 % interval."""
 
 WIDE = 8.0
 """Ratio of the ends from which a profile has a logarithmic axis."""
+
+LONG = 40.0
+"""Of the force, as much is drawn at the head of the page: so many periods of the motion's bandwidth."""
 
 PALE = "#dbe9f4"
 
@@ -45,7 +51,31 @@ def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
     flat = moves.fit.problem.flat
     apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
     friction = [_friction(moves, name)] if not apart or cart(moves.log) is not None else []
-    return [_traces(moves, name), _residual(moves, name), *friction, *_profiles(moves, name)]
+    return [_force(moves, name), _traces(moves, name), _residual(moves, name), *friction, *_profiles(moves, name)]
+
+
+def _force(moves: IdentifiedMoves, name: str) -> Figure:
+    """Measured and simulated force where the stage moves most."""
+    stretch = _liveliest(moves)
+    log, part = moves.log, moves.part
+    time, force = log.time[part][stretch], log["force"][part][stretch]
+    if moves.loop is None:
+        simulated, word = force - moves.fit.residual[stretch], "needed"
+    else:
+        extra = log["disturbance"][part][stretch] if "disturbance" in log else 0.0
+        simulated, word = moves.simulated.force[stretch] + extra, "simulated"
+    caption = "The force as measured and as the identified machine needs it, where the log moves most."
+    panel = Panel("", TIME, Axis("Force", moves.force_unit), _both(time, force, simulated, word))
+    return Figure(f"{name}_{FORCE}", "Measured and simulated force", caption, (panel,))
+
+
+def _liveliest(moves: IdentifiedMoves) -> slice:
+    """The samples of the stretch of a log, of `LONG` periods at most, that goes the longest way."""
+    position = moves.log["position"][moves.part]
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
+    length = min(len(position), max(2, round(LONG / (moves.inverse.bandwidth * moves.log.sample_time))))
+    first = int(np.argmax(way[length - 1 :] - way[: len(way) - length + 1]))
+    return slice(first, first + length)
 
 
 def _traces(moves: IdentifiedMoves, name: str) -> Figure:
@@ -59,8 +89,8 @@ def _traces(moves: IdentifiedMoves, name: str) -> Figure:
         "The force that the identified machine needs to move as measured, and its difference from the measured force."
     )
     panels = (
-        Panel("", TIME, Axis("Force", "N"), _both(time, force, force - moves.fit.residual, "needed")),
-        _left(time, moves.fit.residual),
+        Panel("", TIME, Axis("Force", moves.force_unit), _both(time, force, force - moves.fit.residual, "needed")),
+        _left(time, moves.fit.residual, moves.force_unit),
     )
     return Figure(f"{name}_traces", "Measured and simulated force", caption, panels)
 
@@ -73,8 +103,8 @@ def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, .
     return (
         Panel("", TIME, Axis("Position", "m"), _both(time, position, simulated.position, "simulated")),
         Panel("", TIME, Axis("Measured − simulated", "m"), (apart,)),
-        Panel("", TIME, Axis("Force", "N"), _both(time, force, expected, "simulated")),
-        _left(time, force - expected),
+        Panel("", TIME, Axis("Force", log.unit("force")), _both(time, force, expected, "simulated")),
+        _left(time, force - expected, log.unit("force")),
     )
 
 
@@ -82,14 +112,14 @@ def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Se
     return Series(time, measured, "measured", GREY, width=1.6), Series(time, simulated, word, BLUE, width=0.9)
 
 
-def _left(time: Array, left: Array) -> Panel:
-    return Panel("", TIME, Axis("Measured − simulated", "N"), (Series(time, left, "", VERMILLION, width=0.9),))
+def _left(time: Array, left: Array, unit: str) -> Panel:
+    return Panel("", TIME, Axis("Measured − simulated", unit), (Series(time, left, "", VERMILLION, width=0.9),))
 
 
 def _residual(moves: IdentifiedMoves, name: str) -> Figure:
     """The residual force over place and speed."""
     moved = motion(moves.log["position"][moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
-    left, axis = moves.fit.residual, Axis("Residual force", "N")
+    left, axis = moves.fit.residual, Axis("Residual force", moves.force_unit)
     panels = (
         Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
         Panel("", Axis("Velocity", "m/s"), axis, (Series(moved.velocity, left, "", VERMILLION, width=0.5),)),
@@ -122,7 +152,7 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     )
     speeds = np.concatenate([-np.geomspace(top, top / 1e4, 200), [np.nan], np.geomspace(top / 1e4, top, 200)])
     curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
-    axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", "N", (-reach, reach))
+    axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", moves.force_unit, (-reach, reach))
     unshown = any(estimate.name == "friction.static" and not estimate.determined for estimate in moves.estimates)
     caption = "Loops: measured force less mass times acceleration; they open where the motion reverses."
     if sides:

@@ -12,7 +12,16 @@ from friso.stage.correlations import beside, correlations_text
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.identify.figures import identify_figures
-from friso.views.identify.words import COLUMNS, estimate_rows, headline, prediction_line, read_rows, summaries
+from friso.views.identify.kind_view import view_of
+from friso.views.identify.words import (
+    COLUMNS,
+    estimate_rows,
+    headline,
+    labels,
+    prediction_line,
+    read_rows,
+    summaries,
+)
 from friso.views.pages import Report
 
 STAGE = "identified.toml"
@@ -41,6 +50,8 @@ def identify_html(
     figures: Sequence[Figure],
 ) -> str:
     """The whole page of an identification and its figures."""
+    several = zip(identification.experiments, labels(identification), strict=True)
+    opening = [f"identify_{label}_{view_of(experiment.kind).opening}" for experiment, label in several]
     return Report.of_stage(
         "identify",
         identification.stage,
@@ -53,4 +64,5 @@ def identify_html(
         parts=summaries(identification),
         predicted=[prediction_line(prediction) for prediction in predictions],
         warnings=identification.warnings,
+        opening=opening,
     ).html()

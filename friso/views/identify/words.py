@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from friso.identify.kinds import KINDS
 from friso.identify.logs.log import Log
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.identify.kind_view import Facts, PredictionView, view_of
@@ -27,6 +28,9 @@ NO_STAGE = (
     "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
     "identified values replace those in it."
 )
+
+NO_NEWTONS = "No stage file is written: its keys are in newtons."
+"""Where the force of the only moves is in another unit."""
 
 NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
 
@@ -73,11 +77,19 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
     if len(effects) < len(visible):
         lines.append((GREEN, f"None found: {_none_found(visible)}."))
     if identification.stage is None:
-        lines.append((ORANGE, NOTHING_HOLDS if identification.failed else NO_STAGE))
+        lines.append((ORANGE, _why_no_stage(identification)))
     if len(visible) < len(estimates):
         lines.append((ORANGE, f"Not identified: {missing(estimates)}."))
         lines += [(ORANGE, f"What would show it: {ways}.") for ways in [_ways(estimates)] if ways]
     return lines
+
+
+def _why_no_stage(identification: Identification) -> str:
+    if identification.failed:
+        return NOTHING_HOLDS
+    logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
+    around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
+    return NO_NEWTONS if around and any("force" in log.units for log in logs) else NO_STAGE
 
 
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")

@@ -13,11 +13,8 @@ from friso.views.drawing.figure import Figure
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import ends_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
-from friso.views.identify.moves_figures import moves_figures, record_panels
-from friso.views.identify.numbers import digits, listed, percent
-
-SUFFIXES = {"N": "n", "kg": "kg", "N*s/m": "n_s_per_m"}
-"""Of keys, by unit, of what the inverse model shows."""
+from friso.views.identify.moves_figures import FORCE, moves_figures, record_panels
+from friso.views.identify.numbers import digits, listed, percent, with_interval, within
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
@@ -52,7 +49,7 @@ def _facts(moves: IdentifiedMoves) -> Facts:
         ("Inverse model, per direction", _inverse_text(moves.by_direction)),
         ("Bandwidth of the motion", digits(moves.inverse.bandwidth, "Hz")),
         ("Relative errors of the simulation", _errors(moves)),
-        ("Residual force", f"{digits(residual.rms, 'N')} RMS, {correlation}"),
+        ("Residual force", f"{digits(residual.rms, moves.force_unit)} RMS, {correlation}"),
         ("Share of its power explained", f"{percent(residual.by_position)} by position along the rail, "
          f"{percent(residual.by_velocity)} by speed"),
     )  # fmt: skip
@@ -102,10 +99,15 @@ def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
     named = {
-        f"{estimate.name.replace(' ', '_')}_{SUFFIXES[estimate.unit]}": ends_document(estimate)
+        f"{estimate.name.replace(' ', '_')}_{_suffix(estimate.unit)}": ends_document(estimate)
         for estimate in model.estimates
     }
     return {**named, "force_error": model.error, "bandwidth_hz": model.bandwidth}
+
+
+def _suffix(unit: str) -> str:
+    """Of a key, by its unit: "n_s_per_m" of "N*s/m"."""
+    return unit.lower().replace("*", "_").replace("/", "_per_").replace("^", "")
 
 
 def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
@@ -123,6 +125,17 @@ def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 def _profile_numbers(profile: Profile) -> dict[str, Any]:
     ends = {"low": profile.low, "high": profile.high, "open_low": profile.open_low, "open_high": profile.open_high}
     return {**ends, "values": profile.values, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
+
+
+def _headline(moves: IdentifiedMoves) -> str:
+    """Of a force that is not in newtons, what is identified per unit of it, which no stage file takes."""
+    if moves.force_unit == "N":
+        return ""
+    values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in moves.correlated)
+    return (
+        f"Identified, the force being in {moves.force_unit}: {values}. What needs newtons, such as a stage file, needs "
+        f'--scale force="NUMBER N/{moves.force_unit}".'
+    )
 
 
 def _prediction_sentence(simulated: SimulatedLog) -> str:
@@ -150,7 +163,9 @@ VIEW = KindView[IdentifiedMoves](
     lambda result, logs, name: moves_figures(result, name),
     sentences=_sentences,
     warnings=lambda result: (),
+    headline=_headline,
     longest=True,
+    opening=FORCE,
     prediction=PredictionView[SimulatedLog](
         worst=lambda result: result.errors.force,
         sentence=_prediction_sentence,

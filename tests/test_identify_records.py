@@ -1,0 +1,131 @@
+"""Records as people have them: a velocity alone, a force in volts, gravity, a stage that stops short."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from refusals import Refused
+
+import friso
+from friso.identify.experiments.moves import IdentifiedMoves
+from friso.identify.inverse_model import inverse_model, unit_of
+from friso.identify.kind import AnalysisSettings
+from friso.identify.logs.assemble import read_log
+from friso.identify.logs.integrated import NOTE
+from friso.identify.logs.log import Log
+from friso.identify.logs.mapping import Mapping
+from friso.identify.method import Identification, identify
+from friso.identify.readings.common import record
+from friso.identify.sources import named, read_all
+from friso.views.identify.document import identify_document
+from friso.views.identify.words import answer, headline
+
+DT = 2e-3
+MASS, VISCOUS, COULOMB = 6.0, 20.0, 11.0
+PER_VOLT = 35.0
+
+
+def axis(offset: float = 0.0) -> Log:
+    """Two sines of a mass with friction and a constant force, with noise on the force."""
+    time = np.arange(round(6 / DT)) * DT
+    rates = 2 * np.pi * np.array([[0.5], [1.3]])
+    position = np.sum(0.05 * np.sin(rates * time), axis=0)
+    velocity = np.sum(0.05 * rates * np.cos(rates * time), axis=0)
+    acceleration = np.sum(-0.05 * rates**2 * np.sin(rates * time), axis=0)
+    force = MASS * acceleration + VISCOUS * velocity + COULOMB * np.sign(velocity) + offset
+    force = force + 0.05 * np.random.default_rng(4).standard_normal(len(time))
+    return record("axis", DT, position=position, velocity=velocity, force=force)
+
+
+def csv(path: Path, heads: str, *columns: np.ndarray) -> Path:
+    rows = [",".join(f"{number:.9g}" for number in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join([heads, *rows]) + "\n")
+    return path
+
+
+# --- a velocity alone -------------------------------------------------------------------------------------------------
+
+
+def test_a_position_is_the_integral_of_a_velocity_alone(tmp_path: Path) -> None:
+    log = axis()
+    path = csv(
+        tmp_path / "speed.csv", "time [s],velocity [mm/s],force [N]", log.time, 1e3 * log["velocity"], log["force"]
+    )
+    (file,) = read_all([path], Mapping(experiment="moves"), tmp_path)
+    assert isinstance(file.source, Log)
+    assert NOTE in file.source.warnings
+    assert file.source["position"] == pytest.approx(log["position"] - log["position"][0], abs=1e-6)
+    masses = [inverse_model(one, 5.0).value("mass") for one in (log, file.source)]
+    assert masses[1] == pytest.approx(masses[0], rel=0.01)
+
+
+def test_each_stretch_between_gaps_is_integrated_from_0(tmp_path: Path) -> None:
+    log = axis()
+    keep = np.r_[0:1000, 1500:2500]
+    path = csv(tmp_path / "gap.csv", "time [s],velocity [m/s]", log.time[keep], log["velocity"][keep])
+    read = read_log(path)
+    assert [read["position"][part.start] for part in read.segments] == [0.0, 0.0]
+    assert read["position"][999] == pytest.approx(log["position"][999] - log["position"][0], abs=1e-6)
+
+
+def test_a_velocity_is_not_integrated_beside_what_may_be_the_position(tmp_path: Path, refused: Refused) -> None:
+    log = axis()
+    path = csv(tmp_path / "qm.csv", "time [s],velocity [m/s],qm [m]", log.time, log["velocity"], log["position"])
+    with refused("position"):
+        read_log(path)
+    assert NOTE not in read_log(path, Mapping(roles={"position": "qm"})).warnings
+    assert NOTE in read_log(path, Mapping(roles={"velocity": "velocity"})).warnings
+
+
+# --- a force in volts -------------------------------------------------------------------------------------------------
+
+
+def test_units_of_mechanics_with_volts_in_place_of_newtons() -> None:
+    log = axis()
+    volts = record("axis", DT, position=log["position"], force=log["force"] / PER_VOLT)
+    volts = Log(volts.name, volts.time, DT, volts.signals, volts.segments, {"force": "V"})
+    assert [unit_of(unit, volts) for unit in ("kg", "N*s/m", "N", "N/m", "m/s", "")] == [
+        "V*s^2/m", "V*s/m", "V", "V/m", "m/s", "",
+    ]  # fmt: skip
+    assert unit_of("kg", log) == "kg"
+
+
+@pytest.fixture(scope="module")
+def volts(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Identification]:
+    log = axis()
+    path = tmp_path_factory.mktemp("volts") / "volts.csv"
+    csv(path, "time [s],position [m],command [V]", log.time, log["position"], log["force"] / PER_VOLT)
+    mapping = Mapping(roles={"force": "command"}, experiment="moves")
+    return path, identify([(named(path, mapping, "moves"), "moves")], settings=AnalysisSettings(bandwidth=5.0))
+
+
+def test_a_force_in_volts_yields_estimates_per_volt(volts: tuple[Path, Identification]) -> None:
+    (experiment,) = volts[1].experiments
+    moves: IdentifiedMoves = experiment.result
+    estimates = {estimate.name: estimate for estimate in moves.estimates}
+    mass, coulomb = estimates["masses.cart"], estimates["friction.coulomb"]
+    assert (mass.unit, coulomb.unit) == ("V*s^2/m", "V")
+    assert mass.value == pytest.approx(MASS / PER_VOLT, rel=0.02)
+    assert coulomb.value == pytest.approx(COULOMB / PER_VOLT, rel=0.05)
+
+
+def test_what_needs_newtons_is_not_written_and_says_so(volts: tuple[Path, Identification]) -> None:
+    path, identification = volts
+    assert identification.stage is None
+    assert identification.estimates == ()
+    files = read_all([path], Mapping(roles={"force": "command"}, experiment="moves"), path.parent)
+    lines = [text for _, text in headline(identification)]
+    assert any("N/V" in line and "V·s²/m" in line.replace(" ", "·") for line in lines)
+    assert any("newtons" in line for line in lines)
+    assert not any(" N " in line or line.endswith(" N") for line in answer(identification, files, []))
+    document: dict[str, Any] = identify_document(identification, files, [])
+    assert "mass_v_s2_per_m" in document["experiments"][0]["inverse_model"]
+
+
+def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification], refused: Refused) -> None:
+    (experiment,) = volts[1].experiments
+    with refused("force"):
+        identify([(experiment.logs[0], "moves")], friso.load("examples/emps_axis.toml"))
