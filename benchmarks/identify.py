@@ -26,10 +26,10 @@ from benchmarks.report import Goal, print_goals, print_table
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import static_from_ramps
-from friso.identify.experiments.moves import identify_moves
 from friso.identify.experiments.steps import stiffness_from_steps
 from friso.identify.experiments.stick_slip import static_from_stick_slip
 from friso.identify.logs.log import Log
+from friso.identify.moves import identify_moves
 from friso.identify.output_error.parameters import MASS, RATIO, parameters_of
 from friso.identify.output_error.problem import closed_loop
 from friso.identify.readings.friction_velocity import friction_velocity

@@ -15,10 +15,10 @@ from patched import patched
 from refusals import Refused
 
 import friso
+from friso.identify import moves as method
 from friso.identify.errors import errors_of
-from friso.identify.experiments import moves as method
-from friso.identify.experiments.moves import IdentifiedMoves, identify_moves, simulated_log
 from friso.identify.logs.log import Log
+from friso.identify.moves import IdentifiedMoves, identify_moves, simulated_log
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
 from friso.identify.output_error.fit import everywhere, first_values, fit, nearby

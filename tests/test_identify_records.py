@@ -10,7 +10,6 @@ import pytest
 from refusals import Refused
 
 import friso
-from friso.identify.experiments.moves import IdentifiedMoves
 from friso.identify.inverse_model import inverse_model, unit_of
 from friso.identify.kind import AnalysisSettings
 from friso.identify.logs.assemble import read_log
@@ -18,6 +17,7 @@ from friso.identify.logs.integrated import NOTE
 from friso.identify.logs.log import Log
 from friso.identify.logs.mapping import Mapping
 from friso.identify.method import Identification, identify
+from friso.identify.moves import IdentifiedMoves
 from friso.identify.readings.common import record
 from friso.identify.sources import named, read_all
 from friso.views.identify.document import identify_document

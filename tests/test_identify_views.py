@@ -20,7 +20,6 @@ from friso.identify.errors import SimulationErrors, residual_of
 from friso.identify.estimate import NO_INTERVAL, Estimate
 from friso.identify.experiments.break_away import static_from_ramps
 from friso.identify.experiments.constant_speed import FrictionAtSpeeds
-from friso.identify.experiments.moves import IdentifiedMoves, SimulatedLog
 from friso.identify.experiments.presliding import bristles_from_presliding
 from friso.identify.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
 from friso.identify.experiments.steps import stiffness_from_steps
@@ -29,6 +28,7 @@ from friso.identify.inverse_model import inverse_model, motion
 from friso.identify.logs.log import Log
 from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.method import Experiment, Identification, Prediction
+from friso.identify.moves import IdentifiedMoves, SimulatedLog
 from friso.identify.output_error.coverage import coverage
 from friso.identify.output_error.fit import OutputErrorFit, first_values
 from friso.identify.output_error.parameters import parameters_of

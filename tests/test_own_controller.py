@@ -17,7 +17,7 @@ from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
 from friso.frequency import crossover
 from friso.hunting import Case
-from friso.identify.experiments.moves import identify_moves
+from friso.identify.moves import identify_moves
 from friso.identify.output_error.problem import closed_loop
 from friso.identify.readings.common import record
 from friso.progress import silent

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.experiments.moves import IdentifiedMoves
 from friso.identify.inverse_model import EDGE, SMOOTH, motion
 from friso.identify.logs.log import Log
+from friso.identify.moves import IdentifiedMoves
 from friso.identify.output_error.parameters import FitParameter
 from friso.identify.output_error.problem import Simulated
 from friso.identify.output_error.profile import Profile
