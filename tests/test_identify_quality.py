@@ -16,7 +16,7 @@ from friso.identify.combine import combined
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import inverse_model
 from friso.identify.logs.log import Log
-from friso.identify.model_error import of_inverse_model, with_model_error
+from friso.identify.model_error import all_with_model_error, of_inverse_model, with_causes, with_model_error
 from friso.identify.output_error.parameters import FitParameter, parameters_of
 from friso.identify.output_error.problem import tracking
 from friso.identify.quality import Quality, halves, noise_of, whole_error
@@ -192,23 +192,43 @@ def test_the_inverse_model_steps_in_with_its_values() -> None:
 # --- causes -----------------------------------------------------------------------------------------------------------
 
 
+def sentences(log: Log) -> str:
+    return " ".join(cause.sentence for cause in causes(log, inverse_model(log, 5.0), 0.0))
+
+
 def test_a_delay_is_found() -> None:
     log = axis()
     late = replace(log, signals={**log.signals, "force": np.roll(log["force"], 16)})
-    (sentence,) = causes(late, inverse_model(late, 5.0), 0.0)
-    assert "16 ms earlier" in sentence
+    (cause,) = causes(late, inverse_model(late, 5.0), 0.0)
+    assert "16 ms earlier" in cause.sentence
+    assert cause.without is not None
+    assert cause.without.value("mass") == pytest.approx(MASS, rel=0.01)
+
+
+def test_an_interval_spans_what_the_log_says_with_and_without_a_delay() -> None:
+    log = axis()
+    late = replace(log, signals={**log.signals, "force": np.roll(log["force"], 16)})
+    inverse, flat = inverse_model(late, 5.0), {"masses.cart": MASS}
+    (cause,) = causes(late, inverse, 0.0)
+    off = Estimate.normal("masses.cart", "kg", inverse.value("mass"), 0.01, "output error")
+    quality = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
+    (blind,) = all_with_model_error([off], inverse, flat, quality)
+    (fair,) = with_causes([blind], flat, replace(quality, without_cause=cause.without))
+    assert not blind.holds(MASS)
+    assert fair.holds(MASS)
+    assert fair.value == off.value
 
 
 def test_gravity_is_found() -> None:
     log = axis(offset=60.0)
-    assert "constant force of 60" in " ".join(causes(log, inverse_model(log, 5.0), 0.0))
+    assert "constant force of 60" in sentences(log)
 
 
 def test_an_oscillation_is_found() -> None:
     log = axis()
     force = log["force"] + 8 * np.sin(2 * np.pi * 9.0 * log.time)
     swinging = replace(log, signals={**log.signals, "force": force})
-    assert "at 9" in " ".join(causes(swinging, inverse_model(swinging, 5.0), 0.0))
+    assert "at 9" in sentences(swinging)
 
 
 def test_noise_has_no_cause() -> None:

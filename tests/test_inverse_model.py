@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import Refused
 
+from friso.errors import InputError
 from friso.identify.inverse_model import bandwidth_of, inverse_model
 from friso.identify.logs.log import Log
 from friso.identify.readings.common import record
@@ -56,6 +57,30 @@ def test_smooth_forces_are_found_exactly() -> None:
     assert found["viscous"] == pytest.approx(5.0, rel=2e-3)
     assert found["coulomb"] == pytest.approx(0.0, abs=2e-3)
     assert found["offset"] == pytest.approx(-0.3, abs=2e-3)
+
+
+@pytest.mark.parametrize("every", [20, 50, 100])
+def test_coarse_sampling_does_not_make_the_mass_larger(every: int) -> None:
+    """Down to six samples in a period at the bandwidth; central differences make it 7 % there."""
+    log = swinging(2.0, 5.0, 0.0, -0.3)
+    signals = {role: values[::every] for role, values in log.signals.items()}
+    coarse = record("coarse", every * DT, **signals)
+    assert inverse_model(coarse, 1.6).value("mass") == pytest.approx(2.0, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("line", "scale"),
+    [
+        ("force: F (column 3), as specified; in N", "-1 N/N"),
+        ("force: u (column 3), as specified; 35.15 N/V", "-35.15 N/V"),
+        ("force: u (column 3), as specified; -3e2 mN/V, its values taken to be in V as the scale implies", "3e2 mN/V"),
+    ],
+)
+def test_a_force_of_the_wrong_sign_is_refused_with_its_scale_turned(line: str, scale: str) -> None:
+    log = swinging(-2.0, -5.0, -1.0, 0.0)
+    with pytest.raises(InputError) as refusal:
+        inverse_model(replace(log, read=(line,)), 10.0)
+    assert refusal.value.example == f'--scale force="{scale}"'
 
 
 def test_directions_are_told_apart() -> None:

@@ -65,6 +65,8 @@ def test_a_log_in_si_units(tmp_path: Path) -> None:
     ("name", "role"),
     [
         ("Axis1.NcToPlc.ActPos", "position"), ("Axis1.NcToPlc.ActVelo", "velocity"), ("Axis1.SetPos", "reference"),
+        ("Istposition", "position"), ("Sollposition", "reference"), ("Lageistwert", "position"),
+        ("Lagesollwert", "reference"), ("Istgeschwindigkeit", "velocity"),
         ("enc2", "position"), ("cart_position", "cart_position"), ("relative position", "relative_position"),
         ("iq", "force"), ("MotorCurrent", "force"), ("desired", "reference"), ("setpoint", "reference"), ("t", "time"),
         ("Time", "time"), ("PosDiff", None), ("SetVelo", None), ("following error", None), ("qm", None), ("vir", None),

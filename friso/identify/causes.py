@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import welch
@@ -11,8 +13,8 @@ from friso.errors import InputError
 from friso.identify.inverse_model import InverseModel, inverse_model
 from friso.identify.logs.log import Log
 
-LAGS = (-16, -8, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 8, 16)
-"""Samples by which the force is moved in the search for a delay."""
+LAGS = (-16, -8, -4, -2, -1, 1, 2, 4, 8, 16)
+"""Samples by which the force is moved in the search for a delay, and then by a quarter of the best more and less."""
 
 BETTER = 0.7
 """Share of the error that is left once a cause is taken away that counts as found."""
@@ -27,27 +29,38 @@ UNKNOWN = (
 """What to do where no cause is found."""
 
 
-def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[str]:
+@dataclass(frozen=True)
+class Cause:
+    """What may be wrong with a log, in a sentence; the inverse model without it, where there is one."""
+
+    sentence: str
+    without: InverseModel | None = None
+
+
+def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
     """What may be wrong with a log that the inverse model does not describe, as far as the log tells; nothing where
     none of these explains it."""
-    looked_for = (_delay(log, inverse, cart_share), _constant(inverse, log.unit("force")), _oscillation(inverse))
-    return [sentence for sentence in looked_for if sentence]
+    plain = (_constant(inverse, log.unit("force")), _oscillation(inverse))
+    return [*_delay(log, inverse, cart_share), *(Cause(sentence) for sentence in plain if sentence)]
 
 
-def _delay(log: Log, inverse: InverseModel, cart_share: float) -> str:
-    """The delay between force and motion that makes the inverse model fit much better, in a sentence, or nothing."""
-    errors = {}
-    for lag in LAGS:
-        moved = replace(log, signals={**log.signals, "force": np.roll(log["force"], lag)})
-        try:
-            errors[lag] = inverse_model(moved, inverse.bandwidth, False, cart_share).error
-        except InputError:
-            continue
-    if not errors or min(errors.values()) > BETTER * inverse.error:
-        return ""
-    lag = min(errors, key=errors.__getitem__)
-    how = "earlier" if lag < 0 else "later"
-    return f"a force {abs(lag) * log.sample_time * 1e3:.3g} ms {how} fits much better: a delay between the channels?"
+def _delay(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
+    """The delay between force and motion that makes the inverse model fit much better, if one does."""
+    fits: dict[int, InverseModel] = {}
+
+    def tried(lags: Iterable[int]) -> int | None:
+        for lag in lags:
+            moved = replace(log, signals={**log.signals, "force": np.roll(log["force"], lag)})
+            with suppress(InputError):
+                fits[lag] = inverse_model(moved, inverse.bandwidth, False, cart_share)
+        return min(fits, key=lambda lag: fits[lag].error, default=None)
+
+    rough = tried(LAGS)
+    lag = None if rough is None else tried({rough - abs(rough) // 4, rough + abs(rough) // 4} - {rough})
+    if lag is None or fits[lag].error > BETTER * inverse.error:
+        return []
+    how = f"{abs(lag) * log.sample_time * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
+    return [Cause(f"a force {how} fits much better: a delay between the channels?", fits[lag])]
 
 
 def _constant(inverse: InverseModel, unit: str) -> str:

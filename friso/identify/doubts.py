@@ -49,12 +49,12 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
             f"force, a plain mass with friction {100 * inverse.error:.3g} %. What follows is from the latter alone"
         )
     if poor:
-        why = "; ".join(reasons) or UNKNOWN
+        why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN
         doubts.append(f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained: {why}")
     elif not rejected and plain.ratio > NOISY:
         doubts.append(
             f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "
-            f"lacks something, for which the intervals allow{''.join(f'; {reason}' for reason in reasons)}"
+            f"lacks something, for which the intervals allow{''.join(f'; {cause.sentence}' for cause in reasons)}"
         )
     if inverse.value("coulomb") < NONE_LEFT * float(np.std(inverse.measured)):
         doubts.append(
@@ -64,4 +64,6 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
     for name, first, second in halves(inverse) if plain.ratio > NOISY else ():
         of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == name)
         doubts.append(f"The halves of the record differ in {WORDS[name]}: {first:.4g} and {second:.4g} {of_it}")
-    return replace(plain, doubts=tuple(doubts), rejected=rejected, failed=poor and plain.whole_error > POOR)
+    without = next((cause.without for cause in reasons if cause.without), None)
+    failed = poor and plain.whole_error > POOR
+    return replace(plain, doubts=tuple(doubts), rejected=rejected, failed=failed, without_cause=without)

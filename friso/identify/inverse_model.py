@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
@@ -29,6 +30,10 @@ passes the share `PASS` of half the new sampling frequency."""
 PASS = 0.8
 ORDER, DECIMATION_ORDER, RIPPLE = 4, 8, 0.05
 """Order of the Butterworth filter; order and ripple [dB] of the Chebyshev filter before decimation."""
+
+COARSE = 0.15
+"""Cut-off frequency times sample time from which on derivatives are those of a quintic spline: central differences lose
+some of the acceleration (1 % of it at this sampling), which would make the mass too large."""
 
 EDGE = 49
 """Samples left out at the start, where the filters swing in."""
@@ -86,12 +91,19 @@ class FilteredMotion:
 
 def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
     """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
-    smooth = position
-    if cutoff < 0.5 / sample_time:
+    smooth, filtered = position, cutoff < 0.5 / sample_time
+    if filtered:
         sections = butter(ORDER, 2 * cutoff * sample_time, output="sos")
         smooth = sosfiltfilt(sections, position, padlen=min(3 * ORDER, len(position) - 1))
-    velocity = np.gradient(smooth, sample_time)
-    return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
+    if cutoff * sample_time < COARSE:
+        velocity = np.gradient(smooth, sample_time)
+        return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
+    time = np.arange(len(smooth)) * sample_time
+    curve = make_interp_spline(time, smooth, k=5)
+    velocity, acceleration = (curve.derivative(order)(time) for order in (1, 2))
+    if filtered:
+        acceleration[[0, -1]] = acceleration[[1, -2]]  # the filter leaves a kink at the ends
+    return FilteredMotion(smooth, velocity, acceleration)
 
 
 def bandwidth_of(position: np.ndarray, sample_time: float) -> float:

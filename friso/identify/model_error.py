@@ -45,6 +45,28 @@ def all_with_model_error(
     )
 
 
+def with_causes(estimates: Sequence[Estimate], flat: Mapping[str, Any], quality: Quality) -> tuple[Estimate, ...]:
+    """The estimates with intervals that reach as far as what the log says once it is rid of what may be wrong."""
+    if quality.without_cause is None or is_free(flat):
+        return tuple(estimates)
+    sources, without = _of_inverse(flat), {estimate.name: estimate for estimate in quality.without_cause.estimates}
+    return tuple(
+        spanning(estimate, without[sources[estimate.name][0]], sources[estimate.name][1])
+        if estimate.name in sources
+        else estimate
+        for estimate in estimates
+    )
+
+
+def spanning(estimate: Estimate, other: Estimate, scale: float) -> Estimate:
+    """An estimate whose interval reaches as far as that of another one, times `scale`: of two that differ by a cause
+    that nobody has settled."""
+    if not (estimate.determined and other.determined):
+        return estimate
+    low, high = sorted((scale * other.low, scale * other.high))
+    return replace(estimate, low=min(estimate.low, low), high=max(estimate.high, high))
+
+
 def not_described(estimates: Sequence[Estimate]) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """Nothing of what a fit to a record says that no model describes."""
     answers = (Estimate.unknown(one.name, one.unit, one.method, NOT_DESCRIBED) for one in estimates)

@@ -15,7 +15,7 @@ from friso.identify.errors import Residual, SimulationErrors, errors_of, residua
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
 from friso.identify.logs.log import Log
-from friso.identify.model_error import all_with_model_error, not_described, of_inverse_model
+from friso.identify.model_error import all_with_model_error, not_described, of_inverse_model, with_causes
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
 from friso.identify.output_error.fit import OutputErrorFit
@@ -98,6 +98,7 @@ def identify_moves(
         estimates, correlation = of_inverse_model(inverse, flat, estimates)
     else:
         estimates = all_with_model_error(estimates, inverse, flat, quality)
+    estimates = with_causes(estimates, flat, quality)
     simulated = (loop or follows).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,

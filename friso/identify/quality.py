@@ -22,7 +22,8 @@ class Quality:
     """`noise` [N] of the record's force; `left` [N], RMS of what the fit leaves of it where it counts, and what `noise`
     alone would leave there; relative errors of the force by the inverse model, and on its samples by the steady
     friction and mass of the whole model; sentences that say what is wrong (`doubts`); whether the whole model was
-    `rejected`, and whether nothing holds (`failed`)."""
+    `rejected`, and whether nothing holds (`failed`); the inverse model `without_cause`, of a log rid of what may be
+    wrong with it."""
 
     noise: float
     left: float
@@ -32,6 +33,7 @@ class Quality:
     doubts: tuple[str, ...] = ()
     rejected: bool = False
     failed: bool = False
+    without_cause: InverseModel | None = None
 
     @property
     def ratio(self) -> float:

@@ -13,7 +13,9 @@ from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.units import split_heading
 from friso.quantities import quoted
 
-_SET = frozenset(["ref", "reference", "set", "setpoint", "desired", "target", "cmd", "command", "commanded", "demand"])
+_SET = frozenset(
+    ["ref", "reference", "set", "setpoint", "desired", "target", "cmd", "command", "commanded", "demand", "soll"]
+)
 _NOT_MEASURED = frozenset(
     ["err", "error", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable"]
 )
@@ -25,6 +27,7 @@ _KEYS = {
         [
             "pos",
             "position",
+            "lage",
             "enc",
             "encoder",
             "displacement",
@@ -43,6 +46,9 @@ _KEYS = {
 }
 """Words in a name that tell what a channel is."""
 
+_GERMAN = re.compile(r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?")
+"""Names that begin with what is wanted or what is, or end with it: Sollposition, Istposition, Lagesollwert."""
+
 
 @dataclass(frozen=True)
 class AssignedRole:
@@ -58,7 +64,14 @@ def words(name: str) -> list[str]:
     """Lower-case words of the last part of a dotted name: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
     last = name.rstrip(". ").rsplit(".", 1)[-1]
     last = re.sub(r"([a-z])([A-Z])", r"\1 \2", last)
-    return [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
+    parts = [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
+    return [word for part in parts for word in _compound(part)]
+
+
+def _compound(word: str) -> list[str]:
+    """The parts of a German compound, or the word alone."""
+    match = _GERMAN.fullmatch(word)
+    return [word] if match is None else [part for part in match.groups() if part]
 
 
 def role_of(name: str) -> tuple[str, str] | None:

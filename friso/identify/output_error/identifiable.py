@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from friso.identify.output_error.coverage import Coverage
 from friso.identify.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
-from friso.identify.output_error.parameters import LONGEST, RATIO, SHARE
+from friso.identify.output_error.parameters import LONGEST, MASS, RATIO, SHARE
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.profile import Profile, profile
 from friso.identify.readings.common import low_pass
@@ -30,6 +30,9 @@ SURE = 0.99
 
 STEPS = 10
 """Pieces of about the same work that a fit with its profiles is."""
+
+SWINGS = 0.25
+"""Natural frequency of the mass on its bristles, times the sample time, up to which a log follows how these bend."""
 
 SHARP = 3.0
 """Factor between the ends of a profile interval within which a parameter counts as shown."""
@@ -169,7 +172,10 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     if name in STRIBECK:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:
-        return covered.shows_length(full.value("friction.coulomb") / full.value("friction.bristle_stiffness"))
+        stiffness = full.value("friction.bristle_stiffness")
+        swings = np.sqrt(stiffness / full.value(MASS)) / (2 * np.pi)
+        fast_enough = swings * full.problem.inputs.sample_time < SWINGS
+        return bool(fast_enough and covered.shows_length(full.value("friction.coulomb") / stiffness))
     return True
 
 
@@ -183,5 +189,8 @@ def reason(name: str, covered: Coverage) -> str:
             f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would show"
         )
     if name in BRISTLES:
-        return "the record passes too quickly through the first micrometres of every motion, where the bristles bend"
+        return (
+            "the record passes too quickly, for its sampling, through the first micrometres of every motion, where the "
+            "bristles bend"
+        )
     return "the fit hardly changes with it, or its end of the range is the best"
