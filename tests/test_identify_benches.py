@@ -119,6 +119,13 @@ def test_leuven_two_masses_agree_between_realisations() -> None:
         assert both[name].half_width < 0.1 * both[name].value
 
 
+@pytest.mark.parametrize("name", ["joint damping", "resonance damping ratio", "antiresonance damping ratio"])
+def test_leuven_realisations_share_their_damping(name: str) -> None:
+    one, other = (leuven_model((number,))[name] for number in (1, 2))
+    assert max(one.low, other.low) < min(one.high, other.high)
+    assert all(0 < estimate.low < estimate.high < 3 * estimate.value for estimate in (one, other))
+
+
 def test_leuven_departure_by_friction() -> None:
     model = leuven_model((1, 2))
     result = departure(leuven_response((1, 2), 0), model.predict)

@@ -56,29 +56,30 @@ def noise_of(force: np.ndarray) -> float:
     return max(white, float(digit))
 
 
-def steady_friction(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
-    """Friction [N] of a stage as flat keys at steady velocities [m/s], any shape, less its constant force."""
-    size = np.abs(speeds)
-    coulomb, viscous = flat.get("friction.coulomb", 0.0), flat.get("friction.viscous", 0.0)
-    rise = flat.get("friction.static", coulomb) - coulomb
-    falls = np.exp(
-        -((size / flat.get("friction.stribeck_velocity", 1.0)) ** flat.get("friction.stribeck_exponent", 2.0))
-    )
-    sign = np.sign(speeds)
-    skew = 1 + sign * flat.get("friction.viscous_asymmetry", 0.0)
-    constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
-    return sign * (coulomb + rise * falls) + viscous * skew * speeds - constant
+def steady_friction(flat: Mapping[str, Any], velocity: np.ndarray) -> np.ndarray:
+    """Friction [N] of a stage as flat keys at steady velocities [m/s], shape (n,), less its constant force."""
+    return _by_direction(flat, np.abs(velocity), np.sign(velocity))
 
 
 def whole_error(flat: Mapping[str, Any], inverse: InverseModel) -> float:
     """The relative error of the force on the samples of the inverse model, by mass and steady friction of a stage as
-    flat keys; dry friction turns as gradually as in the inverse model, whose columns are filtered."""
+    flat keys; dry friction turns as gradually as the direction in the inverse model, whose columns are filtered."""
     mass = sum(flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
     acceleration, velocity, sign, _ = inverse.columns.T
-    dry = steady_friction({**flat, "friction.viscous": 0.0, "bias.cart": 0.0, "bias.stage": 0.0}, np.abs(velocity))
-    wet = steady_friction({**flat, "friction.coulomb": 0.0, "friction.static": 0.0}, velocity)
-    left = inverse.measured - mass * acceleration - sign * dry - wet
+    dry = {**flat, "friction.viscous": 0.0}
+    wet = steady_friction(flat, velocity) - steady_friction(dry, velocity)
+    left = inverse.measured - mass * acceleration - wet - _by_direction(dry, np.abs(velocity), sign)
     return float(np.linalg.norm(left) / np.linalg.norm(inverse.measured))
+
+
+def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) -> np.ndarray:
+    """Friction [N] at speeds [m/s] in directions from -1 to 1, which turn from one to the other, less the constant
+    force; each of shape (n,)."""
+    from friso.frequency.friction import steady_force  # brings SymPy along
+
+    forward, backward = (steady_force(flat, speed, way) for way in (True, False))
+    constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
+    return forward * (1 + sign) / 2 - backward * (1 - sign) / 2 - constant
 
 
 def halves(inverse: InverseModel) -> list[tuple[str, float, float]]:
