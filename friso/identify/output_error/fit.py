@@ -10,6 +10,7 @@ import lmfit
 import numpy as np
 from scipy.stats import qmc
 
+from friso.engine.driven import Inputs
 from friso.identify.output_error.parameters import FitParameter, keys_of
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.refine import bounds_of, costs, refine
@@ -154,16 +155,14 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Out
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
     groups = groups_of(*(signal[counted] for signal in (problem.inputs.reference, velocity, acceleration)))
     covariance = spread_of(slopes[counted], rest[counted], groups)
-    if not problem.closed:
-        off = _by_half_a_sample(problem, best, slopes, rest) / COVERAGE
+    for inputs in problem.unsettled:
+        off = _moved_by(inputs, problem, best, slopes, rest) / COVERAGE
         covariance = covariance + np.outer(off, off)
     return OutputErrorFit(problem, best, free, covariance, rest)
 
 
-def _by_half_a_sample(problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
-    """By how much the fitted numbers move, shape (free,), if the force of the log is held between its samples instead
-    of following straight lines, or the other way about: half a sample later. A log does not tell which of them."""
-    inputs = replace(problem.inputs, held=not problem.inputs.held)
+def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:
+    """By how much the fitted numbers move, shape (free,), with other inputs, which a log allows just as well."""
     change = replace(problem, inputs=inputs).residuals(best[None])[0] - rest
     if not np.isfinite(change).all():
         return np.zeros(slopes.shape[1])

@@ -68,6 +68,7 @@ class Problem:
     the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
     own whose target is zero: what it has to add is what the model does not explain. `start` holds position
     [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the fit leaves out.
+    `unsettled` are inputs that the log allows as well as those taken.
     """
 
     flat: Mapping[str, Any]
@@ -78,6 +79,7 @@ class Problem:
     closed: bool
     start: tuple[float, float]
     counted: np.ndarray
+    unsettled: tuple[Inputs, ...] = ()
 
     @cached_property
     def kernel(self) -> Kernel:
@@ -95,7 +97,8 @@ class Problem:
     def beginning(self, count: int) -> Problem:
         """The same with the first so many samples alone."""
         inputs = replace(self.inputs, reference=self.inputs.reference[:count], force=self.inputs.force[:count])
-        return replace(self, inputs=inputs, target=self.target[:count], counted=self.counted[:count])
+        counted = self.counted[:count]
+        return replace(self, inputs=inputs, target=self.target[:count], counted=counted, unsettled=())
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
@@ -218,21 +221,26 @@ def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
     """The stage under the log's force, held to the log's smoothed position by a slow controller; `bandwidth` [Hz] is
-    that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest."""
+    that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest. A log tells
+    neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was."""
     omega = 2 * np.pi * min(bandwidth, SLOW)
-    smooth = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth).position
+    smooth, sharper = (
+        motion(log["position"][part], log.sample_time, cutoff * bandwidth).position for cutoff in (SMOOTH, 2 * SMOOTH)
+    )
+    inputs = Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log))
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
     held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
     return Problem(
         held,
         Driven(structure(held)),
-        Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log)),
+        inputs,
         np.zeros(part.stop - part.start),
         tuple(parameters),
         False,
         _start(log, part),
         _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega),
+        (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper)),
     )
 
 
