@@ -10,13 +10,16 @@ import plain
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from variants import VARIANTS
+from variants import VARIANTS, maxwell, release, stage, van_dijk
 
 import friso
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
+from friso.frequency.friction import steady_force
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import small_cycles_possible
 from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
@@ -36,6 +39,23 @@ def test_a_law_mentions_no_solver(file: Path) -> None:
     ours = {node.module for node in nodes if node.module and node.module.startswith("friso")}
     allowed = ("friso.quantities", "friso.stage", "friso.equations.component", "friso.equations.friction")
     assert all(name.startswith(allowed) for name in ours)
+
+
+@pytest.mark.parametrize("name", VARIANTS)
+def test_friction_in_a_steady_motion_is_that_of_the_linear_systems(name: str) -> None:
+    flat = VARIANTS[name].flat()
+    speeds = np.geomspace(1e-7, 1.0, 30)
+    friction = Ensemble.held(flat, 60).steady_friction(np.concatenate([speeds, -speeds]))
+    forward, backward = (steady_force(flat, speeds, way) for way in (True, False))
+    assert friction == pytest.approx(np.concatenate([forward, -backward]), rel=1e-12)
+
+
+@pytest.mark.parametrize(("share", "possible"), [(0.9995, True), (0.6, False)])
+def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_a_little(
+    share: float, possible: bool
+) -> None:
+    flat = stage(release(), friction=maxwell(share, viscous="0 N*s/m"), controller=van_dijk()).flat()
+    assert small_cycles_possible(Ensemble.held(flat, 1)) == possible
 
 
 def run(changes: dict[str, Any], rtol: float = 1e-8, interval: float = 1e-3) -> Results:

@@ -100,6 +100,7 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
         "clock(p)": [model.clock.period, model.clock.late] if model.clock else [],
         "breakaway(p)": [model.breakaway],
         "stiffness(p)": [model.stiffness],
+        "steady_friction(x, p)": [] if model.steady is None else [model.steady],
         "settled(s, p)": model.settled,
         "surfaces(x, t, r, p)": [kink.at_start for kink in model.kinks],
         "right_hand_side(x, m, t, r, p)": model.rhs,

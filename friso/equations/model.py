@@ -38,8 +38,9 @@ class Model:
 
     The right-hand side is smooth while the kinks' `beyond` symbols are held; `TIME` counts from the last corner
     of the reference. `deviation` [m] is position minus reference, `length` [m] and `rate` [1/s] the scales of
-    the motion from which the solver takes its absolute tolerances, `breakaway` [N] the largest friction force at rest
-    and `stiffness` [N/m] the proportional one of the loop. `jumps` gives by how much states jump where a
+    the motion from which the solver takes its absolute tolerances, `breakaway` [N] the largest friction force at rest,
+    `steady` [N] the one in a steady motion, None where the law cannot say it, and `stiffness` [N/m] the proportional
+    one of the loop. `jumps` gives by how much states jump where a
     kink is crossed, in terms of what holds just before: kinks to states to expressions.
 
     `inputs` are what a run is given anew at every corner of the reference, in this order. Between corners, or between
@@ -57,6 +58,7 @@ class Model:
     rate: sp.Expr
     breakaway: sp.Expr
     stiffness: sp.Expr
+    steady: sp.Expr | None = None
     jumps: Mapping[Kink, Mapping[sp.Symbol, sp.Expr]] = field(default_factory=dict)
     inputs: tuple[sp.Symbol, ...] = REFERENCE
     held: tuple[Held, ...] = ()
@@ -160,6 +162,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         rate=rate,
         breakaway=breakaway,
         stiffness=loop_stiffness(structure.controller),
+        steady=_steady(chain, friction, motor_friction),
         jumps=resets(kinks),
         held=acting.held if acting else (),
     )
@@ -239,6 +242,15 @@ def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
     forces at rest, and what it exerts half a backlash off its reference."""
     force = sum((friction.breakaway for friction in frictions if friction), start=sp.S.Zero)
     return force + (loop_stiffness(structure.controller) * BACKLASH / 2 if structure.plays else 0)
+
+
+def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
+    """Friction [N] at the guide and at the motor while all move as the cart does."""
+    parts = [friction.steady(chain.cart.velocity)] if friction else []
+    if motor_friction and chain.motor:
+        part = motor_friction.steady(chain.motor.velocity)
+        parts.append(part and part.subs(chain.motor.velocity, chain.cart.velocity))
+    return None if None in parts else sum(parts, start=sp.S.Zero)
 
 
 def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:

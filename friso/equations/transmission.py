@@ -62,7 +62,8 @@ def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol)
         for name, output in component.outputs.items()
     }
     outputs["motor_friction_force"] = Output(put(friction.force), "N", "friction force at the motor")
-    return Friction(put(friction.force), put(friction.breakaway), Component(states, kinks, outputs))
+    sliding = friction.sliding and {put(x): put(expression) for x, expression in friction.sliding.items()}
+    return Friction(put(friction.force), put(friction.breakaway), Component(states, kinks, outputs), sliding)
 
 
 def _renamed(name: str, before: str = "") -> str:
@@ -75,6 +76,7 @@ def _expressions(friction: Friction) -> list[sp.Expr]:
     expressions = [friction.force, friction.breakaway]
     expressions += [e for part in component.states for e in (part.derivative, part.scale, part.settled)]
     expressions += [output.expression for output in component.outputs.values()]
+    expressions += map(sp.sympify, (friction.sliding or {}).values())
     for kink in component.kinks:
         expressions += [kink.surface, kink.narrow, kink.at_start, *getattr(kink, "becomes", {}).values()]
     return expressions

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -43,10 +43,3 @@ class Declared:
             matrices[:, i, j] = entry
         parts = matrices[:, :n, :n], matrices[:, :n, n:], matrices[:, n:, :n], matrices[:, n:, n:]
         return System(*parts, tuple(map(str, self.states)), tuple(self.inputs), tuple(self.outputs))
-
-
-def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
-    """What the unknowns are where all equations, which are linear in them, are zero. Raises ValueError if they are not
-    linear."""
-    matrix, right = sp.linear_eq_to_matrix(list(equations), list(unknowns))
-    return list(matrix.LUsolve(right))

@@ -11,9 +11,9 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.component import Switch, state
-from friso.equations.friction.common import direction
+from friso.equations.friction.common import direction, solved
 from friso.equations.structure import shared_structure
-from friso.frequency.declared import Declared, solved
+from friso.frequency.declared import Declared
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
 
@@ -70,8 +70,7 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
     rates = tuple(state.derivative for state in component.states)
     modes = tuple(kink.beyond for kink in component.kinks if isinstance(kink, Switch))
     left: dict[Any, Any] = dict.fromkeys(modes, sp.S.Zero)
-    sliding = friction.sliding or dict(zip(states, solved(rates, states) if states else [], strict=True))
-    slid: dict[Any, Any] = {x: sp.sympify(sliding.get(x, 0)) for x in (*states, *modes)}
+    slid: dict[Any, Any] = friction.slid()
     stuck = _stuck(states, [rate.subs(left) for rate in rates], friction.force.subs(left)) | left
     lengths = [state.scale for state in component.states if state.unit == "m"]
     return LinearFriction(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
@@ -37,6 +37,43 @@ class Friction:
         sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
     ) -> None:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
+
+    def slid(self) -> dict[sp.Symbol, sp.Expr]:
+        """The law's own states, and its modes that remember, in a steady motion at the velocity. Raises ValueError
+        where the law does not declare them and its rates are not linear in its states."""
+        import sympy as sp
+
+        from friso.equations.component import Switch
+
+        states = [state.symbol for state in self.component.states]
+        modes = [kink.beyond for kink in self.component.kinks if isinstance(kink, Switch)]
+        if self.sliding is not None:
+            return {x: sp.sympify(self.sliding.get(x, 0)) for x in (*states, *modes)}
+        still = solved([state.derivative for state in self.component.states], states) if states else []
+        return {**dict(zip(states, still, strict=True)), **dict.fromkeys(modes, sp.S.Zero)}
+
+    def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
+        """The force [N] in a steady motion at the velocity; None where it cannot be said."""
+        from sympy import Piecewise
+
+        from friso.equations.component import Switch
+
+        try:
+            slid = self.slid()
+        except ValueError:
+            return None
+        kinks = [kink for kink in self.component.kinks if not isinstance(kink, Switch)]
+        surfaces = {direction(velocity).beyond: velocity, **{kink.beyond: kink.surface.subs(slid) for kink in kinks}}
+        return self.force.subs(slid).subs({side: Piecewise((1, x > 0), (0, True)) for side, x in surfaces.items()})
+
+
+def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """What the unknowns are where all equations, which are linear in them, are zero. Raises ValueError if they are not
+    linear."""
+    import sympy as sp
+
+    matrix, right = sp.linear_eq_to_matrix(list(equations), list(unknowns))
+    return list(matrix.LUsolve(right))
 
 
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:

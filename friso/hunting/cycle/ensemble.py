@@ -137,6 +137,14 @@ class Ensemble:
         rows = self.kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), self.values)
         return np.broadcast_to(rows[list(self.kernel.outputs).index("force")], (self.count,))
 
+    def steady_friction(self, velocities: np.ndarray) -> np.ndarray | None:
+        """Friction force [N] in steady motions of the cart at velocities [m/s], one per stage, both of shape (count,);
+        None where the law cannot say it."""
+        states = np.zeros((self.count, self.kernel.initial_size))
+        states[:, self.kernel.cart_velocity] = velocities
+        rows = self.kernel.module.steady_friction(states.T, self.values)
+        return np.broadcast_to(rows[0], (self.count,)) if rows else None
+
     def run(
         self,
         starts: np.ndarray,

@@ -12,6 +12,7 @@ import numpy as np
 from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
+from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.cycle.ensemble import Ensemble
@@ -30,9 +31,12 @@ followed for; and up to which share a deviation counts as small."""
 UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
 """Why it is not certain whether anything attracts a stage."""
 
-SMALL_GAP = 0.002
-"""Share of the static friction by which it exceeds Coulomb friction: the smallest for which cycles are of a size that
-is looked for."""
+SMALL_GAP, ROUNDING = 0.002, 1e-9
+"""Share of the break-away force by which friction falls with speed: the smallest for which cycles are of a size that is
+looked for; and where it does not fall at all."""
+
+FASTEST, SPEEDS = 1e7, 300
+"""The fastest speed at which friction is evaluated, in units of the largest of small swings, and how many of these."""
 
 SMALL_SWING, FED = 0.001, (2.0, 6.0)
 """The smallest amplitude that is looked for with certainty, as a share of the deflection by the break-away force; and
@@ -185,25 +189,31 @@ def _beyond_the_search(stages: Ensemble) -> str:
     controller = stages.structure.controller
     if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
-    if _may_swing_a_little(stages):
+    if small_cycles_possible(stages):
         return "friction falls so little over the speeds of small swings that cycles may be smaller than is looked for"
     return ""
 
 
-def _may_swing_a_little(stages: Ensemble) -> bool:
-    """Whether cycles may be smaller than is looked for: those that the fall of friction feeds are a certain share of
-    it (`FED`), and they attract where it falls off with less than their size."""
-    flat = stages.flat
-    if "friction.stribeck_velocity" not in flat:
+def small_cycles_possible(stages: Ensemble) -> bool:
+    """Whether cycles may be smaller than is looked for, of the first stage: those that the fall of friction feeds are a
+    certain share of it (`FED`), and they attract where it falls off with less than their size."""
+    breakaway = float(stages.number("breakaway")[0])
+    if breakaway <= 0:
         return False
-    static, coulomb = flat["friction.static"], flat["friction.coulomb"]
-    if 0 < static - coulomb < SMALL_GAP * static:
-        return True
     sizes = np.geomspace(1e-3 * SMALL_SWING, SMALL_SWING, 60)
-    speeds = sizes * float(stages.length[0] * stages.number("rate")[0])
-    part = 1 - np.exp(-((speeds / flat["friction.stribeck_velocity"]) ** flat["friction.stribeck_exponent"]))
-    fed = (static - coulomb) / static * part / sizes
-    return bool(fed[-1] < FED[1] and fed.max() > max(FED[0], 1.2 * fed[-1]))
+    small = sizes * float(stages.length[0] * stages.number("rate")[0])
+    speeds = np.concatenate([small, np.geomspace(small[-1], FASTEST * small[-1], SPEEDS)])
+    friction = stages.take(np.zeros(2 * speeds.size, dtype=np.int64)).steady_friction(np.concatenate([speeds, -speeds]))
+    if friction is None:
+        return True
+    sticks, both = bool(stages.kernel.having(Role.BRISTLE)), np.abs(friction).reshape(2, -1)
+    for force in both:  # forward, and back
+        at_rest = breakaway * force[0] / both[:, 0].max() if sticks else 0.0  # other laws creep before they slide
+        falls = (np.maximum.accumulate(np.maximum(force, at_rest)) - force) / breakaway
+        fed = falls[: sizes.size] / sizes
+        if ROUNDING < falls.max() < SMALL_GAP or (fed[-1] < FED[1] and fed.max() > max(FED[0], 1.2 * fed[-1])):
+            return True
+    return False
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
