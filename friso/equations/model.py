@@ -245,12 +245,12 @@ def _breakaway(structure: Structure, *frictions: Friction | None) -> sp.Expr:
 
 
 def _steady(chain: Bodies, friction: Friction | None, motor_friction: Friction | None) -> sp.Expr | None:
-    """Friction [N] at the guide and at the motor while all move as the cart does."""
-    parts = [friction.steady(chain.cart.velocity)] if friction else []
-    if motor_friction and chain.motor:
+    """Friction [N] at the guide and at the motor while all move as the cart does; None where a law cannot say it."""
+    total: sp.Expr | None = friction.steady(chain.cart.velocity) if friction else sp.S.Zero
+    if motor_friction and chain.motor and total is not None:
         part = motor_friction.steady(chain.motor.velocity)
-        parts.append(part and part.subs(chain.motor.velocity, chain.cart.velocity))
-    return None if None in parts else sum(parts, start=sp.S.Zero)
+        total = None if part is None else total + part.subs(chain.motor.velocity, chain.cart.velocity)
+    return total
 
 
 def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:

@@ -62,7 +62,7 @@ def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol)
         for name, output in component.outputs.items()
     }
     outputs["motor_friction_force"] = Output(put(friction.force), "N", "friction force at the motor")
-    sliding = friction.sliding and {put(x): put(expression) for x, expression in friction.sliding.items()}
+    sliding: Any = friction.sliding and {put(x): put(expression) for x, expression in friction.sliding.items()}
     return Friction(put(friction.force), put(friction.breakaway), Component(states, kinks, outputs), sliding)
 
 

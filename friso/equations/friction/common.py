@@ -59,12 +59,13 @@ class Friction:
         from friso.equations.component import Switch
 
         try:
-            slid = self.slid()
+            slid: dict[Any, Any] = {**self.slid()}
         except ValueError:
             return None
         kinks = [kink for kink in self.component.kinks if not isinstance(kink, Switch)]
         surfaces = {direction(velocity).beyond: velocity, **{kink.beyond: kink.surface.subs(slid) for kink in kinks}}
-        return self.force.subs(slid).subs({side: Piecewise((1, x > 0), (0, True)) for side, x in surfaces.items()})
+        sides: dict[Any, Any] = {side: Piecewise((1, surface > 0), (0, True)) for side, surface in surfaces.items()}
+        return self.force.subs(slid).subs(sides)
 
 
 def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:

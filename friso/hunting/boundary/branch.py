@@ -91,10 +91,9 @@ class Tracer:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
         near it, or from about its own states (1, states); None if none is found."""
         border = Border(normal[None, :], np.array([normal @ target]))
-        if states is None:
-            states = near.cycle.states * np.exp(target[1] - near.distance)
+        begin = near.cycle.states * np.exp(target[1] - near.distance) if states is None else states
         times = near.cycle.orbits.times * np.exp(target[2] - near.time)
-        orbits, places = close_along(self.family, states, times, target[:1], border, self.sign, self.rtol, self.swings)
+        orbits, places = close_along(self.family, begin, times, target[:1], border, self.sign, self.rtol, self.swings)
         if not orbits.closed[0]:
             return None
         stages = self.family(np.zeros(1, np.int64), places)

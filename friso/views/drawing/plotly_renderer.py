@@ -56,7 +56,7 @@ def fragment(figure: Figure) -> str:
 
 
 def _single(part: Any) -> Any:
-    """Arrays with the precision of a screen: half as long as those with the engine's."""
+    """Arrays with the precision of a screen: half as long as those with the engine's. What is not finite is null."""
     if isinstance(part, dict) and part.get("dtype") == "f8":
         numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
         return {**part, "dtype": "f4", "bdata": base64.b64encode(numbers.tobytes()).decode("ascii")}
@@ -64,7 +64,9 @@ def _single(part: Any) -> Any:
         return part.tolist()
     if isinstance(part, dict):
         return {name: _single(value) for name, value in part.items()}
-    return [_single(value) for value in part] if isinstance(part, list | tuple) else part
+    if isinstance(part, list | tuple | np.ndarray):
+        return [_single(value) for value in (part.tolist() if isinstance(part, np.ndarray) else part)]
+    return None if isinstance(part, float) and not math.isfinite(part) else part
 
 
 def render(figure: Figure) -> go.Figure:
