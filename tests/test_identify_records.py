@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from refusals import Refused
+from test_identify_views import moves
 
 import friso
-from friso.identify.inverse_model import inverse_model, unit_of
+from friso.identify.inverse_model import inverse_model, motion, unit_of
 from friso.identify.kind import AnalysisSettings
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.integrated import NOTE
@@ -18,7 +20,10 @@ from friso.identify.logs.log import Log
 from friso.identify.logs.mapping import Mapping
 from friso.identify.method import Identification, identify
 from friso.identify.moves import IdentifiedMoves
-from friso.identify.readings.common import record
+from friso.identify.output_error.answers import estimates_of
+from friso.identify.output_error.coverage import coverage
+from friso.identify.output_error.identifiable import Identified
+from friso.identify.readings.common import LINEARITY, record
 from friso.identify.sources import named, read_all
 from friso.views.identify.document import identify_document
 from friso.views.identify.words import answer, headline
@@ -104,8 +109,8 @@ def volts(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Identificatio
 
 def test_a_force_in_volts_yields_estimates_per_volt(volts: tuple[Path, Identification]) -> None:
     (experiment,) = volts[1].experiments
-    moves: IdentifiedMoves = experiment.result
-    estimates = {estimate.name: estimate for estimate in moves.estimates}
+    identified: IdentifiedMoves = experiment.result
+    estimates = {estimate.name: estimate for estimate in identified.estimates}
     mass, coulomb = estimates["masses.cart"], estimates["friction.coulomb"]
     assert (mass.unit, coulomb.unit) == ("V*s^2/m", "V")
     assert mass.value == pytest.approx(MASS / PER_VOLT, rel=0.02)
@@ -129,3 +134,19 @@ def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification
     (experiment,) = volts[1].experiments
     with refused("force"):
         identify([(experiment.logs[0], "moves")], friso.load("examples/emps_axis.toml"))
+
+
+# --- what following the log costs -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("in_loop", "share"), [(True, 0.0), (False, 0.05)])
+def test_static_friction_is_less_certain_where_the_stage_follows_the_log(in_loop: bool, share: float) -> None:
+    fit = moves(own_loop=in_loop, fitted_in_loop=in_loop)[0].fit
+    every = tuple(range(len(fit.inner)))
+    sure = replace(fit, free=every, covariance=1e-12 * np.eye(len(every)))
+    names = frozenset(parameter.name for parameter in fit.problem.parameters)
+    covered = coverage(axis()["position"], motion(axis()["position"], DT, 25.0), MASS, COULOMB, DT)
+    estimates = {one.name: one for one in estimates_of(Identified(sure, {}, names), covered)[0]}
+    static, coulomb = (estimates[f"friction.{name}"] for name in ("static", "coulomb"))
+    assert static.half_width == pytest.approx(max(share, LINEARITY) * static.value, rel=1e-3)
+    assert coulomb.half_width == pytest.approx(LINEARITY * coulomb.value, rel=1e-3)
