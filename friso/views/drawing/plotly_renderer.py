@@ -60,11 +60,9 @@ def _single(part: Any) -> Any:
     if isinstance(part, dict) and part.get("dtype") == "f8":
         numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
         return {**part, "dtype": "f4", "bdata": base64.b64encode(numbers.tobytes()).decode("ascii")}
-    if isinstance(part, np.ndarray):  # plotly leaves an empty one as it is
-        return part.tolist()
     if isinstance(part, dict):
         return {name: _single(value) for name, value in part.items()}
-    if isinstance(part, list | tuple | np.ndarray):
+    if isinstance(part, list | tuple | np.ndarray):  # plotly leaves an empty array as it is
         return [_single(value) for value in (part.tolist() if isinstance(part, np.ndarray) else part)]
     return None if isinstance(part, float) and not math.isfinite(part) else part
 
