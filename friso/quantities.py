@@ -269,6 +269,8 @@ def _factor(unit: str, si_unit: str) -> float:
     factor, root, names = _root(unit)
     if si_unit == "Hz":
         return _hertz(factor, root, names)
+    if si_unit == "1/s" and any(name.endswith("hertz") for name in names):
+        raise _Refused("a frequency, which could mean 2 pi as much")
     si_factor, si_root, _ = _root(si_unit)
     if root != si_root and not _per_radian(root, si_root):
         raise _Refused(f"{unit} is not convertible to {si_unit}{_of_rotary_axis(root, si_unit)}")

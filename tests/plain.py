@@ -12,30 +12,30 @@ Flat = Mapping[str, Any]
 State = Mapping[str, float]
 
 
-def reference(flat: Flat, t: float) -> tuple[float, float]:
-    """Position [m] and velocity [m/s] of the reference."""
+def reference(flat: Flat, t: float) -> tuple[float, float, float]:
+    """Position [m], velocity [m/s] and acceleration [m/s^2] of the reference."""
     kind = flat["motion.kind"]
     if kind == "step":
-        return flat["motion.size"], 0.0
+        return flat["motion.size"], 0.0, 0.0
     if kind == "ramp":
-        return flat["motion.velocity"] * t, flat["motion.velocity"]
+        return flat["motion.velocity"] * t, flat["motion.velocity"], 0.0
     if kind in ("hold", "release"):
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     a, ramp, back = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
     there, here = _stroke(a, ramp, t), _stroke(a, ramp, t - back)
-    return there[0] - here[0], there[1] - here[1]
+    return there[0] - here[0], there[1] - here[1], there[2] - here[2]
 
 
-def _stroke(a: float, ramp: float, t: float) -> tuple[float, float]:
+def _stroke(a: float, ramp: float, t: float) -> tuple[float, float, float]:
     """Accelerate at a for the time `ramp`, brake likewise, stay."""
     if t <= 0:
-        return 0.0, 0.0
+        return 0.0, 0.0, 0.0
     if t < ramp:
-        return a * t * t / 2, a * t
+        return a * t * t / 2, a * t, a
     if t < 2 * ramp:
         left = 2 * ramp - t
-        return a * ramp * ramp - a * left * left / 2, a * left
-    return a * ramp * ramp, 0.0
+        return a * ramp * ramp - a * left * left / 2, a * left, -a
+    return a * ramp * ramp, 0.0, 0.0
 
 
 def stribeck_level(flat: Flat, v: float) -> float:
@@ -72,9 +72,40 @@ def elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
     return force, rate
 
 
-def control(flat: Flat, s: State, y: float, v: float, r: float, r_rate: float) -> tuple[float, dict[str, float]]:
+def cascade(
+    flat: Flat, s: State, error: float, v: float, y: float, r_rate: float, r_bend: float
+) -> tuple[float, dict[str, float]]:
+    """The same of a position loop over a velocity loop, with the limit of the force."""
+    keys = {name.removeprefix("controller."): value for name, value in flat.items() if name.startswith("controller.")}
+    rates: dict[str, float] = {}
+    if keys["velocity_filter"] > 0:
+        v = rates["filtered_position"] = (y - s["filtered_position"]) / keys["velocity_filter"]
+    wanted = keys["kv"] * error + keys["velocity_feedforward"] * r_rate
+    if "position_integral_time" in keys:
+        rates["position_integral"] = error
+        wanted += keys["kv"] / keys["position_integral_time"] * s["position_integral"]
+    demand = keys["kp"] * ((wanted if keys["proportional_on"] == "error" else 0.0) - v)
+    if "velocity_integral_time" in keys:
+        rates["velocity_integral"] = wanted - v
+        demand += keys["kp"] / keys["velocity_integral_time"] * s["velocity_integral"]
+    demand += keys["acceleration_feedforward"] * r_bend + keys["viscous_feedforward"] * r_rate
+    demand += keys["coulomb_feedforward"] * ((r_rate > 0) - (r_rate < 0))
+    if "force_limit" not in keys:
+        return demand, rates
+    bound = keys["force_limit"]
+    rest = min(max((abs(demand) - bound) / (bound / 1000), 0.0), 1.0)
+    for name in {"position_integral", "velocity_integral"} & {*rates}:
+        rates[name] *= 1 - rest * (rates[name] * demand > 0)
+    return min(max(demand, -bound), bound), rates
+
+
+def control(
+    flat: Flat, s: State, y: float, v: float, r: float, r_rate: float, r_bend: float
+) -> tuple[float, dict[str, float]]:
     """Actuator force [N] and the rates of the controller's states."""
     error = r - y
+    if flat["controller.kind"] == "cascade":
+        return cascade(flat, s, error, v, y, r_rate, r_bend)
     if "controller.crossover" in flat:
         omega = 2 * pi * flat["controller.crossover"]
         alpha = flat["controller.alpha"]

@@ -79,6 +79,11 @@ def gains(kp: float = 1000, ki: float = 0, kd: float = 0, tau: float = 0, extra:
     return "\n".join(['kind = "pid"', *lines, extra])
 
 
+def cascade(kv: str = "60 1/s", kp: str = "50 N*s/m", extra: str = "", **keys: str) -> str:
+    lines = [f'{name} = "{value}"' for name, value in {"kv": kv, "kp": kp, **keys}.items()]
+    return "\n".join(['kind = "cascade"', *lines, extra])
+
+
 MEASURED = 'derivative_on = "measurement"\n'
 
 
@@ -148,6 +153,27 @@ VARIANTS: dict[str, Stage] = {
     ),
     "rigid, limit, back-calculation": stage(
         step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N", "back_calculation", "20 ms"))
+    ),
+    "rigid, cascade": stage(
+        there_and_back(),
+        friction=lugre(2),
+        controller=cascade(
+            velocity_integral_time="30 ms",
+            acceleration_feedforward="1.7 kg",
+            coulomb_feedforward="1 N",
+            viscous_feedforward="0.5 N*s/m",
+            extra="velocity_feedforward = 0.9\n" + limit("200 N"),
+        ),
+    ),
+    "rigid, cascade, two integrals": stage(
+        step(),
+        friction=lugre(2),
+        controller=cascade(
+            position_integral_time="90 ms",
+            velocity_integral_time="30 ms",
+            proportional_on="measurement",
+            velocity_filter="1 ms",
+        ),
     ),
     "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
     "locked, parasitic": stage(

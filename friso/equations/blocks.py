@@ -147,6 +147,11 @@ class Blocks(ABC):
         """A transfer function of the second order, whose lower polynomial begins with 1: a notch, for one."""
 
     @abstractmethod
+    def sign(self, signal: Signal, name: str) -> Signal:
+        """1 where the signal is positive, -1 where it is negative, and 0 where it is 0, as in the reference's velocity
+        at rest."""
+
+    @abstractmethod
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """The signal clamped to plus and minus a limit."""
 
@@ -166,10 +171,10 @@ def unwinding_time() -> sp.Symbol:
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
-    """The integrals in a steady motion: the first such that the controller exerts the force of `STEADY`, the others 0;
-    `force` is its own in that motion, in terms of the integrals."""
+    """The integrals in a steady motion: the innermost, which is made last, such that the controller exerts the force of
+    `STEADY`, the others 0; `force` is its own in that motion, in terms of the integrals."""
     if not integrals:
         return {}
-    first, *others = integrals
+    *others, innermost = integrals
     rest = force.xreplace(dict.fromkeys(integrals, sp.S.Zero))
-    return {first: (STEADY.force - rest) / sp.diff(force, first), **dict.fromkeys(others, sp.S.Zero)}
+    return {innermost: (STEADY.force - rest) / sp.diff(force, innermost), **dict.fromkeys(others, sp.S.Zero)}

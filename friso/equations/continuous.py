@@ -53,11 +53,18 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
     blocks = Continuous(sp.S.One)
     shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
     force = sum(shares.values(), start=Blocks.nothing).settled
-    integral = sum((sp.diff(force, x) * _per_error(u) for x, u in blocks.integrands.items()), start=sp.S.Zero)
+    proportional, integral = _per_error(force), sp.S.Zero
+    for x, integrand in blocks.integrands.items():
+        gain = sp.diff(force, x)
+        proportional -= gain * sp.diff(integrand, STEADY.velocity)  # the integral of a velocity is a displacement
+        integral += gain * _per_error(integrand)
     values = {
-        symbol: flat[str(symbol)] for gain in (force, integral) for symbol in gain.free_symbols if str(symbol) in flat
+        symbol: flat[str(symbol)]
+        for gain in (proportional, integral)
+        for symbol in gain.free_symbols
+        if str(symbol) in flat
     }
-    return float(_per_error(force).subs(values)), float(integral.subs(values))
+    return float(proportional.subs(values)), float(integral.subs(values))
 
 
 def _per_error(value: sp.Expr) -> sp.Expr:
@@ -150,6 +157,12 @@ class Continuous(Blocks):
         settled = upper[0] * signal.settled + (upper[1] - upper[0] * lower[1]) * signal.settled_rate
         value = upper[0] * low + upper[1] * slope + upper[2] * bend
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate)
+
+    def sign(self, signal: Signal, name: str) -> Signal:
+        """With a kink on either side of 0."""
+        ahead, behind = Kink(f"{name}_ahead", signal.value), Kink(f"{name}_behind", -signal.value)
+        self.kinks += [ahead, behind]
+        return Signal(ahead.beyond - behind.beyond, sp.S.One, sp.sign(signal.settled), sp.S.Zero)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """With a kink at either limit."""

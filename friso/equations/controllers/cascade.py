@@ -1,0 +1,134 @@
+"""The cascade of servo drives: a position loop that commands a velocity to a velocity loop.
+
+Position loop: v = kv (e + (1/T_p) int e dt) + f dr/dt. Velocity loop: F = kp ((v - dy/dt) + (1/T_v) int (v - dy/dt) dt),
+and the force that the move itself is believed to need. An integral without its time is absent. With the proportional
+part on the measurement alone, F = kp ((1/T_v) int (v - dy/dt) dt - dy/dt), it is pseudo-derivative feedback (Phelan
+1977, Automatic Control Systems; Ellis 2012, Control System Design Guide, chapter 6). The structure is that of EMPS
+(Janot, Gautier, Brunot 2019) and of drives in general (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
+
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage import ControllerSection, Rule, register_controller
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.blocks import Blocks, Measured, Signal
+
+POSITION_TIME, VELOCITY_TIME, PROPORTIONAL_ON, VELOCITY_FILTER = (
+    f"controller.{name}"
+    for name in ("position_integral_time", "velocity_integral_time", "proportional_on", "velocity_filter")
+)
+
+FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "coulomb_feedforward", "viscous_feedforward")
+
+
+class Terms(NamedTuple):
+    """Which terms there are; each absent term is absent from the equations."""
+
+    position_integral: bool
+    velocity_integral: bool
+    proportional_on: Literal["error", "measurement"]
+    filtered: bool
+    feedforward: tuple[str, ...]
+
+
+@register_controller
+class Cascade(ControllerSection):
+    """Position loop over velocity loop; an integral without a time, a filter and a feedforward of 0 are absent."""
+
+    kind: Literal["cascade"]
+    kv: Annotated[Value, Quantity("1/s", positive, "60 1/s")]
+    """Gain of the position loop."""
+    position_integral_time: Annotated[Value | None, Quantity("s", positive, "50 ms")] = None
+    kp: Annotated[Value, Quantity("N*s/m", positive, "500 N*s/m")]
+    """Gain of the velocity loop."""
+    velocity_integral_time: Annotated[Value | None, Quantity("s", positive, "10 ms")] = None
+    proportional_on: Literal["error", "measurement"] = "error"
+    """What the gain of the velocity loop acts on besides its integral; the measurement: pseudo-derivative feedback."""
+    velocity_filter: Annotated[Value, Quantity("s", non_negative, "0.2 ms")] = Value(0, "0 s")
+    """Time constant of the first-order filter of the measured velocity."""
+    velocity_feedforward: Annotated[float, Number(non_negative, "1")] = 0.0
+    """Share of the reference's velocity that goes to the velocity loop."""
+    acceleration_feedforward: Annotated[Value, Quantity("kg", non_negative, "1.7 kg")] = Value(0, "0 kg")
+    coulomb_feedforward: Annotated[Value, Quantity("N", non_negative, "1 N")] = Value(0, "0 N")
+    """By the sign of the reference's velocity."""
+    viscous_feedforward: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
+
+    speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType(
+        {"kv": 1, "kp": 1, "position_integral_time": -1, "velocity_integral_time": -1, "velocity_filter": -1}
+    )
+    loop_gain = ("kp",)
+    decisive = ("velocity_filter", *FEEDFORWARD)
+    shares: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"p": "position loop", "v": "velocity", "i": "integral", "f": "feedforward"}
+    )
+    words: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"kv": "Position gain kv", "kp": "Velocity gain kp", "velocity_integral_time": "Integral time of the velocity loop"}
+    )
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (PROPORTIONAL_ON, VELOCITY_TIME),
+            lambda f: (f[PROPORTIONAL_ON] == "error") | (VELOCITY_TIME in f),
+            "the integral of the velocity loop, on which alone the error acts in pseudo-derivative feedback",
+            'velocity_integral_time = "10 ms", or proportional_on = "error"',
+        ),
+    )
+
+    @classmethod
+    def variant(cls, flat: Mapping[str, Any]) -> Terms:
+        """Which terms there are."""
+        return Terms(
+            position_integral=POSITION_TIME in flat,
+            velocity_integral=VELOCITY_TIME in flat,
+            proportional_on=flat[PROPORTIONAL_ON],
+            filtered=bool(flat[VELOCITY_FILTER] > 0),
+            feedforward=tuple(name for name in FEEDFORWARD if flat[cls.key(name)] > 0),
+        )
+
+    @classmethod
+    def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        """Whether either loop has an integral."""
+        return POSITION_TIME in flat or VELOCITY_TIME in flat
+
+    @classmethod
+    def stiffness(cls, blocks: Blocks, variant: Terms) -> sp.Expr:
+        """The force on a stage that is displaced quickly [N/m]: the integral of its velocity is its displacement."""
+        kv, kp = blocks.key("kv"), blocks.key("kp")
+        stiffness = kp * kv if variant.proportional_on == "error" else 0
+        return stiffness + (kp / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)
+
+    @classmethod
+    def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
+        """The shares [N] of the position loop's command, of the velocity that opposes it, of the velocity loop's
+        integral, and of the feedforward."""
+        ahead = {name: blocks.key(name) for name in variant.feedforward}
+        kv, kp = blocks.key("kv"), blocks.key("kp")
+        lag = blocks.key("velocity_filter") if variant.filtered else None
+        velocity = blocks.derivative(measured.position, "position", lag)
+        command = measured.error * kv
+        if variant.position_integral:
+            gain = kv / blocks.key("position_integral_time")
+            command += blocks.integral(measured.error, gain, "position_integral", "sum")
+        command += measured.reference_velocity * ahead.get("velocity_feedforward", 0)
+        integral = blocks.nothing
+        if variant.velocity_integral:
+            gain = kp / blocks.key("velocity_integral_time")
+            integral = blocks.integral(command - velocity, gain, "velocity_integral", "sum")
+        feedforward = measured.reference_acceleration * ahead.get("acceleration_feedforward", 0)
+        feedforward += measured.reference_velocity * ahead.get("viscous_feedforward", 0)
+        if "coulomb_feedforward" in ahead:
+            feedforward += blocks.sign(measured.reference_velocity, "reference") * ahead["coulomb_feedforward"]
+        return {
+            "p": command * kp if variant.proportional_on == "error" else blocks.nothing,
+            "v": -(velocity * kp),
+            "i": integral,
+            "f": feedforward,
+        }
