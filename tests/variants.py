@@ -162,7 +162,7 @@ VARIANTS: dict[str, Stage] = {
             acceleration_feedforward="1.7 kg",
             coulomb_feedforward="1 N",
             viscous_feedforward="0.5 N*s/m",
-            extra="velocity_feedforward = 0.9\n" + limit("200 N"),
+            extra="velocity_feedforward = 0.9\n" + limit("20 N"),
         ),
     ),
     "rigid, cascade, two integrals": stage(

@@ -117,10 +117,24 @@ class Kernel:
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
         """States and numbers held in a steady motion that has lasted, shape (runs, initial_size); `flat` and the
         numbers of the motion may be arrays of shape (runs,)."""
+        return self.settled_at(self.values(flat, runs), steady, runs)
+
+    def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
+        """The same for stages given by the values of their parameters."""
         full = np.zeros((runs, self.initial_size))
-        for i, row in enumerate(self.module.settled(steady, self.values(flat, runs))):
+        for i, row in enumerate(self.module.settled(steady, values)):
             full[:, i] = row
         return full
+
+    def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
+        """The same with all integrals 0, the force of the controller being what follows from that."""
+        resting = self.settled_at(values, steady._replace(force=0.0), runs)
+        if integrals := self.having(Role.INTEGRAL):
+            per_newton = self.settled_at(values, steady._replace(force=1.0), runs) - resting
+            inner = integrals[-1]
+            resting -= (resting[:, inner] / per_newton[:, inner])[:, None] * per_newton
+            resting[:, integrals] = 0.0
+        return resting
 
     def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
         """On which side of each kink runs are, 1 beyond and 0 before it, shape (kinks, ...), from the `full` state

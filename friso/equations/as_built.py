@@ -133,9 +133,10 @@ def _drive(form: AsBuilt) -> Control:
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
     """What the encoder reads [m], what the controller commands [N], and what it keeps for the next sample."""
+    from dataclasses import replace
+
     import sympy as sp
 
-    from friso.equations.blocks import Loop
     from friso.equations.component import STEADY, TICK, Held, gaussian, key, quantised, state
     from friso.equations.model import REFERENCE
     from friso.equations.sampled import Rest, sampled_controller
@@ -153,7 +154,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
         rests=sp.Abs(error) < drive["integrator_deadband"],
         restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
     )
-    measured = Loop(error, reading, loop.velocity, speed, acceleration)
+    measured = replace(loop, error=error, position=reading)
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, measured, form.velocity_samples, extra, rest)
     last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none

@@ -22,14 +22,21 @@ Polynomial = tuple[Any, Any, Any]
 
 @dataclass(frozen=True)
 class Loop:
-    """What a controller sees: error [m], position [m], its rate, that of the reference [m/s], and its acceleration
-    [m/s^2]."""
+    """What a controller sees: error [m], position [m], its rate, that of the reference [m/s], its acceleration
+    [m/s^2], and its direction: 1 ahead, -1 back, 0 at rest."""
 
     error: sp.Expr
     position: sp.Expr
     velocity: sp.Expr
     reference_velocity: sp.Expr
     reference_acceleration: sp.Expr = sp.S.Zero
+    reference_direction: sp.Expr = sp.S.Zero
+
+
+def direction(*rates: sp.Expr) -> sp.Expr:
+    """The sign of the first of some rates that is not 0, as 1, -1 or 0."""
+    cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
+    return sp.Piecewise(*cases, (sp.S.Zero, True))
 
 
 @dataclass(frozen=True)
@@ -86,12 +93,14 @@ class Signal:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a controller acts on: error and position [m], velocity [m/s] and acceleration [m/s^2] of the reference."""
+    """What a controller acts on: error and position [m], velocity [m/s], acceleration [m/s^2] and direction (1, -1, 0)
+    of the reference."""
 
     error: Signal
     position: Signal
     reference_velocity: Signal
     reference_acceleration: Signal
+    reference_direction: Signal
 
 
 def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
@@ -108,6 +117,7 @@ def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
             rate=loop.reference_acceleration,
         ),
         Signal(loop.reference_acceleration, length * rate**2, sp.S.Zero, sp.S.Zero, rate=sp.S.Zero),
+        Signal(loop.reference_direction, sp.S.One, direction(STEADY.reference_velocity), sp.S.Zero),
     )
 
 
@@ -145,11 +155,6 @@ class Blocks(ABC):
     @abstractmethod
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
         """A transfer function of the second order, whose lower polynomial begins with 1: a notch, for one."""
-
-    @abstractmethod
-    def sign(self, signal: Signal, name: str) -> Signal:
-        """1 where the signal is positive, -1 where it is negative, and 0 where it is 0, as in the reference's velocity
-        at rest."""
 
     @abstractmethod
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:

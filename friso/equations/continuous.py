@@ -158,12 +158,6 @@ class Continuous(Blocks):
         value = upper[0] * low + upper[1] * slope + upper[2] * bend
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate)
 
-    def sign(self, signal: Signal, name: str) -> Signal:
-        """With a kink on either side of 0."""
-        ahead, behind = Kink(f"{name}_ahead", signal.value), Kink(f"{name}_behind", -signal.value)
-        self.kinks += [ahead, behind]
-        return Signal(ahead.beyond - behind.beyond, sp.S.One, sp.sign(signal.settled), sp.S.Zero)
-
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """With a kink at either limit."""
         value, kinks = _clamped(signal.value, limit, name)

@@ -9,7 +9,7 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.blocks import Controller, Loop
+from friso.equations.blocks import Controller, Loop, direction
 from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
 from friso.equations.continuous import Continuous, continuous_controller
 from friso.equations.friction.common import Friction
@@ -134,7 +134,8 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     breakaway = _breakaway(structure, friction, motor_friction)
     length, rate = _scales(structure, breakaway, chain.mass)
     stage, rated = chain.measured(structure)
-    loop = Loop(reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration)
+    ways = direction(velocity, acceleration)  # as they are at the last corner: where it turns there is another
+    loop = Loop(reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, ways)
     form = structure.controller
     if control is None and form is not None:
         control = partial(continuous_controller, form)

@@ -121,11 +121,6 @@ class Sampled(Blocks):
         ]
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, before=y1)
 
-    def sign(self, signal: Signal, name: str) -> Signal:
-        """As it is at a sample."""
-        value = sp.Piecewise((1, signal.value > 0), (-1, signal.value < 0), (0, True))
-        return Signal(value, sp.S.One, sp.sign(signal.settled), sp.S.Zero)
-
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """As it is at a sample."""
         return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)

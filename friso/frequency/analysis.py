@@ -9,7 +9,7 @@ from friso.errors import InputError
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
 from friso.frequency.members import Members, limit_cases, limiter_states
-from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, plant
+from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, fed_forward, plant
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
 from friso.quantities import quoted
@@ -29,6 +29,7 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
 
     - "plant": from "force" on the stage and "disturbance on cart" [N] to "stage", "cart" and "joint deflection" [m];
     - "controller": from "reference" and "stage" [m] (and "stage velocity" [m/s] if it measures that) to "force" [N];
+      one with feedforward also from "reference velocity" [m/s] and "reference acceleration" [m/s^2], here and below;
     - "open": the loop cut at the actuator, from "force" to minus the "force" of the controller;
     - "closed": from "force", "reference", "disturbance on cart" and "sensor noise" [m] to "stage", "cart", "joint
       deflection" and "force".
@@ -76,8 +77,8 @@ def _plant(flat: Mapping[str, Any], member: Members) -> System:
 
 def _controller(flat: Mapping[str, Any], member: Members) -> System:
     controller = compensator(flat, len(member))
-    measures_velocity = controller.take((VELOCITY,), (FORCE,)).d.any()
-    return controller.take((REFERENCE, STAGE, VELOCITY) if measures_velocity else (REFERENCE, STAGE), (FORCE,))
+    measured = (REFERENCE, STAGE, VELOCITY) if controller.sees(VELOCITY) else (REFERENCE, STAGE)
+    return controller.take((*measured, *fed_forward(controller)), (FORCE,))
 
 
 def _closed(flat: Mapping[str, Any], member: Members) -> System:

@@ -10,7 +10,17 @@ import numpy as np
 
 from friso.frequency.drive import DriveTiming, bilinear, delayed, fastest, waited, zero_order_hold
 from friso.frequency.members import Members
-from friso.frequency.parts import DISTURBANCE, FORCE, NOISE, REFERENCE, STAGE, VELOCITY, compensator, plant
+from friso.frequency.parts import (
+    DISTURBANCE,
+    FORCE,
+    NOISE,
+    REFERENCE,
+    STAGE,
+    VELOCITY,
+    compensator,
+    fed_forward,
+    plant,
+)
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
@@ -30,13 +40,14 @@ def open_loop(flat: Mapping[str, Any], members: Members) -> System:
 
 
 def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
-    """The closed loop in continuous time: from a force on the stage, reference, disturbance on the cart and noise of
-    the sensor to all that the plant shows and the actuator force."""
+    """The closed loop in continuous time: from a force on the stage, reference, disturbance on the cart, noise of the
+    sensor and what is fed forward of the reference to all that the plant shows and the actuator force."""
     machine, control = plant(flat, members), compensator(flat, len(members))
+    ahead = fed_forward(control)
     n, k = len(machine.states), len(control.states)
     channels = machine.take((FORCE, DISTURBANCE), (STAGE, VELOCITY))
     push = machine.b[:, :, [machine.inputs.index(FORCE)]]
-    measured, commanded = control.take((STAGE, VELOCITY), (FORCE,)), control.take((REFERENCE, STAGE), (FORCE,))
+    measured, commanded = control.take((STAGE, VELOCITY), (FORCE,)), control.take((REFERENCE, STAGE, *ahead), (FORCE,))
     a = np.zeros((len(members), n + k, n + k))
     a[:, :n, :n] = machine.a + push @ measured.d @ channels.c
     a[:, :n, n:] = push @ control.c
@@ -46,7 +57,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     inside = np.concatenate([push @ commanded.d, commanded.b], axis=1)
     outputs = np.concatenate([machine.c, np.zeros((len(members), machine.c.shape[1], k))], axis=2)
     force = np.concatenate([measured.d @ channels.c, control.c], axis=2)
-    d = np.zeros((len(members), outputs.shape[1] + 1, 4))
+    d = np.zeros((len(members), outputs.shape[1] + 1, 4 + len(ahead)))
     d[:, -1:, 2:] = commanded.d
     system = System(
         a,
@@ -54,7 +65,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
         np.concatenate([outputs, force], axis=1),
         d,
         machine.states + control.states,
-        (FORCE, DISTURBANCE, REFERENCE, NOISE),
+        (FORCE, DISTURBANCE, REFERENCE, NOISE, *ahead),
         (*machine.outputs, FORCE),
     )
     return system

@@ -23,10 +23,19 @@ from friso.frequency.members import Members
 from friso.frequency.system import System
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
+REFERENCE_VELOCITY, REFERENCE_ACCELERATION = FEEDFORWARD = "reference velocity", "reference acceleration"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
 
-_REFERENCE, _POSITION, _VELOCITY = (sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v"))
-_CONTROLLER_INPUTS = {REFERENCE: _REFERENCE, STAGE: _POSITION, VELOCITY: _VELOCITY}
+_REFERENCE, _POSITION, _VELOCITY, _SPEED, _ACCELERATION = (
+    sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend")
+)
+_CONTROLLER_INPUTS = {
+    REFERENCE: _REFERENCE,
+    STAGE: _POSITION,
+    VELOCITY: _VELOCITY,
+    REFERENCE_VELOCITY: _SPEED,
+    REFERENCE_ACCELERATION: _ACCELERATION,
+}
 
 
 def plant(flat: Mapping[str, Any], members: Members) -> System:
@@ -57,14 +66,19 @@ def _limiter(touched: np.ndarray) -> dict[str, Any]:
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
-    """The controller: from reference, position [m] and velocity [m/s] of the stage to the force [N]. Raises InputError
-    for one that exerts none."""
+    """The controller: from reference, position [m] and velocity [m/s] of the stage, velocity [m/s] and acceleration
+    [m/s^2] of the reference to the force [N]. Raises InputError for one that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
     system = _compensator(replace(form, anti_windup=None)).at(flat, members)
     if not (system.c.any() or system.d.any()):
         raise InputError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
     return system
+
+
+def fed_forward(control: System) -> tuple[str, ...]:
+    """Names of the derivatives of the reference that a controller takes."""
+    return tuple(name for name in FEEDFORWARD if control.sees(name))
 
 
 @dataclass(frozen=True)
@@ -97,7 +111,7 @@ def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
 
 @cache
 def _compensator(form: ControllerForm) -> Declared:
-    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, sp.S.Zero)
+    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, _SPEED, _ACCELERATION)
     control = continuous_controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
     within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}  # of limits inside it

@@ -31,6 +31,11 @@ class System:
         b, c, d = self.b[..., columns], self.c[..., rows, :], self.d[..., rows, :][..., columns]
         return System(self.a, b, c, d, self.states, tuple(inputs), tuple(outputs))
 
+    def sees(self, name: str) -> bool:
+        """Whether anything depends on an input."""
+        column = self.inputs.index(name)
+        return bool(self.b[..., column].any() or self.d[..., column].any())
+
     def at(self, points: np.ndarray) -> Complex:
         """Transfer matrices c (s - a)^-1 b + d at the points s (k,), complex, shape (members, k, p, m)."""
         n = len(self.states)

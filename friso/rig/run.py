@@ -134,8 +134,7 @@ def _recorded(
         budget=int(BUDGET * task.duration / flat["drive.sample_time"]),
     )  # fmt: skip
     at_rest = Steady(-task.displacement, float(task.pieces[0, 1]) + task.displacement)
-    starts = shape.settled(flat | motion, at_rest, len(seeds))
-    starts[:, shape.having(Role.INTEGRAL)] = 0.0
+    starts = shape.unwound_at(shape.values(flat | motion, len(seeds)), at_rest, len(seeds))
     batch = prepare(shape, flat | motion, len(seeds), options, starts)
     end = np.array([[task.duration, 0.0, 0.0, 0.0]])
     batch = batch._replace(

@@ -70,7 +70,11 @@ class Cascade(ControllerSection):
         {"p": "position loop", "v": "velocity", "i": "integral", "f": "feedforward"}
     )
     words: ClassVar[Mapping[str, str]] = MappingProxyType(
-        {"kv": "Position gain kv", "kp": "Velocity gain kp", "velocity_integral_time": "Integral time of the velocity loop"}
+        {
+            "kv": "Position gain kv",
+            "kp": "Velocity gain kp",
+            "velocity_integral_time": "Integral time of the velocity loop",
+        }
     )
 
     rules: ClassVar[tuple[Rule, ...]] = (
@@ -124,8 +128,7 @@ class Cascade(ControllerSection):
             integral = blocks.integral(command - velocity, gain, "velocity_integral", "sum")
         feedforward = measured.reference_acceleration * ahead.get("acceleration_feedforward", 0)
         feedforward += measured.reference_velocity * ahead.get("viscous_feedforward", 0)
-        if "coulomb_feedforward" in ahead:
-            feedforward += blocks.sign(measured.reference_velocity, "reference") * ahead["coulomb_feedforward"]
+        feedforward += measured.reference_direction * ahead.get("coulomb_feedforward", 0)
         return {
             "p": command * kp if variant.proportional_on == "error" else blocks.nothing,
             "v": -(velocity * kp),

@@ -22,6 +22,10 @@ LIMITED = np.geomspace(500.0, 30000.0, 8)
 """Distances beyond these, in the same units, for stages with a force limit: cycles that it drives are as large as the
 limit moves the masses in the time in which the integrator unwinds."""
 
+OUTER = -10.0, -1.0, 1.0, 10.0
+"""How far integrals of outer loops have wound up at first, where there are several: times for which they have integrated
+the distance, in units of the time in which the loop moves."""
+
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
 
@@ -56,7 +60,10 @@ class Starts:
             if which.size:
                 of = np.repeat(which, len(units))
                 some = self.stages.take(of)
-                self._add(of, stuck(some, side * np.tile(units, which.size) * some.length))
+                distances = side * np.tile(units, which.size) * some.length
+                self._add(of, stuck(some, distances))
+                for wound in OUTER if some.outer_integrals else ():
+                    self._add(of, stuck(some, distances, wound / some.number("rate")))
                 if thorough:
                     of = np.repeat(which, len(PUSHES))
                     some = self.stages.take(of)

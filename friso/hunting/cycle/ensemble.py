@@ -18,7 +18,7 @@ from friso.equations.structure import Structure, shared_structure
 WITHOUT_FRICTION = 1e-6
 """Size of the motion [m] from which magnitudes follow where no friction deflects the loop: such a stage is linear."""
 
-PER_STAGE = ("symmetric", "length", "scales", "relaxed")
+PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton")
 """Properties of the stages one by one, which are kept with them."""
 
 
@@ -100,42 +100,39 @@ class Ensemble:
 
     @property
     def integral(self) -> int:
-        """The state that winds up while a stage sticks."""
-        return self.kernel.having(Role.INTEGRAL)[0]
+        """The state that winds up while a stage sticks; of several, the innermost, which holds the force."""
+        return self.kernel.having(Role.INTEGRAL)[-1]
+
+    @property
+    def outer_integrals(self) -> list[int]:
+        """The other states that wind up."""
+        return self.kernel.having(Role.INTEGRAL)[:-1]
 
     def settled(self, steady: Steady) -> np.ndarray:
         """States in a steady motion that has lasted, shape (count, states)."""
-        states = np.empty((self.count, self.kernel.initial_size))
-        for i, row in enumerate(self.kernel.module.settled(steady, self.values)):
-            states[:, i] = row
-        return states
+        return self.kernel.settled_at(self.values, steady, self.count)
 
     def displaced(self, displacement: np.ndarray) -> np.ndarray:
         """States of stages at rest that are displaced [m], the controller's filters having followed, all else zero."""
-        states = self.settled(Steady(-displacement, displacement))
-        states[:, self.kernel.having(Role.INTEGRAL)] = 0.0
-        return states
+        return self.kernel.unwound_at(self.values, Steady(-displacement, displacement), self.count)
 
     @cached_property
     def relaxed(self) -> np.ndarray:
         """State of the integrator per displacement [s] at which the actuator exerts no force on a stage at rest, shape
         (count,)."""
-        states = self.displaced(np.ones(self.count))
-        free = self.force(states)
-        states[:, self.integral] = 1.0
-        return -free / (self.force(states) - free)
+        return self.settled(Steady(-1.0, 1.0))[:, self.integral]
+
+    @cached_property
+    def per_newton(self) -> np.ndarray:
+        """By how much the integrator changes for a force of 1 N, shape (count,)."""
+        held, free = (self.settled(Steady(0.0, 0.0, force=force))[:, self.integral] for force in (1.0, 0.0))
+        return held - free
 
     def rates(self, states: np.ndarray) -> np.ndarray:
         """The time derivative of the states, both of shape (count, states)."""
         modes = self.kernel.modes(states.T, 0.0, np.zeros(3), self.values)
         rows = self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values)
         return np.stack([np.broadcast_to(row, (self.count,)) for row in rows], axis=1)
-
-    def force(self, states: np.ndarray) -> np.ndarray:
-        """Actuator force [N] without its limit, shape (count,)."""
-        modes = np.zeros((len(self.kernel.kinks), self.count))
-        rows = self.kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), self.values)
-        return np.broadcast_to(rows[list(self.kernel.outputs).index("force")], (self.count,))
 
     def steady_friction(self, velocities: np.ndarray) -> np.ndarray | None:
         """Friction force [N] in steady motions of the cart at velocities [m/s], one per stage, both of shape (count,);

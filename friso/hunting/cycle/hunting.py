@@ -189,6 +189,8 @@ def _beyond_the_search(stages: Ensemble) -> str:
     controller = stages.structure.controller
     if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
+    if stages.outer_integrals:
+        return "with integrals in several loops, stages that stick with an outer one wound up otherwise may swing on"
     if small_cycles_possible(stages):
         return "friction falls so little over the speeds of small swings that cycles may be smaller than is looked for"
     return ""

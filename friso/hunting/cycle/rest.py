@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.equations.roles import Role
+from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
 
 
-def stuck(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
+def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
     """States, shape (count, states), of stages at rest that are displaced [m] (count,), the bristles relaxed and the
-    integrator such that the actuator exerts no force.
+    integrator such that the actuator exerts no force; but integrals of outer loops have `wound` up for a time [s].
 
     A stage that sticks winds up from here until it breaks away, and has forgotten by then how it came to stick: these
     states are a line through all hunting cycles with sticking, and the distance to the reference alone tells what
-    follows.
+    follows, unless there are integrals in several loops.
     """
-    states = stages.displaced(displacement)
-    states[:, stages.integral] = stages.relaxed * displacement
+    states = stages.settled(Steady(-displacement, displacement))
+    states[:, stages.outer_integrals] = np.reshape(-displacement * wound, (-1, 1))
     return states
 
 
@@ -30,6 +30,5 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,)."""
-    states = stuck(stages, displacement)
-    ramp = states + stages.rates(states) * (np.arange(states.shape[1]) == stages.integral)
-    return stages.number("breakaway") / np.abs(stages.force(ramp) - stages.force(states))
+    rate = stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton
+    return stages.number("breakaway") / np.abs(rate)
