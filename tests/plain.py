@@ -80,6 +80,7 @@ def cascade(
     rates: dict[str, float] = {}
     if keys["velocity_filter"] > 0:
         v = rates["filtered_position"] = (y - s["filtered_position"]) / keys["velocity_filter"]
+    v = filtered(flat, s, "feedback", v, rates)
     wanted = keys["kv"] * error + keys["velocity_feedforward"] * r_rate
     if "position_integral_time" in keys:
         rates["position_integral"] = error
@@ -90,6 +91,7 @@ def cascade(
         demand += keys["kp"] / keys["velocity_integral_time"] * s["velocity_integral"]
     demand += keys["acceleration_feedforward"] * r_bend + keys["viscous_feedforward"] * r_rate
     demand += keys["coulomb_feedforward"] * ((r_rate > 0) - (r_rate < 0))
+    demand = filtered(flat, s, "forward", demand, rates)
     if "force_limit" not in keys:
         return demand, rates
     bound = keys["force_limit"]
@@ -99,6 +101,44 @@ def cascade(
     return min(max(demand, -bound), bound), rates
 
 
+def filtered(flat: Flat, s: State, path: str, u: float, rates: dict[str, float]) -> float:
+    """A signal behind the filters of a path, whose states' rates are added to the `rates`."""
+    for n in range(1, 13):
+        row = f"controller.filters.{n}"
+        if flat.get(f"{row}.path") != path:
+            continue
+        kind, name = flat[f"{row}.kind"], f"filtered_filter_{n}"
+        low, slope = s[name], s.get(f"{name}_rate", 0.0)
+        if kind == "lead_lag" or flat.get(f"{row}.order") == 1:
+            pole = 2 * pi * flat[f"{row}.{'pole_' if kind == 'lead_lag' else ''}frequency"]
+            rates[name] = (u - low) * pole
+            u = low + (rates[name] / (2 * pi * flat[f"{row}.zero_frequency"]) if kind == "lead_lag" else 0.0)
+            continue
+        if kind == "notch":
+            w, width = 2 * pi * flat[f"{row}.frequency"], 2 * pi * flat[f"{row}.width"]
+            numerator = (1.0, (1 - flat[f"{row}.depth"]) * width / w**2, 1 / w**2)
+            denominator = (1.0, width / w**2, 1 / w**2)
+        elif kind == "sampled_biquad":  # z^-1 = (1 - s T/2)/(1 + s T/2), a power of (1 + s T/2)^2 left out
+            h = flat[f"{row}.sample_time"] / 2
+            b = [flat[f"{row}.numerator.{k}"] for k in (1, 2, 3)]
+            a = [1.0, *(flat[f"{row}.denominator.{k}"] for k in (1, 2))]
+            numerator, denominator = (
+                tuple(c / sum(a) for c in (p[0] + p[1] + p[2], 2 * h * (p[0] - p[2]), h * h * (p[0] - p[1] + p[2])))
+                for p in (b, a)
+            )
+        else:
+            w = 2 * pi * flat[f"{row}.{'pole_' if kind == 'biquad' else ''}frequency"]
+            zeta = flat[f"{row}.{'pole_damping' if kind == 'biquad' else 'damping_ratio'}"]
+            denominator, numerator = (1.0, 2 * zeta / w, 1 / w**2), (1.0, 0.0, 0.0)
+            if kind == "biquad":
+                w_z = 2 * pi * flat[f"{row}.zero_frequency"]
+                numerator = (1.0, 2 * flat[f"{row}.zero_damping"] / w_z, 1 / w_z**2)
+        bend = (u - low - denominator[1] * slope) / denominator[2]
+        rates |= {name: slope, f"{name}_rate": bend}
+        u = numerator[0] * low + numerator[1] * slope + numerator[2] * bend
+    return u
+
+
 def control(
     flat: Flat, s: State, y: float, v: float, r: float, r_rate: float, r_bend: float
 ) -> tuple[float, dict[str, float]]:
@@ -106,6 +146,9 @@ def control(
     error = r - y
     if flat["controller.kind"] == "cascade":
         return cascade(flat, s, error, v, y, r_rate, r_bend)
+    of_filters: dict[str, float] = {}
+    y = filtered(flat, s, "feedback", y, of_filters)
+    error = r - y
     if "controller.crossover" in flat:
         omega = 2 * pi * flat["controller.crossover"]
         alpha = flat["controller.alpha"]
@@ -128,7 +171,8 @@ def control(
             rates["filtered_position"] = -slope
         demand = kp * error + ki * s.get("integral", 0.0) + kd * slope
         winding = error
-    rates["integral"] = winding
+    rates |= {"integral": winding, **of_filters}
+    demand = filtered(flat, s, "forward", demand, rates)
     if "controller.force_limit" not in flat:
         return demand, rates
     bound, anti_windup = flat["controller.force_limit"], flat.get("controller.anti_windup", "clamp")

@@ -112,6 +112,22 @@ def ramp(velocity: str = "0.1 m/s", duration: str = "1 s") -> str:
 HOLD = 'kind = "hold"\nduration = "1 s"'
 
 
+def a_filter(kind: str, **keys: object) -> str:
+    lines = [f"{name} = {value!r}" for name, value in {"kind": kind, **keys}.items()]
+    return "\n".join(["[[controller.filters]]", *lines, ""]).replace("'", '"')
+
+
+FORWARD_FILTERS = (
+    a_filter("notch", frequency="60 Hz", width="20 Hz", depth=0.9)
+    + a_filter("low_pass", frequency="300 Hz", order=1)
+    + a_filter("sampled_biquad", numerator=[0.94, -1.85, 0.93], denominator=[-1.85, 0.87], sample_time="1 ms")
+)
+
+FEEDBACK_FILTERS = a_filter(
+    "biquad", path="feedback", zero_frequency="90 Hz", zero_damping=0.1, pole_frequency="80 Hz", pole_damping=0.5
+) + a_filter("lead_lag", path="feedback", zero_frequency="400 Hz", pole_frequency="200 Hz")
+
+
 def stage(
     motion: str, masses: str = "both", friction: str = "", joint: str = "", parasitic: str = "", controller: str = ""
 ) -> Stage:
@@ -155,14 +171,14 @@ VARIANTS: dict[str, Stage] = {
         step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N", "back_calculation", "20 ms"))
     ),
     "rigid, cascade": stage(
-        there_and_back(),
+        there_and_back(acceleration="1 m/s^2"),
         friction=lugre(2),
         controller=cascade(
             velocity_integral_time="30 ms",
             acceleration_feedforward="1.7 kg",
             coulomb_feedforward="1 N",
             viscous_feedforward="0.5 N*s/m",
-            extra="velocity_feedforward = 0.9\n" + limit("20 N"),
+            extra="velocity_feedforward = 0.9\n" + limit("6 N"),
         ),
     ),
     "rigid, cascade, two integrals": stage(
@@ -174,6 +190,23 @@ VARIANTS: dict[str, Stage] = {
             proportional_on="measurement",
             velocity_filter="1 ms",
         ),
+    ),
+    "rigid, PI, filters, limit": stage(
+        step(), friction=lugre(2), controller=gains(2000, 5000, extra=limit("4 N") + FORWARD_FILTERS + FEEDBACK_FILTERS)
+    ),
+    "rigid, van Dijk, low-pass": stage(
+        step(),
+        friction=lugre(2),
+        controller=van_dijk(
+            "8 Hz",
+            limit("6 N", "back_calculation", "20 ms")
+            + a_filter("low_pass", frequency="200 Hz", order=2, damping_ratio=0.6),
+        ),
+    ),
+    "rigid, cascade, filters": stage(
+        step(),
+        friction=lugre(2),
+        controller=cascade(velocity_integral_time="30 ms", extra=FEEDBACK_FILTERS + FORWARD_FILTERS),
     ),
     "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
     "locked, parasitic": stage(

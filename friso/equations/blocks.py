@@ -8,16 +8,16 @@ drive carries it out.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import sympy as sp
 
 from friso.equations.component import STEADY, Component, Held, key
-from friso.stage.controllers import ANTI_WINDUP_TIME, FORCE_LIMIT, ControllerSection
-
-Polynomial = tuple[Any, Any, Any]
-"""Coefficients of 1, s [s] and s^2 [s^2]."""
+from friso.equations.structure import ControllerForm
+from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
+from friso.stage.filters import FEEDBACK, FORWARD, Polynomial
 
 
 @dataclass(frozen=True)
@@ -124,6 +124,9 @@ def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
 class Blocks(ABC):
     """The blocks, which keep what they need beside them. `name` distinguishes a block from others of its kind."""
 
+    def __init__(self, form: ControllerForm | None = None) -> None:
+        self.form = form
+
     nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
     """A signal that is always 0."""
 
@@ -160,9 +163,63 @@ class Blocks(ABC):
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """The signal clamped to plus and minus a limit."""
 
+    def fed_back(self, signal: Signal) -> Signal:
+        """A signal that is measured, behind the filters of the feedback path."""
+        return self._filtered(signal, FEEDBACK)
+
+    def fed_forward(self, signal: Signal) -> Signal:
+        """The force that is demanded, behind the filters of the forward path."""
+        return self._filtered(signal, FORWARD)
+
+    def _filtered(self, signal: Signal, path: str) -> Signal:
+        """A signal behind the filters of a path, in their order."""
+        for number, part in enumerate(self.form.filters if self.form else (), start=1):
+            if part.path == path:
+                row = _Row(f"{FILTERS_KEY}.{number}")
+                upper, lower = part.law.transfer(row, part.variant)
+                signal = self.transfer(signal, upper, lower, f"filter_{number}")
+        return signal
+
+    def transfer(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+        """A transfer function of the first or the second order, whose lower polynomial begins with 1."""
+        if lower[2] != 0:
+            return self.biquad(signal, upper, lower, name)
+        through = sp.sympify(upper[1]) / lower[1]
+        return self.low_pass(signal, lower[1], name) * (upper[0] - through) + signal * through
+
     def lead(self, signal: Signal, zero: sp.Expr, pole: sp.Expr, name: str) -> Signal:
         """(1 + zero s)/(1 + pole s), both [s]: a lead where the zero is the longer one, else a lag."""
         return signal + self.derivative(signal, name, pole) * (zero - pole)
+
+
+class _Row(dict[str, sp.Symbol]):
+    """The keys of a table in an array, as parameters."""
+
+    def __init__(self, place: str) -> None:
+        super().__init__()
+        self.place = place
+
+    def __missing__(self, name: str) -> sp.Symbol:
+        return key(f"{self.place}.{name}")
+
+
+@dataclass(frozen=True)
+class Demand:
+    """The shares of a controller's force by name, their sum, and the force demanded behind the filters [N]."""
+
+    shares: Mapping[str, Signal]
+    total: Signal
+    force: Signal
+
+
+def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
+    """What a controller demands for what it measures."""
+    if form.law.feeds_back == "position":
+        position = blocks.fed_back(seen.position)
+        seen = replace(seen, position=position, error=seen.error + seen.position - position)
+    shares = form.law.declare(seen, blocks, form.variant)
+    total = sum(shares.values(), start=Blocks.nothing)
+    return Demand(shares, total, blocks.fed_forward(total))
 
 
 def force_limit() -> sp.Symbol:

@@ -11,9 +11,10 @@ import sympy as sp
 from friso.equations.blocks import (
     Blocks,
     Controller,
+    Demand,
     Loop,
-    Polynomial,
     Signal,
+    demanded,
     force_limit,
     measured,
     unwinding_time,
@@ -22,6 +23,7 @@ from friso.equations.blocks import (
 from friso.equations.component import STEADY, Component, Kink, Output, Role, State, state
 from friso.equations.structure import ControllerForm, controller_form
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
+from friso.stage.filters import Polynomial
 
 UNWINDING_BAND = sp.Rational(1, 1000)
 """Share of the force limit over which the integrator is brought to rest.
@@ -32,14 +34,14 @@ switching for ever; over this narrow band the stop is continuous and the slide i
 
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
     """The controller of the given form; `length` [m] and `rate` [1/s] are the scales of its states."""
-    blocks = Continuous(rate)
-    shares = form.law.declare(measured(loop, length, rate), blocks, form.variant)
-    demand = sum(shares.values(), start=Blocks.nothing)
-    bound = ForceLimit.of(demand, form.anti_windup) if form.anti_windup else None
-    force, kinks = (bound.force, bound.kinks) if bound else (demand.value, ())
+    blocks = Continuous(rate, form)
+    demand = demanded(form, measured(loop, length, rate), blocks)
+    bound = ForceLimit.of(demand.force, form.anti_windup) if form.anti_windup else None
+    force, kinks = (bound.force, bound.kinks) if bound else (demand.force.value, ())
     outputs = {"force": Output(force, "N", "actuator force")}
     outputs |= {
-        f"force_{term}": Output(shares[term].value, "N", f"{name} share") for term, name in form.law.shares.items()
+        f"force_{term}": Output(demand.shares[term].value, "N", f"{name} share")
+        for term, name in form.law.shares.items()
     }
     states, resting = blocks.finished(demand, bound)
     return Controller(force, Component(states, (*blocks.kinks, *kinks, *resting), outputs))
@@ -50,9 +52,8 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
     a stage given as flat keys, its reference at rest."""
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
-    blocks = Continuous(sp.S.One)
-    shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
-    force = sum(shares.values(), start=Blocks.nothing).settled
+    blocks = Continuous(sp.S.One, form)
+    force = demanded(form, measured(loop, sp.S.One, sp.S.One), blocks).force.settled
     proportional, integral = _per_error(force), sp.S.Zero
     for x, integrand in blocks.integrands.items():
         gain = sp.diff(force, x)
@@ -107,7 +108,8 @@ class _Integral:
 class Continuous(Blocks):
     """Blocks whose memories are states; `rate` [1/s] is that of the motion."""
 
-    def __init__(self, rate: sp.Expr) -> None:
+    def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
+        super().__init__(form)
         self.rate = rate
         self.states: list[State] = []
         self.kinks: list[Kink] = []
@@ -156,7 +158,10 @@ class Continuous(Blocks):
         ]
         settled = upper[0] * signal.settled + (upper[1] - upper[0] * lower[1]) * signal.settled_rate
         value = upper[0] * low + upper[1] * slope + upper[2] * bend
-        return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate)
+        following = None if signal.rate is None else (signal.rate - slope - lower[1] * bend) / lower[2]
+        straight = upper[0] * slope + upper[1] * bend
+        changes = straight if upper[2] == 0 else None if following is None else straight + upper[2] * following
+        return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, rate=changes)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """With a kink at either limit."""
@@ -164,10 +169,10 @@ class Continuous(Blocks):
         self.kinks += kinks
         return replace(signal, value=value, rate=None)
 
-    def finished(self, demand: Signal, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
+    def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
         """All states, the integrators doing as they are to where the demand is beyond its bound, and resting where
         their output is beyond a limit of its own; and the kinks of that."""
-        steady = wound_up(demand.settled, [integral.symbol for integral in self._integrals])
+        steady = wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])
         states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
         clamp = bound if bound and bound.anti_windup == "clamp" else None
         far: list[Kink] = list(_far(clamp.kinks, clamp.limit, "rest")) if self._integrals and clamp else []
@@ -187,7 +192,7 @@ class Continuous(Blocks):
                 winding.append(up)
             derivative = integral.integrand * share
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
-                gain = len(self._integrals) * sp.diff(demand.value, integral.symbol)
+                gain = len(self._integrals) * sp.diff(demand.total.value, integral.symbol)
                 derivative += bound.cut / (gain * unwinding_time())
             states.append(
                 State(integral.symbol, derivative, "m*s", integral.scale, Role.INTEGRAL, steady[integral.symbol])

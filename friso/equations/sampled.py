@@ -11,10 +11,21 @@ from typing import Any, Literal
 
 import sympy as sp
 
-from friso.equations.blocks import Blocks, Loop, Polynomial, Signal, force_limit, measured, unwinding_time, wound_up
+from friso.equations.blocks import (
+    Blocks,
+    Demand,
+    Loop,
+    Signal,
+    demanded,
+    force_limit,
+    measured,
+    unwinding_time,
+    wound_up,
+)
 from friso.equations.component import Held, Role, key, state
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
+from friso.stage.filters import Polynomial
 
 SAMPLE_TIME = key("drive.sample_time")
 
@@ -35,11 +46,11 @@ def sampled_controller(
     `loop` holds what is known at the sample. A derivative without a filter is a difference over `velocity_samples`. An
     integrator does at the limit of the force what its anti-windup prescribes: clamped, it rests for the sample in which
     it would drive the force further beyond."""
-    blocks = Sampled(velocity_samples)
-    shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
-    demand = sum(shares.values(), start=Blocks.nothing)
+    blocks = Sampled(velocity_samples, form)
+    demand = demanded(form, measured(loop, sp.S.One, sp.S.One), blocks)
     limit = force_limit() if form.anti_windup else None
-    force, held = blocks.finished(replace(demand, value=demand.value + extra), form.anti_windup, rest)
+    pushed = replace(demand.force, value=demand.force.value + extra)
+    force, held = blocks.finished(replace(demand, force=pushed), form.anti_windup, rest)
     return sp.Max(-limit, sp.Min(limit, force)) if limit is not None else force, held
 
 
@@ -57,7 +68,8 @@ class _Integral:
 class Sampled(Blocks):
     """Blocks whose memories are numbers held from one sample to the next."""
 
-    def __init__(self, velocity_samples: int) -> None:
+    def __init__(self, velocity_samples: int, form: ControllerForm | None = None) -> None:
+        super().__init__(form)
         self.velocity_samples = velocity_samples
         self.held: list[Held] = []
         self._integrals: list[_Integral] = []
@@ -125,13 +137,13 @@ class Sampled(Blocks):
         """As it is at a sample."""
         return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)
 
-    def finished(self, demand: Signal, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
+    def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
         """The force before it is limited, and all that is held, the integrators doing as they are to where the force
         would be beyond its limit, and resting where their output would be beyond a limit of its own."""
         new: dict[Any, Any] = {}
         for integral in self._integrals:
             new[integral.next] = integral.symbol + integral.share.xreplace(new)
-        unlimited = demand.value.xreplace(new)
+        unlimited = demand.force.value.xreplace(new)
         updates: dict[Any, Any] = {}
         for integral in self._integrals:
             share: Any = integral.share.xreplace(updates)
@@ -144,17 +156,17 @@ class Sampled(Blocks):
             following = integral.symbol + share
             if anti_windup == BACK_CALCULATION:
                 cut = sp.Max(-force_limit(), sp.Min(force_limit(), unlimited)) - unlimited
-                gain = len(self._integrals) * sp.diff(demand.value, integral.next)
+                gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
                 following += SAMPLE_TIME * cut / (gain * unwinding_time())
             updates[integral.next] = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
-        steady: dict[Any, Any] = {**wound_up(demand.settled, [integral.symbol for integral in self._integrals])}
+        steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}
         updated: list[tuple[Any, Any]] = [(held.update, held.settled) for held in self.held]
         held = [
             replace(number, update=update.xreplace(updates), settled=settled.xreplace(steady))
             for number, (update, settled) in zip(self.held, updated, strict=True)
         ]
         held += [Held(i.symbol, updates[i.next], steady[i.symbol], Role.INTEGRAL) for i in self._integrals]
-        force: Any = demand.value
+        force: Any = demand.force.value
         return force.xreplace(updates), tuple(held)
 
 

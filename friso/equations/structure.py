@@ -12,12 +12,14 @@ from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLERS,
     DEFAULT_ANTI_WINDUP,
+    FILTERS_KEY,
     FORCE_LIMIT,
     KIND,
     AntiWindup,
     ControllerSection,
     controller_of,
 )
+from friso.stage.filters import FilterForm, filter_forms
 from friso.stage.tables import friction_law
 from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
 
@@ -27,13 +29,14 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 @dataclass(frozen=True)
 class ControllerForm:
     """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
-    it has integral action; and what that does at the limit of the force (None: there is no limit)."""
+    it has integral action; what that does at the limit of the force (None: there is no limit); and its filters."""
 
     kind: str
     form: str
     variant: Hashable
     integral: bool
     anti_windup: AntiWindup | None = None
+    filters: tuple[FilterForm, ...] = ()
 
     @property
     def law(self) -> type[ControllerSection]:
@@ -136,4 +139,5 @@ def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
         variant=law.variant(flat),
         integral=law.integrates(flat),
         anti_windup=flat.get(ANTI_WINDUP, DEFAULT_ANTI_WINDUP) if FORCE_LIMIT in flat else None,
+        filters=filter_forms(flat, FILTERS_KEY),
     )

@@ -9,11 +9,13 @@ from pydantic import model_validator
 
 from friso.errors import StageError
 from friso.quantities import Quantity, Value, positive
+from friso.stage.filters import FILTER_ARRAY
+from friso.stage.lists import Rows
 from friso.stage.section import Section, SectionClass, UncertainSection, Variants
 
 CONTROLLER = "controller"
-KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME = (
-    f"{CONTROLLER}.{name}" for name in ("kind", "force_limit", "anti_windup", "anti_windup_time")
+KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME, FILTERS_KEY = (
+    f"{CONTROLLER}.{name}" for name in ("kind", "force_limit", "anti_windup", "anti_windup_time", "filters")
 )
 """Stage-file keys that every controller has."""
 
@@ -38,7 +40,10 @@ class ControllerSection(UncertainSection):
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
     anti_windup: AntiWindup | None = None
     anti_windup_time: Annotated[Value | None, Quantity("s", positive, "50 ms")] = None
+    filters: Annotated[Rows, FILTER_ARRAY] = Rows()
 
+    feeds_back: ClassVar[Literal["position", "velocity"]] = "position"
+    """What the filters of the feedback path act on."""
     bandwidth_key: ClassVar[str | None] = None
     """The numeric key [Hz] that states the bandwidth, where the controller has one."""
     bandwidth_name: ClassVar[str] = "crossover"

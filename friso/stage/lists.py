@@ -1,6 +1,8 @@
-"""Keys that take an array of values: `element_stiffness = ["40 N/um", "30 N/um"]`.
+"""Keys that take an array: of values, `element_stiffness = ["40 N/um", "30 N/um"]`, or of tables,
+`[[controller.filters]]`.
 
-In `Stage.flat` every element has a key of its own, numbered from 1: friction.element_stiffness.2.
+In `Stage.flat` every element has a key of its own, numbered from 1: friction.element_stiffness.2; those of tables have
+one for each of their keys: controller.filters.2.frequency.
 """
 
 from collections.abc import Callable, Mapping
@@ -25,6 +27,15 @@ class Values(tuple[Any, ...]):
     def text(self) -> list[Any]:
         """What the user wrote."""
         return [getattr(value, "text", value) for value in self]
+
+
+class Rows(tuple[Any, ...]):
+    """An array of tables."""
+
+    @property
+    def text(self) -> list[Any]:
+        """What the user wrote."""
+        return [row.as_written() for row in self]
 
 
 @dataclass(frozen=True)
@@ -78,3 +89,9 @@ class Several:
 def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:
     """The flat keys of the elements of an array, in order; none where the stage does not have it."""
     return [*takewhile(flat.__contains__, (f"{key}.{number}" for number in count(1)))]
+
+
+def row_keys(flat: Mapping[str, Any], key: str) -> list[str]:
+    """The beginnings of the flat keys of an array's tables, in order; none where the stage does not have it."""
+    places = (f"{key}.{number}" for number in count(1))
+    return [*takewhile(lambda place: any(name.startswith(f"{place}.") for name in flat), places)]

@@ -21,7 +21,7 @@ from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, as_toml, quoted
-from friso.stage.lists import Several, Values
+from friso.stage.lists import Rows, Several, Values, row_keys
 from friso.stage.plug_ins import load_installed
 
 
@@ -33,6 +33,16 @@ class Rule:
     holds: Callable[[Mapping[str, Any]], Any]
     expected: str
     example: str
+
+    def at(self, place: str) -> "Rule":
+        """The same between the keys of a table that stands at a place of the stage file."""
+        keys = tuple(f"{place}.{key}" for key in self.keys)
+        return Rule(keys, lambda flat: self.holds(keys_below(flat, place)), self.expected, self.example)
+
+
+def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
+    """The flat keys of a table, without its place."""
+    return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
 class Section(BaseModel):
@@ -82,11 +92,14 @@ class UncertainSection(Section):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The values by key; those of an array by key and number, from 1."""
+        """The values by key; those of an array by key and number, from 1, and those of tables in it by their own key."""
         values: dict[str, Any] = {}
         for key, value in self:
             if isinstance(value, Values):
                 values |= {f"{key}.{number}": item for number, item in enumerate(value, start=1)}
+            elif isinstance(value, Rows):
+                rows = enumerate(value, start=1)
+                values |= {f"{key}.{n}.{name}": item for n, row in rows for name, item in row.numbers.items()}
             else:
                 values[key] = value
         return values
@@ -166,6 +179,42 @@ class Variants:
         raise InputError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
 
 
+@dataclass(frozen=True)
+class TableArray:
+    """A key that takes an array of tables, `most` of them at most, of `variants`; `example` shows one."""
+
+    variants: Variants
+    example: str
+    most: int
+
+    def read(self, entries: Any) -> Rows:
+        """The sections for an array of tables. Raises InputError, under the number of the one that is wrong."""
+        size = len(entries) if isinstance(entries, list | tuple) else None
+        if size is None or size > self.most:
+            text = quoted(entries) if size is None else f"{size} tables"
+            raise InputError("", text, f"an array of at most {self.most} tables", self.example)
+        rows = []
+        for number, entry in enumerate(entries, start=1):
+            try:
+                rows.append(Table(self.variants.pick, self.example).read(entry))
+            except InputError as error:
+                raise error.under(str(number)) from None
+        return Rows(rows)
+
+    def rows(self, flat: Mapping[str, Any], key: str) -> dict[str, type[Section]]:
+        """The places of an array's tables in a stage given as flat keys, and their classes."""
+        return {place: self.variants.pick(keys_below(flat, place)) for place in row_keys(flat, key)}
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+def table_arrays(cls: type[Section]) -> dict[str, TableArray]:
+    """The keys of a table that take an array of tables."""
+    items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
+    return {key: item for key, item in items if isinstance(item, TableArray)}
+
+
 def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
     """Unit, bound and example of each numeric key of a table."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
@@ -232,6 +281,8 @@ def _described(cls: type[Section], key: str, kind: AxisKind) -> tuple[str, str]:
     for item in field.metadata:
         if isinstance(item, Table):
             return f"a table [{key}]", item.example
+        if isinstance(item, TableArray):
+            return f"an array of tables [[{key}]]", item.example
         if hasattr(item, "written_example"):
             item = item.on(kind) if hasattr(item, "on") else item
             return item.expected, f"{key} = {item.written_example}"

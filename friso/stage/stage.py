@@ -23,7 +23,16 @@ from friso.stage.controllers import (
 from friso.stage.flexure import Flexure, derived, with_material
 from friso.stage.lists import element_keys
 from friso.stage.rig import Cable, Drive, Floor, Rail
-from friso.stage.section import Rule, Section, Table, UncertainSection, list_fields, numeric_fields, unknown_key
+from friso.stage.section import (
+    Rule,
+    Section,
+    Table,
+    UncertainSection,
+    list_fields,
+    numeric_fields,
+    table_arrays,
+    unknown_key,
+)
 from friso.stage.tables import (
     FRICTION,
     MOTION,
@@ -174,8 +183,7 @@ class Stage(Section):
 
     def _written(self, rule: Rule) -> str:
         """The values that a rule is about, as the user wrote them."""
-        pairs = [key.split(".") for key in rule.keys]
-        values = [(name, getattr(getattr(self, table), name)) for table, name in pairs if getattr(self, table)]
+        values = [(key.split(".")[-1], _at(self, key)) for key in rule.keys if getattr(self, key.split(".")[0])]
         return ", ".join(f"{name} = {_written(getattr(value, 'text', value))}" for name, value in values)
 
     def as_written(self) -> dict[str, Any]:
@@ -242,7 +250,7 @@ class Stage(Section):
         lines = [f"{key} = {as_toml(text)}" for key, text in texts.items() if isinstance(text, str)]
         for name, table in texts.items():
             if isinstance(table, dict):
-                lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
+                lines += _table_lines(name, table)
         return "\n".join(lines).lstrip() + "\n"
 
 
@@ -265,10 +273,24 @@ def declared_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
     """The same in the units in which keys are declared, those of a linear axis."""
     keys: dict[str, Quantity | Number] = {}
     for name, cls in _tables(flat).items():
-        keys |= {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
-        for key, several in list_fields(cls).items():
-            keys |= dict.fromkeys(element_keys(flat, f"{name}.{key}"), several.of)
+        keys |= _numeric_keys_of(flat, name, cls)
     return keys
+
+
+def _numeric_keys_of(flat: Mapping[str, Any], name: str, cls: type[Section]) -> dict[str, Quantity | Number]:
+    """Those of a table, and of the tables in it."""
+    keys: dict[str, Quantity | Number] = {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
+    for key, several in list_fields(cls).items():
+        keys |= dict.fromkeys(element_keys(flat, f"{name}.{key}"), several.of)
+    for place, row in _rows(flat, name, cls):
+        keys |= _numeric_keys_of(flat, place, row)
+    return keys
+
+
+def _rows(flat: Mapping[str, Any], name: str, cls: type[Section]) -> Iterator[tuple[str, type[Section]]]:
+    """The tables in the arrays of a table: their places in the stage file, and their classes."""
+    for key, array in table_arrays(cls).items():
+        yield from array.rows(flat, f"{name}.{key}").items()
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
@@ -290,6 +312,9 @@ def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
             keys = tuple(key.replace("friction.", f"{name}.", 1) for key in rule.keys) if at_motor else rule.keys
             holds = rule.holds({**flat, **as_friction(flat)} if at_motor else flat)
             yield replace(rule, keys=keys), np.logical_not(holds)
+        for place, row in _rows(flat, name, owner):
+            for rule in (rule.at(place) for rule in row.rules):
+                yield rule, np.logical_not(rule.holds(flat))
 
 
 def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
@@ -313,6 +338,28 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
     }
     present = {key.split(".")[0] for key in flat}
     return {name: cls for name, cls in classes.items() if name in present}
+
+
+def _table_lines(name: str, table: Mapping[str, Any]) -> list[str]:
+    """How a table is written in TOML: its own keys, then the arrays of tables in it."""
+    arrays = {
+        key: value
+        for key, value in table.items()
+        if isinstance(value, list) and isinstance(next(iter(value), {}), dict)
+    }
+    lines = ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items() if key not in arrays)]
+    for key, rows in arrays.items():
+        for row in rows:
+            lines += ["", f"[[{name}.{key}]]", *(f"{inner} = {_toml(value)}" for inner, value in row.items())]
+    return lines
+
+
+def _at(stage: Stage, key: str) -> Any:
+    """What stands at a dotted key; None for nothing."""
+    value: Any = stage
+    for name in key.split("."):
+        value = value[int(name) - 1] if isinstance(value, tuple) else getattr(value, name)
+    return value
 
 
 def _toml(value: Any) -> str:
@@ -344,24 +391,28 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
     """Set or (None) remove a dotted key of nested tables, or set an element of an array. Raises StageError."""
     *path, last = key.split(".")
-    for name in path:
-        tables = tables.setdefault(name, {})
-        if isinstance(tables, list) and name == path[-1]:
-            _put_element(tables, key, value)
-            return
-        if not isinstance(tables, dict):
+    place: Any = tables
+    for depth, name in enumerate(path):
+        place = place[_number(place, key, depth)] if isinstance(place, list) else place.setdefault(name, {})
+        if not isinstance(place, dict | list):
             raise StageError(key, "an unknown key", f"{name} is not a table", 'controller.crossover="12 Hz"')
-    if value is not None:
-        tables[last] = value
-    elif tables.pop(last, None) is None:
+    if isinstance(place, list):
+        number = _number(place, key, len(path))
+        if value is None:
+            array = ".".join(path)
+            raise StageError(key, "an element to remove", f"the whole array {array} without it")
+        place[number] = value
+    elif value is not None:
+        place[last] = value
+    elif place.pop(last, None) is None:
         raise StageError(key, "a key to remove", "a key that the stage has")
 
 
-def _put_element(values: list[Any], key: str, value: Any) -> None:
-    """Set the element of an array that a dotted key ends with the number of. Raises StageError."""
-    array, _, number = key.rpartition(".")
+def _number(values: list[Any], key: str, depth: int) -> int:
+    """Which element of an array the part of a dotted key at a depth means. Raises StageError."""
+    parts = key.split(".")
+    number, array = parts[depth], ".".join(parts[:depth])
     if not (number.isascii() and number.isdigit() and 1 <= int(number) <= len(values)):
-        raise StageError(key, f"the element {number}", f"a number from 1 to {len(values)}", f"{array}.1")
-    if value is None:
-        raise StageError(key, "an element to remove", f"the whole array {array} without it")
-    values[int(number) - 1] = value
+        expected = f"a number from 1 to {len(values)}" if values else "no number: the array is empty"
+        raise StageError(key, f"the element {number}", expected, f"{array}.1")
+    return int(number) - 1

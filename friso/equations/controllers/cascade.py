@@ -1,10 +1,10 @@
 """The cascade of servo drives: a position loop that commands a velocity to a velocity loop.
 
-Position loop: v = kv (e + (1/T_p) int e dt) + f dr/dt. Velocity loop: F = kp ((v - dy/dt) + (1/T_v) int (v - dy/dt) dt),
+Position loop: v = kv (e + (1/T_p) int e dt) + f dr/dt. Velocity loop: F = kp (w + (1/T_v) int w dt) with w = v - dy/dt,
 and the force that the move itself is believed to need. An integral without its time is absent. With the proportional
-part on the measurement alone, F = kp ((1/T_v) int (v - dy/dt) dt - dy/dt), it is pseudo-derivative feedback (Phelan
-1977, Automatic Control Systems; Ellis 2012, Control System Design Guide, chapter 6). The structure is that of EMPS
-(Janot, Gautier, Brunot 2019) and of drives in general (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives).
+part on the measurement alone, F = kp ((1/T_v) int w dt - dy/dt), it is pseudo-derivative feedback (Phelan 1977,
+Automatic Control Systems; Ellis 2012, Control System Design Guide, chapter 6). The structure is that of EMPS (Janot,
+Gautier, Brunot 2019) and of drives in general (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives).
 """
 
 from __future__ import annotations
@@ -65,6 +65,7 @@ class Cascade(ControllerSection):
         {"kv": 1, "kp": 1, "position_integral_time": -1, "velocity_integral_time": -1, "velocity_filter": -1}
     )
     loop_gain = ("kp",)
+    feeds_back = "velocity"
     decisive = ("velocity_filter", *FEEDFORWARD)
     shares: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"p": "position loop", "v": "velocity", "i": "integral", "f": "feedforward"}
@@ -73,7 +74,7 @@ class Cascade(ControllerSection):
         {
             "kv": "Position gain kv",
             "kp": "Velocity gain kp",
-            "velocity_integral_time": "Integral time of the velocity loop",
+            "velocity_integral_time": "Integral time of velocity",
         }
     )
 
@@ -116,7 +117,7 @@ class Cascade(ControllerSection):
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
         lag = blocks.key("velocity_filter") if variant.filtered else None
-        velocity = blocks.derivative(measured.position, "position", lag)
+        velocity = blocks.fed_back(blocks.derivative(measured.position, "position", lag))
         command = measured.error * kv
         if variant.position_integral:
             gain = kv / blocks.key("position_integral_time")

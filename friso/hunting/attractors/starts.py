@@ -23,8 +23,8 @@ LIMITED = np.geomspace(500.0, 30000.0, 8)
 limit moves the masses in the time in which the integrator unwinds."""
 
 OUTER = -10.0, -1.0, 1.0, 10.0
-"""How far integrals of outer loops have wound up at first, where there are several: times for which they have integrated
-the distance, in units of the time in which the loop moves."""
+"""How far integrals of outer loops have wound up at first, where there are several: times for which they have
+integrated the distance, in units of the time in which the loop moves."""
 
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""

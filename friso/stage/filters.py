@@ -1,0 +1,201 @@
+"""The tables [[controller.filters]]: transfer functions of up to the second order, in the order of the signal."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from math import pi, sqrt
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
+
+from friso.quantities import Number, Quantity, Value, any_sign, non_negative, positive
+from friso.stage.lists import Several, Values, row_keys
+from friso.stage.section import Rule, TableArray, UncertainSection, Variants, keys_below
+
+FORWARD, FEEDBACK = "forward", "feedback"
+"""What a filter acts on: the force that is demanded, or what is measured."""
+
+MOST = 12
+"""Filters of a controller at most."""
+
+Polynomial = tuple[Any, Any, Any]
+"""Coefficients of 1, s [s] and s^2 [s^2]."""
+
+
+class Transfer(NamedTuple):
+    """A transfer function; its lower polynomial begins with 1."""
+
+    upper: Polynomial
+    lower: Polynomial
+
+
+class FilterSection(UncertainSection):
+    """Base of the filters, each of which declares its keys, `kind: Literal["name"]`, and its transfer function."""
+
+    kind: Any
+    path: Literal["forward", "feedback"] = FORWARD
+
+    @classmethod
+    def variant(cls, row: Mapping[str, Any]) -> Hashable:
+        """What else its equations depend on, such as its order; `row` are its keys."""
+        return None
+
+    @classmethod
+    def transfer(cls, row: Mapping[str, Any], variant: Any) -> Transfer:
+        """The transfer function from its keys, numbers or symbols."""
+        raise NotImplementedError
+
+
+FILTERS = Variants("kind")
+FILTER_ARRAY = TableArray(FILTERS, '[[controller.filters]] kind = "notch", frequency = "300 Hz" ...', MOST)
+
+
+@FILTERS.register
+class Notch(FilterSection):
+    """(s^2 + (1 - depth) w s + w_0^2)/(s^2 + w s + w_0^2), w being the width between the points at -3 dB of a notch
+    that is as deep as can be."""
+
+    kind: Literal["notch"]
+    frequency: Annotated[Value, Quantity("Hz", positive, "300 Hz")]
+    width: Annotated[Value, Quantity("Hz", positive, "100 Hz")]
+    depth: Annotated[float, Number(any_sign, "0.9")] = 1.0
+    """Share of the signal that is taken away at the frequency."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(("depth",), lambda f: (f["depth"] > 0) & (f["depth"] <= 1), "a depth above 0, 1 at most", "depth = 0.9"),
+    )
+
+    @classmethod
+    def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        omega, width = _omega(row["frequency"]), _omega(row["width"])
+        damping, bend = width / omega**2, 1 / omega**2
+        return Transfer((1, (1 - row["depth"]) * damping, bend), (1, damping, bend))
+
+
+@FILTERS.register
+class LowPass(FilterSection):
+    """1/(1 + s/w_0), or of the second order 1/(1 + 2 zeta s/w_0 + s^2/w_0^2)."""
+
+    kind: Literal["low_pass"]
+    frequency: Annotated[Value, Quantity("Hz", positive, "1 kHz")]
+    order: Literal[1, 2] = 1
+    damping_ratio: Annotated[float, Number(positive, "0.7")] = sqrt(0.5)
+    """Of one of the second order."""
+
+    @classmethod
+    def variant(cls, row: Mapping[str, Any]) -> int:
+        return int(row["order"])
+
+    @classmethod
+    def transfer(cls, row: Mapping[str, Any], variant: int) -> Transfer:
+        omega = _omega(row["frequency"])
+        lower = (1, 1 / omega, 0) if variant == 1 else _second_order(omega, row["damping_ratio"])
+        return Transfer((1, 0, 0), lower)
+
+
+@FILTERS.register
+class LeadLag(FilterSection):
+    """(1 + s/w_z)/(1 + s/w_p): a lead where the zero is the slower one."""
+
+    kind: Literal["lead_lag"]
+    zero_frequency: Annotated[Value, Quantity("Hz", positive, "20 Hz")]
+    pole_frequency: Annotated[Value, Quantity("Hz", positive, "200 Hz")]
+
+    @classmethod
+    def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        zero, pole = (_omega(row[f"{place}_frequency"]) for place in ("zero", "pole"))
+        return Transfer((1, 1 / zero, 0), (1, 1 / pole, 0))
+
+
+@FILTERS.register
+class Biquad(FilterSection):
+    """(1 + 2 zeta_z s/w_z + s^2/w_z^2)/(1 + 2 zeta_p s/w_p + s^2/w_p^2), by its zeros and poles."""
+
+    kind: Literal["biquad"]
+    zero_frequency: Annotated[Value, Quantity("Hz", positive, "180 Hz")]
+    zero_damping: Annotated[float, Number(non_negative, "0.05")]
+    pole_frequency: Annotated[Value, Quantity("Hz", positive, "220 Hz")]
+    pole_damping: Annotated[float, Number(any_sign, "0.5")]
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("pole_damping",),
+            lambda f: f["pole_damping"] > 0,
+            "a filter that is stable: poles with a damping ratio greater than 0",
+            "pole_damping = 0.5",
+        ),
+    )
+
+    @classmethod
+    def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        zeros, poles = (
+            _second_order(_omega(row[f"{place}_frequency"]), row[f"{place}_damping"]) for place in ("zero", "pole")
+        )
+        return Transfer(zeros, poles)
+
+
+@FILTERS.register
+class SampledBiquad(FilterSection):
+    """y = b0 u + b1 u' + b2 u'' - a1 y' - a2 y'', primes for samples before, as drives take it.
+
+    In continuous time it is the filter of which these are the coefficients by the bilinear transform at `sample_time`.
+    """
+
+    kind: Literal["sampled_biquad"]
+    numerator: Annotated[Values, Several(Number(any_sign, "0.94"), ("0.94", "-1.85", "0.93"), 3, 3)]
+    denominator: Annotated[Values, Several(Number(any_sign, "-1.85"), ("-1.85", "0.87"), 2, 2)]
+    """a1 and a2."""
+    sample_time: Annotated[Value, Quantity("s", positive, "125 us")]
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("denominator",),
+            lambda f: (abs(f["denominator.2"]) < 1) & (abs(f["denominator.1"]) < 1 + f["denominator.2"]),
+            "a filter that is stable: abs(a2) < 1 and abs(a1) < 1 + a2",
+            "denominator = [-1.85, 0.87]",
+        ),
+    )
+
+    @classmethod
+    def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        half = row["sample_time"] / 2
+        b0, b1, b2 = (row[f"numerator.{n}"] for n in (1, 2, 3))
+        a1, a2 = (row[f"denominator.{n}"] for n in (1, 2))
+        total = 1 + a1 + a2
+        upper = (b0 + b1 + b2, 2 * half * (b0 - b2), half**2 * (b0 - b1 + b2))
+        lower = (total, 2 * half * (1 - a2), half**2 * (1 - a1 + a2))
+        return Transfer(*(tuple(part / total for part in polynomial) for polynomial in (upper, lower)))
+
+
+def _omega(frequency: Any) -> Any:
+    """Angular frequency [rad/s] of one in hertz, exact where it is a symbol."""
+    if isinstance(frequency, float):
+        return 2 * pi * frequency
+    from sympy import pi as exact
+
+    return 2 * exact * frequency
+
+
+def _second_order(omega: Any, damping: Any) -> Polynomial:
+    return (1, 2 * damping / omega, 1 / omega**2)
+
+
+class FilterForm(NamedTuple):
+    """A filter by its kind, where it acts, and what else its equations depend on."""
+
+    kind: str
+    path: str
+    variant: Hashable
+
+    @property
+    def law(self) -> type[FilterSection]:
+        """The class that declares its transfer function."""
+        return FILTERS.classes[self.kind]  # type: ignore[return-value]
+
+
+def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
+    """The filters of a stage given as flat keys, the array having a `key`."""
+    forms = []
+    for place in row_keys(flat, key):
+        row = keys_below(flat, place)
+        law: Any = FILTERS.classes[row["kind"]]
+        forms.append(FilterForm(row["kind"], row["path"], law.variant(row)))
+    return tuple(forms)

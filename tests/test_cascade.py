@@ -1,0 +1,339 @@
+"""Position loop over velocity loop: against models by hand, python-control and difference equations, and through the
+commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import control
+import numpy as np
+import plain
+import pytest
+import sympy as sp
+from patched import patched
+from scipy.integrate import solve_ivp
+from variants import cascade, gains, limit, lugre, release, stage, step, there_and_back
+
+import friso
+from friso.equations.bandwidth import faster
+from friso.equations.blocks import Loop
+from friso.equations.component import state
+from friso.equations.continuous import slow_gains
+from friso.equations.sampled import SAMPLE_TIME, sampled_controller
+from friso.equations.structure import controller_form
+from friso.frequency import crossover
+from friso.frequency.margins import margins
+from friso.frequency.members import limit_cases
+from friso.identify.experiments.moves import identify_moves
+from friso.identify.output_error.problem import closed_loop
+from friso.identify.readings.common import record
+from friso.progress import silent
+from friso.stage import Stage
+from friso.studies.compare import study
+from friso.studies.compare.study import compare
+from friso.studies.rig.experiments import hunting as rig_hunting
+from friso.studies.rig.hunted import rails
+from friso.views.compare.words import sentences as comparison_sentences
+from friso.views.rig.page import sentences
+
+KV, KP, T_V, T_P, MASS = 60.0, 50.0, 0.03, 0.09, 1.7
+
+PI = cascade(velocity_integral_time="30 ms")
+"""P position, PI velocity: in motion about a reference at rest that is a PID with the derivative on the measurement."""
+
+AS_PID = gains(KP * (KV + 1 / T_V), KP * KV / T_V, KP, extra='derivative_on = "measurement"\n')
+
+BOTH = cascade(position_integral_time="90 ms", velocity_integral_time="30 ms")
+
+INTEGRAL_TIME = "controller.velocity_integral_time"
+
+
+def rigid(controller: str, motion: str = "") -> Stage:
+    return stage(motion or release("2 mm", "20 s"), friction=lugre(2), controller=controller)
+
+
+def by_radau(machine: Stage, names: tuple[str, ...], times: np.ndarray, start: dict[str, float]) -> np.ndarray:
+    """Positions [m] at times [s], by SciPy from equations written by hand."""
+    right_hand_side = plain.rates(machine.flat(), names)
+    begin = [start.get(name, 0.0) for name in names]
+    run = solve_ivp(right_hand_side, (0.0, times[-1]), begin, "Radau", times, rtol=1e-8, atol=1e-12, max_step=5e-3)
+    return run.y[names.index("position")]
+
+
+def test_slow_gains_are_those_of_the_pid_that_it_is() -> None:
+    assert slow_gains(rigid(PI).flat()) == pytest.approx(slow_gains(rigid(AS_PID).flat()))
+
+
+def test_trace_against_radau() -> None:
+    """A move with feedforward, force limit and both integrals, friction and all."""
+    more = "velocity_feedforward = 0.9\n" + limit("6 N", "none")
+    motion = there_and_back("0.6 s", "0.3 s", "2 m/s^2")
+    ahead = {"acceleration_feedforward": "1.5 kg", "coulomb_feedforward": "1 N", "velocity_filter": "1 ms"}
+    times = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms"}
+    machine = rigid(cascade(**ahead, **times, extra=more), motion)
+    run = friso.simulate(machine, 1e-9, 2e-3)
+    names = (
+        "position",
+        "velocity",
+        "bristle_deflection",
+        "filtered_position",
+        "position_integral",
+        "velocity_integral",
+    )
+    by_hand = solve_in_pieces(machine, names, run["time"].values, (0.03, 0.06, 0.3, 0.33, 0.36))
+    assert np.abs(run["position"].values - by_hand).max() < 2e-6 * np.abs(by_hand).max()
+    assert {*np.unique(run["force"].values >= 6 - 1e-9)} == {False, True}
+
+
+def solve_in_pieces(
+    machine: Stage, names: tuple[str, ...], times: np.ndarray, corners: tuple[float, ...]
+) -> np.ndarray:
+    """The same, begun anew at every corner of the reference."""
+    right_hand_side, x, positions = plain.rates(machine.flat(), names), np.zeros(len(names)), []
+    ends = (0.0, *corners, times[-1])
+    for start, end in zip(ends, ends[1:], strict=False):
+        wanted = times[(times >= start) & (times < end)]
+        run = solve_ivp(
+            right_hand_side, (start, end), x, "Radau", dense_output=True, rtol=1e-9, atol=1e-13, max_step=2e-3
+        )
+        positions.append(run.sol(wanted)[0])
+        x = run.y[:, -1]
+    return np.concatenate([*positions, [x[0]]])
+
+
+@pytest.fixture(scope="module")
+def hunting() -> friso.Hunting:
+    return friso.hunting(rigid(PI))
+
+
+def test_hunting_is_that_of_the_pid_that_it_is(hunting: friso.Hunting) -> None:
+    (cycle,), (same,) = hunting.attracting, friso.hunting(rigid(AS_PID)).attracting
+    assert cycle.amplitude == pytest.approx(same.amplitude, rel=1e-5)
+    assert cycle.period == pytest.approx(same.period, rel=1e-5)
+    assert cycle.multiplier == pytest.approx(same.multiplier, rel=1e-3, abs=1e-4)
+    assert cycle.growth == pytest.approx(cycle.multiplier, rel=1e-2, abs=1e-3)
+
+
+def test_verdict_against_radau(hunting: friso.Hunting) -> None:
+    """From a release it ends in the cycle."""
+    names = ("position", "velocity", "bristle_deflection", "velocity_integral")
+    start = {"position": 2e-3, "velocity_integral": 2e-3 * T_V / KP * 0}
+    cycle = hunting.attracting[0]
+    times = np.linspace(0.0, 12 * cycle.period, 24001)
+    last = by_radau(rigid(PI), names, times, start)[times > 10 * cycle.period]
+    assert (last.max() - last.min()) / 2 == pytest.approx(cycle.amplitude, rel=1e-3)
+
+
+@pytest.fixture(scope="module")
+def two() -> friso.Hunting:
+    return friso.hunting(rigid(BOTH))
+
+
+def test_two_integrals_against_radau(two: friso.Hunting) -> None:
+    """The state that winds up is not one number any more: the cycle is one all the same, or there is none."""
+    names = ("position", "velocity", "bristle_deflection", "position_integral", "velocity_integral")
+    (cycle,) = two.attracting
+    times = np.linspace(0.0, 16 * cycle.period, 32001)
+    last = by_radau(rigid(BOTH), names, times, {"position": 2e-3})[times > 13 * cycle.period]
+    assert (last.max() - last.min()) / 2 == pytest.approx(cycle.amplitude, rel=1e-3)
+
+
+def loop_by_hand(s: Any, position: float, velocity: float, lag: float) -> Any:
+    """Force over minus the position of the stage [N/m]."""
+    measured = s / (1 + lag * s)
+    inner = KP * (1 + 1 / (velocity * s))
+    return inner * (KV * (1 + 1 / (position * s)) + measured)
+
+
+@pytest.mark.parametrize("proportional_on", ["error", "measurement"])
+def test_loops_against_python_control(proportional_on: str) -> None:
+    lag = 1e-3
+    keys = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms", "velocity_filter": "1 ms"}
+    machine = rigid(cascade(**keys, proportional_on=proportional_on))
+    s = control.tf("s")
+    outer, measured = KV * (1 + 1 / (T_P * s)), s / (1 + lag * s)
+    inner = KP / (T_V * s)
+    loop = (inner * (outer + measured) + KP * measured + (KP * outer if proportional_on == "error" else 0)) / (
+        MASS * s**2 + 0.5 * s
+    )
+    ours = friso.linear(machine, "sliding", "open")
+    omega = np.geomspace(0.1, 1e5, 200)
+    slides = friso.linear(machine, "sliding")(1j * omega) * (MASS * (1j * omega) ** 2 + 0.5j * omega)
+    assert np.abs(slides - 1).max() < 2e-2  # friction at high speed is viscous, nearly
+    theirs = loop(1j * omega) * slides
+    assert ours(1j * omega) == pytest.approx(theirs, rel=1e-9)
+    flat = machine.flat()
+    gain, phase, _, _, _, _ = control.stability_margins(control.ss(ours))
+    exact = margins(flat, limit_cases(flat)["sliding"])
+    assert exact.stable
+    assert exact.phase_margin == pytest.approx(phase, rel=1e-5)
+    assert min(exact.gain_margin, 1 / exact.gain_reduction) == pytest.approx(max(gain, 1 / gain), rel=1e-4) or (
+        exact.gain_margin == np.inf
+    )
+
+
+def test_feedforward_of_a_perfect_model_leaves_no_error() -> None:
+    """The closed loop from the reference with its derivatives is 1: no error whatever the move, but for friction."""
+    ahead = {"acceleration_feedforward": "1.7 kg", "viscous_feedforward": "0.5 N*s/m"}
+    machine = rigid(cascade(velocity_integral_time="30 ms", **ahead, extra="velocity_feedforward = 1\n"))
+    machine = machine.replace({"friction": None}).replace({"controller.viscous_feedforward": "0 N*s/m"})
+    closed = friso.linear(machine, part="closed")
+    assert [*closed.input_labels][-2:] == ["reference velocity", "reference acceleration"]
+    s = 2j * np.pi * np.array([0.3, 3.0, 30.0])
+    answers = closed(s)[closed.output_labels.index("stage")]
+    r = [answers[closed.input_labels.index(name)] for name in ("reference", *closed.input_labels[-2:])]
+    assert r[0] + s * r[1] + s**2 * r[2] == pytest.approx(1.0)
+
+
+def difference_equations(flat: dict[str, Any], error: np.ndarray, reading: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """The forces of a drive: the filter by Tustin, both integrals summed up, clamped at the limit."""
+    key = {name.removeprefix("controller."): value for name, value in flat.items()}
+    t, lag = flat["drive.sample_time"], key["velocity_filter"]
+    low, before, outer, inner = reading[0], reading[0], 0.0, 0.0
+    forces = []
+    for e, y, r_rate in zip(error, reading, speed, strict=True):
+        low = ((2 * lag - t) * low + t * (y + before)) / (2 * lag + t)
+        velocity, before = (y - low) / lag, y
+
+        def force(outer: float, inner: float, e: float = e, r: float = r_rate, v: float = velocity) -> float:
+            wanted = key["kv"] * (e + outer / key["position_integral_time"]) + key["velocity_feedforward"] * r
+            ahead = key["viscous_feedforward"] * r + key["coulomb_feedforward"] * np.sign(r)
+            return key["kp"] * (wanted - v + inner / key["velocity_integral_time"]) + ahead
+
+        def share(outer: float, e: float = e, r: float = r_rate, v: float = velocity) -> float:
+            return t * (key["kv"] * (e + outer / key["position_integral_time"]) + key["velocity_feedforward"] * r - v)
+
+        demand = force(outer + t * e, inner + share(outer + t * e))
+        pressing = np.sign(demand) * (abs(demand) > key["force_limit"])
+        outer += t * e * (pressing * e <= 0)
+        inner += share(outer) * (pressing * share(outer) <= 0)
+        forces.append(np.clip(force(outer, inner), -key["force_limit"], key["force_limit"]))
+    return np.array(forces)
+
+
+def test_sampled_blocks_are_the_difference_equations() -> None:
+    ahead = {"viscous_feedforward": "0.5 N*s/m", "coulomb_feedforward": "1 N", "velocity_filter": "2 ms"}
+    times = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms"}
+    machine = rigid(cascade(**ahead, **times, extra="velocity_feedforward = 0.9\n" + limit("6 N")))
+    flat = {**machine.flat(), "drive.sample_time": 1e-3}
+    rng = np.random.default_rng(1)
+    reading, reference = rng.normal(size=(2, 300)).cumsum(axis=1) * 2e-4
+    speed = np.where(np.arange(300) % 50 < 10, 0.0, rng.normal(size=300) * 1e-2)
+    e, y, r = sp.symbols("e y r", real=True)
+    way = sp.Piecewise((1, r > 0), (-1, r < 0), (0, True))
+    force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, r, sp.S.Zero, way), 1)
+    keys = {symbol: flat[str(symbol)] for part in (force, *(h.update for h in held)) for symbol in part.free_symbols
+            if str(symbol) in flat}  # fmt: skip
+    step_once = sp.lambdify([e, y, r, *(h.symbol for h in held)], [part.subs(keys) for part in (force, *(h.update for h in held))], "math")  # fmt: skip
+    kept = [reading[0] if h.symbol in (state("signal_before_position"), state("low_passed_position")) else 0.0 for h in held]  # fmt: skip
+    forces = []
+    for row in zip(reference - reading, reading, speed, strict=True):
+        now, *kept = step_once(*row, *kept)
+        forces.append(now)
+    by_hand = difference_equations(flat, reference - reading, reading, speed)
+    assert np.abs(np.array(forces) - by_hand).max() < 1e-11
+    assert np.abs(by_hand).max() == 6.0
+    assert str(SAMPLE_TIME) in flat
+
+
+# what the house asks of any controller
+
+
+def test_it_is_written_read_and_made_faster() -> None:
+    machine = rigid(BOTH)
+    assert friso.loads(machine.to_toml()) == machine
+    quicker = faster(machine.flat(), 2.0)
+    assert quicker["controller.kv"] == 120.0
+    assert quicker["controller.kp"] == 100.0
+    assert quicker[INTEGRAL_TIME] == 0.015
+    assert rigid(cascade(kv="1 (m/min)/mm")).flat()["controller.kv"] == pytest.approx(1000 / 60)
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({"controller.kv": "60 Hz"}, ["controller.kv", "2 pi", '"60 1/s"']),
+        ({"controller.proportional_on": "measurement", INTEGRAL_TIME: None}, ["proportional_on", "pseudo-derivative"]),
+        ({"controller.velocity_feedforward": -1}, ["velocity_feedforward", "0 or greater"]),
+    ],
+)
+def test_what_is_wrong_is_told(changes: dict[str, Any], parts: list[str]) -> None:
+    with pytest.raises(friso.StageError) as refused:
+        rigid(PI).replace(changes)
+    assert all(part in str(refused.value) for part in parts), str(refused.value)
+
+
+EDGE = 0.030
+"""Placeholder."""
+
+
+def test_boundary_and_map_agree_on_where_hunting_ends() -> None:
+    """In the integral time of the velocity loop."""
+    machine = rigid(PI)
+    found = friso.boundary(machine, {INTEGRAL_TIME: "20 ms..200 ms"})
+    ends = sorted(found.value(point.point.place) for points in found.special for point in points)
+    assert ends
+    inside, outside = ends[0] * 0.97, ends[0] * 1.03
+    runs = friso.sweep(machine, {INTEGRAL_TIME: ([inside, outside], "s")}, metrics=["multiplier"])
+    first, second = np.abs(runs["multiplier"].values)
+    assert (first < 1) != (second < 1)
+
+
+DRIVE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
+
+
+@pytest.fixture(scope="module")
+def whole() -> Stage:
+    coarse = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
+    keys = {
+        "kind": "cascade",
+        "kv": "60 1/s",
+        "kp": "50 N*s/m",
+        "velocity_integral_time": "30 ms",
+        "force_limit": "200 N",
+    }
+    return friso.load(DRIVE).replace({**coarse, "controller": keys})
+
+
+def test_bode_with_sampling_and_delay(whole: Stage) -> None:
+    slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
+    fast = friso.bode(whole)
+    assert fast.limits["free"].highest_stable < slow.limits["free"].highest_stable
+
+
+def test_rig_hunting(whole: Stage) -> None:
+    sizes = {
+        "CROSSOVERS": np.array([1.0, 3.0]),
+        "SHOWN": (0, 1),
+        "DISPLACEMENTS": (0.02,),
+        "rails": lambda machine: rails(machine)[:2],
+    }
+    with patched({rig_hunting: sizes}):
+        outcome = rig_hunting.run_experiment(whole, 1, silent)
+    assert all(sentences(outcome))
+
+
+def test_compare(whole: Stage) -> None:
+    with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
+        found = compare(whole, 20, 1)
+    assert {"a", "c", "d", "e", "f"} <= {result.option.letter for result in found.results}
+    assert all(comparison_sentences(found))
+
+
+def test_identify_in_its_own_loop(whole: Stage) -> None:
+    """A log that its own sampled loop wrote gives mass and friction back."""
+    plain_axis = {"joint": None, "parasitic": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}}
+    one = whole.replace(plain_axis)
+    flat, time = one.flat(), np.arange(4000) * 1e-3
+    reference = 0.02 * (1 - np.cos(2 * np.pi * time))
+    blank = record("given", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
+    truth = closed_loop(flat, blank, blank.segments[0], ()).record(np.zeros(0))
+    log = record("moves", 1e-3, reference=reference, position=truth.position, force=truth.force)
+    estimates = {estimate.name: estimate.value for estimate in identify_moves(log, flat, own_loop=True).estimates}
+    assert sum(estimates[key] for key in flat if key.startswith("masses.")) == pytest.approx(1.7, rel=0.01)
+    assert estimates["friction.coulomb"] == pytest.approx(1.0, rel=0.05)
+
+
+def test_steps_rest_where_there_is_no_integral() -> None:
+    assert friso.check(rigid(cascade(), step("1 mm", "3 s")))["given"].verdict == "settles"
