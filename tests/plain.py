@@ -156,10 +156,10 @@ def control(
         tau_i = flat["controller.beta"] * tau_z
         tau_p = 1 / (omega * sqrt(1 / alpha))
         k_p = flat["controller.tuned_mass"] * omega**2 / sqrt(1 / alpha)
-        filtered = s["filtered_error"]
-        slope = (error - filtered) / tau_p
-        demand = k_p * ((1 + tau_z / tau_i) * filtered + s["integral"] / tau_i + tau_z * slope)
-        rates, winding = {"filtered_error": slope}, filtered
+        passed = s["filtered_error"]
+        slope = (error - passed) / tau_p
+        demand = k_p * ((1 + tau_z / tau_i) * passed + s["integral"] / tau_i + tau_z * slope)
+        rates, winding = {"filtered_error": slope}, passed
     else:
         kp, ki, kd, tau = (flat[f"controller.{name}"] for name in ("kp", "ki", "kd", "tau"))
         rates = {}

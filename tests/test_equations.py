@@ -94,8 +94,9 @@ def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleT
 
 
 def test_every_state_and_kink_matters(name: str) -> None:
-    """No dead states or kinks: each appears in the right-hand side."""
+    """No dead states or kinks: each appears in the right-hand side, or lets states jump."""
     used = set().union(*(sp.sympify(f).free_symbols for f in model(name).rhs))
+    used |= {kink.beyond for kink in model(name).jumps}
     dead = {kink.name for kink in model(name).kinks if kink.beyond not in used}
     assert dead == set()
     assert set(model(name).symbols) - {sp.Symbol("position", real=True)} <= used

@@ -18,6 +18,7 @@ from friso.equations.component import STEADY, Component, Held, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
 from friso.stage.filters import FEEDBACK, FORWARD, Polynomial
+from friso.stage.standstill import Settings
 
 
 @dataclass(frozen=True)
@@ -134,6 +135,11 @@ class Blocks(ABC):
         """The parameter with this name in the table [controller] [SI]."""
         return key(ControllerSection.key(name))
 
+    @property
+    def settings(self) -> Settings:
+        """Which settings against friction there are."""
+        return self.form.settings if self.form else Settings()
+
     @abstractmethod
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
         """1/(1 + tau s), tau [s]."""
@@ -162,6 +168,18 @@ class Blocks(ABC):
     @abstractmethod
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """The signal clamped to plus and minus a limit."""
+
+    @abstractmethod
+    def at_standstill(self, total: Signal, error: Signal) -> Signal:
+        """The force with the gains of standstill, where the error is small; what integrals hold stays."""
+
+    @abstractmethod
+    def push(self, error: Signal, direction: Signal) -> Signal:
+        """A force towards the reference, where that rests and the error is not small."""
+
+    @abstractmethod
+    def dither(self) -> Signal:
+        """A sinusoidal force."""
 
     def fed_back(self, signal: Signal) -> Signal:
         """A signal that is measured, behind the filters of the feedback path."""
@@ -205,21 +223,31 @@ class _Row(dict[str, sp.Symbol]):
 
 @dataclass(frozen=True)
 class Demand:
-    """The shares of a controller's force by name, their sum, and the force demanded behind the filters [N]."""
+    """The shares of a controller's force by name, their sum, and the force demanded with what is added against friction
+    and behind the filters [N]; and the error [m] that is measured."""
 
     shares: Mapping[str, Signal]
     total: Signal
     force: Signal
+    error: Signal
 
 
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
     """What a controller demands for what it measures."""
+    error, settings = seen.error, form.settings
     if form.law.feeds_back == "position":
         position = blocks.fed_back(seen.position)
         seen = replace(seen, position=position, error=seen.error + seen.position - position)
     shares = form.law.declare(seen, blocks, form.variant)
     total = sum(shares.values(), start=Blocks.nothing)
-    return Demand(shares, total, blocks.fed_forward(total))
+    added = total
+    if settings.gains:
+        added = blocks.at_standstill(total, error)
+    if settings.push:
+        added += blocks.push(error, seen.reference_direction)
+    if settings.dither:
+        added += blocks.dither()
+    return Demand(shares, total, blocks.fed_forward(added), error)
 
 
 def force_limit() -> sp.Symbol:

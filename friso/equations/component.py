@@ -92,6 +92,16 @@ class gaussian(sp.Function):
     nargs = 2
 
 
+class sine(sp.Function):
+    """sin(2 pi x) of a number of turns x (`friso.engine`)."""
+
+    nargs = 1
+
+    def fdiff(self, argindex: int = 1) -> sp.Expr:
+        """2 pi cos(2 pi x)."""
+        return 2 * sp.pi * sine(self.args[0] + sp.Rational(1, 4))
+
+
 class quantised(sp.Function):
     """A number in whole digits, the size of which comes second; as it is where that is 0 (`friso.engine`)."""
 
@@ -105,11 +115,13 @@ class Kink:
     `beyond` is the symbol that is 1 where `surface` > 0 and 0 where it is < 0; the right-hand side contains
     it instead of an absolute value or a condition, and so is smooth while it is held. Within about `narrow` of the
     surface, in its own unit, the right-hand side may have a peak that a long step across the surface would pass over.
+    Where the surface contains the sides of other kinks, it `starts` as that, with conditions in their place.
     """
 
     name: str
     surface: sp.Expr
     narrow: sp.Expr = field(default=sp.S.Zero, kw_only=True, compare=False)
+    starts: sp.Expr | None = field(default=None, kw_only=True, compare=False)
 
     @property
     def beyond(self) -> sp.Symbol:
@@ -123,7 +135,11 @@ class Kink:
     @property
     def at_start(self) -> sp.Expr:
         """Positive in the states from which a run begins beyond."""
-        return self.surface
+        return self.surface if self.starts is None else self.starts
+
+    def beginning(self, sides: Mapping[Any, Any]) -> Kink:
+        """The same, its surface beginning with conditions in the place of the sides of other kinks."""
+        return Kink(self.name, self.surface, narrow=self.narrow, starts=cast(sp.Expr, self.surface.xreplace(sides)))
 
     def called(self, name: str) -> Self:
         """The same with another name; `beyond` is to be replaced in what contains it."""
@@ -132,7 +148,8 @@ class Kink:
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
         """The same with expressions put in the place of others."""
         surface, narrow = (cast(sp.Expr, expression.xreplace(values)) for expression in (self.surface, self.narrow))
-        return Kink(self.name, surface, narrow=narrow)
+        starts = None if self.starts is None else cast(sp.Expr, self.starts.xreplace(values))
+        return Kink(self.name, surface, narrow=narrow, starts=starts)
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
-from friso.equations.component import STEADY, Component, Kink, Output, Role, State, state
+from friso.equations.component import STEADY, TIME, Component, Kink, Output, Role, State, Switch, sine, state
 from friso.equations.structure import ControllerForm, controller_form
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
 from friso.stage.filters import Polynomial
@@ -44,7 +44,9 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
         for term, name in form.law.shares.items()
     }
     states, resting = blocks.finished(demand, bound)
-    return Controller(force, Component(states, (*blocks.kinks, *kinks, *resting), outputs))
+    sides = {kink.beyond: sp.Piecewise((1, kink.surface > 0), (0, True)) for kink in blocks.kinks}
+    others = (kink.beginning(sides) if kink.surface.free_symbols & {*sides} else kink for kink in (*kinks, *resting))
+    return Controller(force, Component(states, (*blocks.kinks, *others), outputs))
 
 
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
@@ -111,6 +113,7 @@ class Continuous(Blocks):
     def __init__(self, rate: sp.Expr, form: ControllerForm | None = None) -> None:
         super().__init__(form)
         self.rate = rate
+        self.gains: sp.Expr = sp.S.One  # the factor of standstill
         self.states: list[State] = []
         self.kinks: list[Kink] = []
         self._integrals: list[_Integral] = []
@@ -169,6 +172,50 @@ class Continuous(Blocks):
         self.kinks += kinks
         return replace(signal, value=value, rate=None)
 
+    def at_standstill(self, total: Signal, error: Signal) -> Signal:
+        """With a kink where the error is as large as the window."""
+        window, factor = map(self.key, ("standstill_window", "standstill_factor"))
+        inside = Kink("standstill", window**2 - error.value**2)
+        self.kinks.append(inside)
+        self.gains = 1 + (factor - 1) * inside.beyond
+        settled = sp.Piecewise((factor, error.settled**2 < window**2), (1, True))
+        integrals = [integral.symbol for integral in self._integrals]
+        value, resting = (
+            held + gains * (part - held)
+            for gains, part in ((self.gains, total.value), (settled, total.settled))
+            for held in [sum((sp.diff(part, x) * x for x in integrals), start=sp.S.Zero)]
+        )
+        return replace(total, value=value, settled=resting, rate=None)
+
+    def push(self, error: Signal, direction: Signal) -> Signal:
+        """With a kink at either end of the window."""
+        push, window = map(self.key, ("stiction_push", "stiction_push_window"))
+        ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
+        self.kinks += [ahead, behind]
+        way = sp.Piecewise((1, error.settled > window), (-1, error.settled < -window), (0, True))
+        resting = push * (1 - direction.value**2)
+        return Signal(resting * (ahead.beyond - behind.beyond), push, push * way, sp.S.Zero)
+
+    def dither(self) -> Signal:
+        """Over the time since the last corner of the reference."""
+        amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
+        return Signal(amplitude * sine(frequency * TIME), amplitude, sp.S.Zero, sp.S.Zero)
+
+    def _pausing(self, error: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:
+        """The share by which integrals go on beside the deadband [0 or 1], and its kink."""
+        if not self.settings.deadband:
+            return sp.S.One, ()
+        within = self.key("integral_deadband") ** 2 - error**2
+        pauses = Kink("deadband", within)
+        if self.settings.hysteresis:
+            pauses = Switch("deadband", within, error**2 - self.key("integral_deadband_exit") ** 2, within)
+        return 1 - pauses.beyond, (pauses,)
+
+    def _begun_anew(self, error: sp.Expr) -> tuple[Kink, ...]:
+        """The mode in which the error is positive, at whose ends integrals begin anew."""
+        empty = {integral.symbol: sp.S.Zero for integral in self._integrals if self.settings.reset}
+        return (Switch("positive_error", error, -error, error, empty, empty),) if empty else ()
+
     def finished(self, demand: Demand, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
         """All states, the integrators doing as they are to where the demand is beyond its bound, and resting where
         their output is beyond a limit of its own; and the kinks of that."""
@@ -177,27 +224,39 @@ class Continuous(Blocks):
         clamp = bound if bound and bound.anti_windup == "clamp" else None
         far: list[Kink] = list(_far(clamp.kinks, clamp.limit, "rest")) if self._integrals and clamp else []
         winding: list[Kink] = []
+        error = demand.error.value
+        going, pauses = self._pausing(error) if self._integrals else (sp.S.One, ())
         for integral in self._integrals:
             share = sp.S.One
             beside = "" if str(integral.symbol) == "integral" else f"_{integral.symbol}"
             up = Kink(f"winding_up{beside}", integral.integrand)
             if clamp:
                 share *= 1 - _resting(clamp.kinks, tuple(far[:2]), up, clamp.limit)
-            if integral.limit is not None:
-                _, ends = _clamped(integral.output, integral.limit, str(integral.symbol))
-                beyond = _far(ends, integral.limit, f"rest_{integral.symbol}")
-                share *= 1 - _resting(ends, beyond, up, integral.limit)
+            for output, limit, name in self._limits(integral, demand):
+                _, ends = _clamped(output, limit, name)
+                beyond = _far(ends, limit, f"rest_{name}")
+                share *= 1 - _resting(ends, beyond, up, limit)
                 far += [*ends, *beyond]
             if share != 1:
                 winding.append(up)
-            derivative = integral.integrand * share
+            derivative = integral.integrand * self.gains * share * going
+            if self.settings.leak:
+                derivative -= 2 * sp.pi * self.key("integral_leak") * integral.symbol
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.symbol)
                 derivative += bound.cut / (gain * unwinding_time())
             states.append(
                 State(integral.symbol, derivative, "m*s", integral.scale, Role.INTEGRAL, steady[integral.symbol])
             )
-        return tuple(states), (*far, *winding)
+        return tuple(states), (*far, *winding, *pauses, *self._begun_anew(error))
+
+    def _limits(self, integral: _Integral, demand: Demand) -> list[tuple[sp.Expr, sp.Expr, str]]:
+        """What of an integral is limited, to what, and the name of that limit."""
+        limits = [] if integral.limit is None else [(integral.output, integral.limit, str(integral.symbol))]
+        if self.settings.limit:
+            force = sp.diff(demand.total.value, integral.symbol) * integral.symbol
+            limits.append((force, self.key("integral_limit"), f"{integral.symbol}_force"))
+        return limits
 
 
 def _clamped(value: sp.Expr, limit: sp.Expr, name: str) -> tuple[sp.Expr, tuple[Kink, ...]]:

@@ -22,7 +22,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
-from friso.equations.component import Held, Role, key, state
+from friso.equations.component import STEADY, Held, Role, key, sine, state
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
 from friso.stage.filters import Polynomial
@@ -72,6 +72,7 @@ class Sampled(Blocks):
         super().__init__(form)
         self.velocity_samples = velocity_samples
         self.held: list[Held] = []
+        self.gains: Any = sp.S.One  # the factor of standstill
         self._integrals: list[_Integral] = []
 
     def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
@@ -137,19 +138,75 @@ class Sampled(Blocks):
         """As it is at a sample."""
         return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)
 
+    def at_standstill(self, total: Signal, error: Signal) -> Signal:
+        """As the error is at a sample."""
+        window, factor = map(self.key, ("standstill_window", "standstill_factor"))
+        self.gains = sp.Piecewise((factor, sp.Abs(error.value) < window), (1, True))
+        settled = sp.Piecewise((factor, error.settled**2 < window**2), (1, True))
+        value, resting = (
+            held + gains * (part - held)
+            for gains, part, numbers in (
+                (self.gains, total.value, [integral.next for integral in self._integrals]),
+                (settled, total.settled, [integral.symbol for integral in self._integrals]),
+            )
+            for held in [sum((sp.diff(part, x) * x for x in numbers), start=sp.S.Zero)]
+        )
+        return replace(total, value=value, settled=resting, rate=None, before=None)
+
+    def push(self, error: Signal, direction: Signal) -> Signal:
+        """As error and reference are at a sample."""
+        push, window = map(self.key, ("stiction_push", "stiction_push_window"))
+        way, settled = (
+            sp.Piecewise((1, part > window), (-1, part < -window), (0, True)) for part in (error.value, error.settled)
+        )
+        return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
+
+    def dither(self) -> Signal:
+        """By the number of turns at a sample."""
+        amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
+        turn = state("dither_turn")
+        following = turn + frequency * SAMPLE_TIME
+        self.held.append(Held(turn, sp.Piecewise((following - 1, following > 1), (following, True))))
+        return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
+
+    def _standstill(self, error: sp.Expr) -> Rest:
+        """When integrals pause, and when they begin anew, by the settings against friction."""
+        rests: Any = sp.false
+        restarts: Any = sp.false
+        if self.settings.deadband:
+            within = sp.Abs(error) < self.key("integral_deadband")
+            rests = within
+            if self.settings.hysteresis:
+                paused = state("paused")
+                beyond = sp.Abs(error) > self.key("integral_deadband_exit")
+                pauses = sp.Piecewise((1, within), (0, beyond), (paused, True))
+                self.held.append(Held(paused, pauses))
+                rests = pauses > 0
+        if self.settings.reset:
+            before = state("error_at_change")
+            self.held.append(Held(before, sp.Piecewise((error, error**2 > 0), (before, True)), STEADY.error))
+            restarts = error * before < 0
+        return Rest(rests, restarts)
+
     def finished(self, demand: Demand, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
         """The force before it is limited, and all that is held, the integrators doing as they are to where the force
         would be beyond its limit, and resting where their output would be beyond a limit of its own."""
+        settings = self._standstill(demand.error.value) if self._integrals else Rest()
+        rest = Rest(sp.Or(rest.rests, settings.rests), sp.Or(rest.restarts, settings.restarts))
         new: dict[Any, Any] = {}
         for integral in self._integrals:
-            new[integral.next] = integral.symbol + integral.share.xreplace(new)
+            new[integral.next] = integral.symbol + self.gains * integral.share.xreplace(new)
         unlimited = demand.force.value.xreplace(new)
         updates: dict[Any, Any] = {}
         for integral in self._integrals:
-            share: Any = integral.share.xreplace(updates)
+            share: Any = self.gains * integral.share.xreplace(updates)
             rests = rest.rests
             clamp = force_limit() if anti_windup == "clamp" else None
-            for value, end in ((unlimited, clamp), (integral.gain * new[integral.next], integral.limit)):
+            limits = [(unlimited, clamp), (integral.gain * new[integral.next], integral.limit)]
+            if self.settings.limit:
+                held_force = sp.diff(demand.total.value, integral.next) * new[integral.next]
+                limits.append((held_force, self.key("integral_limit")))
+            for value, end in limits:
                 if end is not None:
                     winding = sp.Or(sp.And(value > end, share > 0), sp.And(value < -end, share < 0))
                     rests = sp.Or(rests, winding)
@@ -158,7 +215,9 @@ class Sampled(Blocks):
                 cut = sp.Max(-force_limit(), sp.Min(force_limit(), unlimited)) - unlimited
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
                 following += SAMPLE_TIME * cut / (gain * unwinding_time())
-            updates[integral.next] = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
+            kept = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
+            leak = 2 * sp.pi * self.key("integral_leak") * SAMPLE_TIME if self.settings.leak else 0  # backward Euler
+            updates[integral.next] = kept / (1 + leak)
         steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}
         updated: list[tuple[Any, Any]] = [(held.update, held.settled) for held in self.held]
         held = [

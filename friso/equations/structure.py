@@ -20,6 +20,7 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.filters import FilterForm, filter_forms
+from friso.stage.standstill import Settings, settings_of
 from friso.stage.tables import friction_law
 from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
 
@@ -29,7 +30,8 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 @dataclass(frozen=True)
 class ControllerForm:
     """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
-    it has integral action; what that does at the limit of the force (None: there is no limit); and its filters."""
+    it has integral action; what that does at the limit of the force (None: there is no limit); its filters; and its settings
+    against friction."""
 
     kind: str
     form: str
@@ -37,6 +39,7 @@ class ControllerForm:
     integral: bool
     anti_windup: AntiWindup | None = None
     filters: tuple[FilterForm, ...] = ()
+    settings: Settings = Settings()
 
     @property
     def law(self) -> type[ControllerSection]:
@@ -140,4 +143,5 @@ def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
         integral=law.integrates(flat),
         anti_windup=flat.get(ANTI_WINDUP, DEFAULT_ANTI_WINDUP) if FORCE_LIMIT in flat else None,
         filters=filter_forms(flat, FILTERS_KEY),
+        settings=settings_of(flat),
     )

@@ -76,9 +76,12 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Whether a difference is zero all over the surface of a kink, which is linear in at least one symbol."""
+    """Whether a difference is zero all over the surface of a kink; not, where that is linear in no symbol: it bounds a
+    window, at which something is switched."""
     if gap == 0:
         return True
-    symbol = next(s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)
+    linear = (s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)
+    if (symbol := next(linear, None)) is None:
+        return False
     (at,) = sp.solve(kink.surface, symbol)
     return sp.simplify(gap.subs(symbol, at)) == 0

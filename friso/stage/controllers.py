@@ -11,7 +11,8 @@ from friso.errors import StageError
 from friso.quantities import Quantity, Value, positive
 from friso.stage.filters import FILTER_ARRAY
 from friso.stage.lists import Rows
-from friso.stage.section import Section, SectionClass, UncertainSection, Variants
+from friso.stage.section import Section, SectionClass, Variants
+from friso.stage.standstill import Standstill
 
 CONTROLLER = "controller"
 KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME, FILTERS_KEY = (
@@ -29,7 +30,7 @@ DEFAULT_ANTI_WINDUP: AntiWindup = "clamp"
 BACK_CALCULATION: AntiWindup = "back_calculation"
 
 
-class ControllerSection(UncertainSection):
+class ControllerSection(Standstill):
     """Base of the controllers, each of which declares its keys, `kind: Literal["name"]`, its blocks, and what the house
     asks of any controller: nobody else asks for its keys.
 

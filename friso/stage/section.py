@@ -92,7 +92,7 @@ class UncertainSection(Section):
 
     @property
     def numbers(self) -> dict[str, Any]:
-        """The values by key; those of an array by key and number, from 1, and those of tables in it by their own key."""
+        """The values by key; those of an array by key and number, from 1, and those of tables in it by theirs."""
         values: dict[str, Any] = {}
         for key, value in self:
             if isinstance(value, Values):

@@ -100,6 +100,12 @@ class Stage(Section):
             "an anti-windup time of at least one sample: in a shorter one the integrator overshoots at every sample",
             '[controller] anti_windup_time = "50 ms" with [drive] sample_time = "50 us"',
         ),
+        Rule(
+            ("controller.integral_deadband", "controller.integral_deadband_exit"),
+            lambda f: f.get("controller.integral_deadband_exit", np.inf) >= f.get("controller.integral_deadband", 0.0),
+            "a deadband that is left at a larger error than that at which it is entered",
+            'integral_deadband = "1 um", integral_deadband_exit = "3 um"',
+        ),
     )
 
     def __init__(self, /, **data: Any) -> None:

@@ -1,0 +1,87 @@
+"""What drives do against friction, beside any controller: keys of [controller]."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, NamedTuple, Self
+
+from pydantic import model_validator
+
+from friso.errors import StageError
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage.section import UncertainSection
+
+
+class Standstill(UncertainSection):
+    """Settings of a drive against friction."""
+
+    integral_limit: Annotated[Value | None, Quantity("N", positive, "2 N")] = None
+    """Of the force that each integral holds."""
+    integral_leak: Annotated[Value | None, Quantity("Hz", positive, "0.1 Hz")] = None
+    """Corner below which an integral is a low-pass."""
+    integral_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
+    """Error below which integrals pause."""
+    integral_deadband_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
+    """Larger error at which they go on; the deadband itself where it is left out."""
+    integral_reset: bool = False
+    """Whether integrals begin anew where the error changes sign."""
+    standstill_window: Annotated[Value | None, Quantity("m", positive, "5 um")] = None
+    """Error below which the gains are multiplied by `standstill_factor`; what integrals hold stays."""
+    standstill_factor: Annotated[float | None, Number(positive, "0.5")] = None
+    stiction_push: Annotated[Value | None, Quantity("N", positive, "1 N")] = None
+    """Force towards the reference while that rests and the error is larger than `stiction_push_window`."""
+    stiction_push_window: Annotated[Value | None, Quantity("m", non_negative, "2 um")] = None
+    dither_amplitude: Annotated[Value | None, Quantity("N", positive, "0.5 N")] = None
+    """Of a sinusoidal force, whose phase is 0 at every corner of the reference."""
+    dither_frequency: Annotated[Value | None, Quantity("Hz", positive, "200 Hz")] = None
+
+    @model_validator(mode="after")
+    def _settings_are_whole(self) -> Self:
+        for first, second in PAIRS:
+            for key, other in ((first, second), (second, first)):
+                if getattr(self, key) is not None and getattr(self, other) is None:
+                    raise StageError(other, "nothing", f"what belongs to {key}", EXAMPLES[other])
+        if self.integral_deadband_exit is not None and self.integral_deadband is None:
+            key = "integral_deadband"
+            raise StageError(key, "nothing", "what belongs to integral_deadband_exit", EXAMPLES[key])
+        return self
+
+
+PAIRS = (
+    ("standstill_window", "standstill_factor"),
+    ("stiction_push", "stiction_push_window"),
+    ("dither_amplitude", "dither_frequency"),
+)
+"""Keys that come together."""
+
+EXAMPLES = {
+    "integral_deadband": 'integral_deadband = "1 um"',
+    "standstill_window": 'standstill_window = "5 um"',
+    "standstill_factor": "standstill_factor = 0.5",
+    "stiction_push": 'stiction_push = "1 N"',
+    "stiction_push_window": 'stiction_push_window = "2 um"',
+    "dither_amplitude": 'dither_amplitude = "0.5 N"',
+    "dither_frequency": 'dither_frequency = "200 Hz"',
+}
+
+
+class Settings(NamedTuple):
+    """Which of the settings against friction a controller has."""
+
+    limit: bool = False
+    leak: bool = False
+    deadband: bool = False
+    hysteresis: bool = False
+    reset: bool = False
+    gains: bool = False
+    push: bool = False
+    dither: bool = False
+
+
+def settings_of(flat: Mapping[str, Any]) -> Settings:
+    """Those of a stage given as flat keys."""
+    names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
+    limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
+    gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)
+    reset = bool(flat.get("controller.integral_reset", False))
+    return Settings(limit, leak, deadband, hysteresis, reset, gains, push, dither)
