@@ -90,7 +90,7 @@ def cascade(
         rates["velocity_integral"] = wanted - v
         demand += keys["kp"] / keys["velocity_integral_time"] * s["velocity_integral"]
     demand += keys["acceleration_feedforward"] * r_bend + keys["viscous_feedforward"] * r_rate
-    demand += keys["coulomb_feedforward"] * ((r_rate > 0) - (r_rate < 0))
+    demand += keys["coulomb_feedforward"] * (float(r_rate > 0) - float(r_rate < 0))
     demand = filtered(flat, s, "forward", demand, rates)
     if "force_limit" not in keys:
         return demand, rates

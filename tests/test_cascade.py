@@ -40,7 +40,7 @@ from friso.studies.rig.hunted import rails
 from friso.views.compare.words import sentences as comparison_sentences
 from friso.views.rig.page import sentences
 
-KV, KP, T_V, T_P, MASS = 60.0, 50.0, 0.03, 0.09, 1.7
+KV, KP, T_V, MASS = 60.0, 50.0, 0.03, 1.7
 
 PI = cascade(velocity_integral_time="30 ms")
 """P position, PI velocity: in motion about a reference at rest that is a PID with the derivative on the measurement."""
@@ -119,11 +119,12 @@ def test_hunting_is_that_of_the_pid_that_it_is(hunting: Hunting) -> None:
 
 
 def test_verdict_against_radau(hunting: Hunting) -> None:
-    """From a release it ends in the cycle."""
+    """Stuck at the cycle's amplitude without force, it comes back to it."""
     names = ("position", "velocity", "bristle_deflection", "velocity_integral")
     cycle = hunting.attracting[0]
+    start = {"position": cycle.amplitude, "velocity_integral": KV * cycle.amplitude * T_V}
     times = np.linspace(0.0, 12 * cycle.period, 24001)
-    last = by_radau(rigid(PI), names, times, {"position": 2e-3})[times > 10 * cycle.period]
+    last = by_radau(rigid(PI), names, times, start)[times > 10 * cycle.period]
     assert (last.max() - last.min()) / 2 == pytest.approx(cycle.amplitude, rel=1e-3)
 
 
@@ -141,22 +142,15 @@ def test_two_integrals_against_radau(two: Hunting) -> None:
     assert (last.max() - last.min()) / 2 == pytest.approx(cycle.amplitude, rel=1e-3)
 
 
-def loop_by_hand(s: Any, position: float, velocity: float, lag: float) -> Any:
-    """Force over minus the position of the stage [N/m]."""
-    measured = s / (1 + lag * s)
-    inner = KP * (1 + 1 / (velocity * s))
-    return inner * (KV * (1 + 1 / (position * s)) + measured)
-
-
 @pytest.mark.parametrize("proportional_on", ["error", "measurement"])
 def test_loops_against_python_control(proportional_on: str) -> None:
-    lag = 1e-3
-    keys = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms", "velocity_filter": "1 ms"}
-    machine = rigid(cascade(**keys, proportional_on=proportional_on))
+    lag, kp, t_p = 1e-3, 300.0, 0.3
+    keys = {"position_integral_time": "300 ms", "velocity_integral_time": "30 ms", "velocity_filter": "1 ms"}
+    machine = rigid(cascade(kp="300 N*s/m", **keys, proportional_on=proportional_on))
     s = control.tf("s")
-    outer, measured = KV * (1 + 1 / (T_P * s)), s / (1 + lag * s)
-    inner = KP / (T_V * s)
-    loop = (inner * (outer + measured) + KP * measured + (KP * outer if proportional_on == "error" else 0)) / (
+    outer, measured = KV * (1 + 1 / (t_p * s)), s / (1 + lag * s)
+    inner = kp / (T_V * s)
+    loop = (inner * (outer + measured) + kp * measured + (kp * outer if proportional_on == "error" else 0)) / (
         MASS * s**2 + 0.5 * s
     )
     ours = friso.linear(machine, "sliding", "open")
@@ -167,13 +161,11 @@ def test_loops_against_python_control(proportional_on: str) -> None:
     theirs = loop(1j * omega) * slides
     assert ours(1j * omega) == pytest.approx(theirs, rel=1e-9)
     flat = machine.flat()
-    gain, phase, _, _, _, _ = control.stability_margins(control.ss(ours))
-    exact = margins(flat, limit_cases(flat)["sliding"])
+    gain, phase = control.stability_margins(control.ss(ours))[:2]
+    exact = margins(machine.flat(), limit_cases(machine.flat())["sliding"])
     assert exact.stable
     assert exact.phase_margin == pytest.approx(phase, rel=1e-5)
-    assert min(exact.gain_margin, 1 / exact.gain_reduction) == pytest.approx(max(gain, 1 / gain), rel=1e-4) or (
-        exact.gain_margin == np.inf
-    )
+    assert exact.gain_reduction == pytest.approx(gain, rel=1e-4)
 
 
 def test_feedforward_of_a_perfect_model_leaves_no_error() -> None:
@@ -215,6 +207,9 @@ def difference_equations(flat: dict[str, Any], error: np.ndarray, reading: np.nd
     return np.array(forces)
 
 
+CLIP = {"clipped": lambda value, limit: min(max(value, -limit), limit)}
+
+
 def test_sampled_blocks_are_the_difference_equations() -> None:
     ahead = {"viscous_feedforward": "0.5 N*s/m", "coulomb_feedforward": "1 N", "velocity_filter": "2 ms"}
     times = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms"}
@@ -228,7 +223,9 @@ def test_sampled_blocks_are_the_difference_equations() -> None:
     force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, r, sp.S.Zero, way), 1)
     parts = (force, *(number.update for number in held))
     keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
-    step_once = sp.lambdify([e, y, r, *(number.symbol for number in held)], [part.subs(keys) for part in parts], "math")
+    step_once = sp.lambdify(
+        [e, y, r, *(number.symbol for number in held)], [part.subs(keys) for part in parts], [CLIP, "math"]
+    )
     passed = {state(name) for name in ("signal_before_position", "low_passed_position")}
     kept = [reading[0] if number.symbol in passed else 0.0 for number in held]
     forces = []

@@ -25,7 +25,7 @@ from math import sqrt
 import numpy as np
 
 from friso.engine.roots import crossing, cubic, first_guess
-from friso.engine.simd_math import exp, gaussian, power, quantised, sine, tanh
+from friso.engine.simd_math import clipped, exp, gaussian, power, quantised, sine, tanh
 '''
 
 

@@ -50,7 +50,7 @@ class _KernelPrinter(PythonCodePrinter):
     def _print_call(self, expr: sp.Expr) -> str:
         return f"{type(expr).__name__}({', '.join(self._print(argument) for argument in expr.args)})"
 
-    _print_gaussian = _print_quantised = _print_sine = _print_call
+    _print_gaussian = _print_quantised = _print_clipped = _print_sine = _print_call
 
     def _print_reciprocal(self, expr: sp.Expr) -> str:
         return f"(1.0 / ({self._print(expr.args[0])}))"

@@ -68,6 +68,11 @@ def tanh(x):
     return 1.0 - 2.0 / (exp(2.0 * x) + 1.0)
 
 
+def clipped(x, limit):
+    """x within plus and minus a limit."""
+    return min(max(x, -limit), limit)
+
+
 def quantised(x, digit):
     """x in whole digits, below 2^51 of them; as it is where the digit is 0."""
     rounded = digit * ((x / digit + _ROUNDER) - _ROUNDER)

@@ -102,6 +102,13 @@ class sine(sp.Function):
         return 2 * sp.pi * sine(self.args[0] + sp.Rational(1, 4))
 
 
+class clipped(sp.Function):
+    """A number within plus and minus a limit, which comes second (`friso.engine`); SymPy's own minimum and maximum take
+    minutes to compare long expressions."""
+
+    nargs = 2
+
+
 class quantised(sp.Function):
     """A number in whole digits, the size of which comes second; as it is where that is 0 (`friso.engine`)."""
 

@@ -22,7 +22,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
-from friso.equations.component import STEADY, Held, Role, key, sine, state
+from friso.equations.component import STEADY, Held, Role, clipped, key, sine, state
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
 from friso.stage.filters import Polynomial
@@ -51,7 +51,7 @@ def sampled_controller(
     limit = force_limit() if form.anti_windup else None
     pushed = replace(demand.force, value=demand.force.value + extra)
     force, held = blocks.finished(replace(demand, force=pushed), form.anti_windup, rest)
-    return sp.Max(-limit, sp.Min(limit, force)) if limit is not None else force, held
+    return clipped(force, limit) if limit is not None else force, held
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Sampled(Blocks):
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
         """As it is at a sample."""
-        return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)
+        return replace(signal, value=clipped(signal.value, limit), rate=None, before=None)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
         """As the error is at a sample."""
@@ -212,7 +212,7 @@ class Sampled(Blocks):
                     rests = sp.Or(rests, winding)
             following = integral.symbol + share
             if anti_windup == BACK_CALCULATION:
-                cut = sp.Max(-force_limit(), sp.Min(force_limit(), unlimited)) - unlimited
+                cut = clipped(unlimited, force_limit()) - unlimited
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
                 following += SAMPLE_TIME * cut / (gain * unwinding_time())
             kept = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))

@@ -20,7 +20,7 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.filters import FilterForm, filter_forms
-from friso.stage.standstill import Settings, settings_of
+from friso.stage.standstill import NO_SETTINGS, Settings, settings_of
 from friso.stage.tables import friction_law
 from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
 
@@ -30,8 +30,8 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 @dataclass(frozen=True)
 class ControllerForm:
     """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
-    it has integral action; what that does at the limit of the force (None: there is no limit); its filters; and its settings
-    against friction."""
+    it has integral action; what that does at the limit of the force (None: there is no limit); its filters; and its
+    settings against friction."""
 
     kind: str
     form: str
@@ -39,7 +39,7 @@ class ControllerForm:
     integral: bool
     anti_windup: AntiWindup | None = None
     filters: tuple[FilterForm, ...] = ()
-    settings: Settings = Settings()
+    settings: Settings = NO_SETTINGS
 
     @property
     def law(self) -> type[ControllerSection]:

@@ -12,6 +12,8 @@ from dataclasses import replace
 from typing import cast
 
 import sympy as sp
+from mpmath import mp
+from sympy import prime
 
 from friso.equations.component import TIME, Kink, Role, State, Switch, state
 from friso.equations.model import Model
@@ -76,12 +78,26 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
-    """Whether a difference is zero all over the surface of a kink; not, where that is linear in no symbol: it bounds a
-    window, at which something is switched."""
+    """Whether a difference is zero all over the surface of a kink, tried at points of it; not, where the surface is
+    linear in no symbol: it bounds a window then, at which something is switched."""
     if gap == 0:
         return True
     linear = (s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)
     if (symbol := next(linear, None)) is None:
         return False
-    (at,) = sp.solve(kink.surface, symbol)
-    return sp.simplify(gap.subs(symbol, at)) == 0
+    others = sorted((kink.surface.free_symbols | gap.free_symbols) - {symbol}, key=str)
+    rest, slope, difference = (
+        sp.lambdify([symbol, *others], part, [{"sine": lambda turn: mp.sin(2 * mp.pi * turn)}, "mpmath"])
+        for part in (kink.surface.subs(symbol, 0), sp.diff(kink.surface, symbol), gap)
+    )
+    with mp.workdps(DIGITS):
+        for n in range(1, TRIED + 1):
+            point = [mp.mpf(prime(n + k) % 97) / (50 + n) + 1 for k in range(1, len(others) + 1)]
+            at = -rest(0, *point) / slope(0, *point)
+            if abs(difference(at, *point)) > NOTHING:
+                return False
+    return True
+
+
+TRIED, DIGITS, NOTHING = 3, 50, 1e-25
+"""Points of a surface at which a difference is tried, digits to which it is computed, and what counts as 0."""

@@ -78,6 +78,9 @@ class Settings(NamedTuple):
     dither: bool = False
 
 
+NO_SETTINGS = Settings()
+
+
 def settings_of(flat: Mapping[str, Any]) -> Settings:
     """Those of a stage given as flat keys."""
     names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
