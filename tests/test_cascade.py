@@ -160,7 +160,6 @@ def test_loops_against_python_control(proportional_on: str) -> None:
     assert np.abs(slides - 1).max() < 2e-2  # friction at high speed is viscous, nearly
     theirs = loop(1j * omega) * slides
     assert ours(1j * omega) == pytest.approx(theirs, rel=1e-9)
-    flat = machine.flat()
     gain, phase = control.stability_margins(control.ss(ours))[:2]
     exact = margins(machine.flat(), limit_cases(machine.flat())["sliding"])
     assert exact.stable

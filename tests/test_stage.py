@@ -93,8 +93,8 @@ def test_defaults_of_a_rigid_mass_without_friction() -> None:
 def test_emps_gains_follow_from_the_recorded_loop() -> None:
     flat = load(ROOT / "examples" / "emps_axis.toml").flat()
     gtau, kp, kv = 35.1507, 160.18, 243.45  # N/V, 1/s, V s/m: data/README of the record
-    assert flat["controller.kp"] == pytest.approx(gtau * kv * kp, rel=1e-12)
-    assert flat["controller.kd"] == pytest.approx(gtau * kv, rel=1e-12)
+    assert flat["controller.kv"] * flat["controller.kp"] == pytest.approx(gtau * kv * kp, rel=1e-12)
+    assert flat["controller.kp"] == pytest.approx(gtau * kv, rel=1e-12)
     assert flat["controller.force_limit"] == pytest.approx(10 * gtau, rel=1e-12)
     assert flat["controller.anti_windup"] == "clamp"
 

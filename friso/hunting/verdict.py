@@ -21,7 +21,7 @@ from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
+from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
 from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, searched
 from friso.hunting.measures import Measures, measure, options
@@ -195,6 +195,8 @@ def judge_runs(
     `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
     sure, attracts = motions.completed.copy(), np.zeros(count, bool)
+    if survey is None and why_not(shared_structure(flat)) == DITHERS:
+        sure[:] = False
     if survey is not None:
         sure &= survey.decided
         attracts = survey.attracts.copy()

@@ -23,7 +23,7 @@ class Standstill(UncertainSection):
     """Error below which integrals pause."""
     integral_deadband_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
     """Larger error at which they go on; the deadband itself where it is left out."""
-    integral_reset: bool = False
+    integral_reset: bool | None = None
     """Whether integrals begin anew where the error changes sign."""
     standstill_window: Annotated[Value | None, Quantity("m", positive, "5 um")] = None
     """Error below which the gains are multiplied by `standstill_factor`; what integrals hold stays."""

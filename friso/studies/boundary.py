@@ -9,7 +9,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.errors import InputError
 from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
-from friso.hunting.cycle.hunting import cannot_hunt
+from friso.hunting.cycle.hunting import DITHERS, cannot_hunt
 from friso.stage import Stage, numeric_keys, violations
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
@@ -46,6 +46,8 @@ def boundary(
         raise InputError("axes", f"{len(ranges)} keys", "one key or two", EXAMPLE)
     check_links(stage, followers, frozenset(swept.key for swept in ranges))
     if reason := cannot_hunt(stage):
+        if reason == DITHERS:
+            raise InputError("controller.dither_amplitude", reason, "a controller without dither", EXAMPLE)
         raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
     for swept in ranges:
         if swept.key.startswith("motion."):

@@ -26,8 +26,8 @@ _OPERATORS: dict[type, Any] = {
     ast.UAdd: operator.pos,
 }
 _FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
-_ELEMENT = re.compile(r"\b([A-Za-z_]\w*\.[A-Za-z_]\w*)\.([0-9]+)\b")
-"""The key of an element of an array, friction.element_stiffness.2; Python would write [2]."""
+_KEY, _ELEMENT = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+"), re.compile(r"\.([0-9]+)\b")
+"""A key, and the number of an element of an array in it, controller.filters.2.frequency; Python would write [2]."""
 
 _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
@@ -70,7 +70,7 @@ def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any
 
 def _parsed(key: str, text: str) -> ast.expr:
     try:
-        tree = ast.parse(_ELEMENT.sub(r"\1[\2]", text.strip()), mode="eval").body
+        tree = ast.parse(_KEY.sub(lambda key: _ELEMENT.sub(r"[\1]", key[0]), text.strip()), mode="eval").body
         _check(tree)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InputError(key, quoted(text), "numbers, names, + - * / **, min, max, sqrt, abs", EXAMPLE) from error
@@ -88,8 +88,12 @@ def _check(node: ast.expr) -> None:
         case ast.Call(ast.Name(name), arguments, []) if _ARGUMENTS.get(name) == len(arguments):
             for argument in arguments:
                 _check(argument)
-        case ast.Attribute(ast.Name(), _) | ast.Name() | ast.Subscript(ast.Attribute(ast.Name(), _), ast.Constant()):
+        case ast.Name():
             pass
+        case ast.Attribute(ast.Name() | ast.Attribute() | ast.Subscript() as owner, _):
+            _check(owner)
+        case ast.Subscript(ast.Attribute() as owner, ast.Constant()):
+            _check(owner)
         case ast.Constant(value) if type(value) in (int, float):
             pass
         case _:
@@ -112,4 +116,10 @@ def _value(node: ast.expr, numbers: Mapping[str, Any]) -> Any:
 
 def _name(node: ast.expr) -> str:
     """The name of a key or an axis, as a stage file has it."""
-    return f"{_name(node.value)}.{ast.unparse(node.slice)}" if isinstance(node, ast.Subscript) else ast.unparse(node)
+    match node:
+        case ast.Subscript(owner, part):
+            return f"{_name(owner)}.{ast.unparse(part)}"
+        case ast.Attribute(owner, part):
+            return f"{_name(owner)}.{part}"
+        case _:
+            return ast.unparse(node)

@@ -49,6 +49,9 @@ FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a h
 REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
 """The same where the search through the bandwidths contradicts the survey of the stage itself."""
 
+DITHERS = "dither keeps the stage moving, so that no cycle is searched: only runs tell whether it hunts"
+"""Why cycles of a stage are not searched that may hunt all the same."""
+
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
 
@@ -139,17 +142,17 @@ class Hunting:
 
 
 def cannot_hunt(stage: Stage) -> str:
-    """Why a stage cannot hunt, whatever its numbers; "" if it may."""
+    """Why a stage cannot hunt, whatever its numbers, or why its cycles are not searched (`DITHERS`); "" if they are."""
     return why_not(structure(stage.flat()))
 
 
 def why_not(form: Structure) -> str:
-    """Why stages of this structure cannot hunt; "" if they may."""
+    """Why stages of this structure cannot hunt, or why their cycles are not searched; "" if they are."""
     if form.friction == "none":
         return "there is no friction to stick to"
     if form.controller is None or not form.controller.integral:
         return "the controller has no integral action that could wind up"
-    return ""
+    return DITHERS if form.controller.settings.dither else ""
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -160,7 +163,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
-        return Hunting((), reason, True, None)
+        return Hunting((), reason, reason != DITHERS, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)

@@ -1,0 +1,201 @@
+"""Filters of a controller: in the stage file, in continuous time and as a drive carries them out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from scipy import signal
+from variants import FEEDBACK_FILTERS, FORWARD_FILTERS, a_filter, cascade, gains, lugre, release, stage
+
+import friso
+from friso.equations.blocks import Loop
+from friso.equations.sampled import sampled_controller
+from friso.equations.structure import controller_form
+from friso.frequency.drive import bilinear
+from friso.frequency.members import limit_cases
+from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator
+from friso.stage import Stage, numeric_keys
+from friso.studies.axes import SweptAxis, read_axis
+from friso.studies.links import check_links, linked
+
+PLACE = "controller.filters"
+
+
+def filtered(filters: str, controller: str | None = None) -> Stage:
+    gain = 'kind = "pid"\nkp = "1 N/m"\n' if controller is None else controller
+    return stage(release(), friction=lugre(2), controller=gain + filters)
+
+
+def answer(machine: Stage, s: np.ndarray, sees: str = STAGE) -> np.ndarray:
+    """From what is measured to the force."""
+    return compensator(machine.flat(), 1).take((sees,), (FORCE,)).at(s)[0, :, 0, 0]
+
+
+W = 2 * np.pi * 100.0
+OMEGA = 2j * np.pi * np.geomspace(1, 1e4, 100)
+
+KINDS: dict[str, tuple[str, Any]] = {
+    "notch": (
+        a_filter("notch", frequency="100 Hz", width="30 Hz", depth=0.8),
+        lambda s: (s**2 + 0.2 * 0.3 * W * s + W**2) / (s**2 + 0.3 * W * s + W**2),
+    ),
+    "first order": (a_filter("low_pass", frequency="100 Hz"), lambda s: 1 / (1 + s / W)),
+    "second order": (
+        a_filter("low_pass", frequency="100 Hz", order=2, damping_ratio=0.6),
+        lambda s: 1 / (1 + 1.2 * s / W + (s / W) ** 2),
+    ),
+    "lead": (
+        a_filter("lead_lag", zero_frequency="50 Hz", pole_frequency="200 Hz"),
+        lambda s: (1 + 2 * s / W) / (1 + s / 2 / W),
+    ),
+    "biquad": (
+        a_filter("biquad", zero_frequency="50 Hz", zero_damping=0.1, pole_frequency="100 Hz", pole_damping=0.7),
+        lambda s: (1 + 0.4 * s / W + (2 * s / W) ** 2) / (1 + 1.4 * s / W + (s / W) ** 2),
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_filter_is_its_transfer_function(kind: str) -> None:
+    text, by_hand = KINDS[kind]
+    assert answer(filtered(text), OMEGA) == pytest.approx(-by_hand(OMEGA), rel=1e-11)
+
+
+def test_a_notch_takes_its_depth_away_and_is_as_wide_as_stated() -> None:
+    deep = filtered(a_filter("notch", frequency="100 Hz", width="30 Hz"))
+    assert abs(answer(deep, np.array([1j * W]))[0]) < 1e-12
+    half = np.roots([1, 0.3 * W, -(W**2)]).max()  # where the width of 30 Hz ends below
+    assert abs(answer(deep, np.array([1j * half]))[0]) == pytest.approx(np.sqrt(0.5))
+
+
+def test_paths_and_order() -> None:
+    """In a row they multiply, on either path; of a cascade those of the feedback act on the velocity alone."""
+    parts = [by_hand for _, by_hand in KINDS.values()]
+    row = filtered("".join(text for text, _ in KINDS.values()))
+    assert answer(row, OMEGA) == pytest.approx(-np.prod([part(OMEGA) for part in parts], axis=0), rel=1e-9)
+    back = filtered(KINDS["biquad"][0].replace("kind", 'path = "feedback"\nkind'))
+    assert answer(back, OMEGA) == pytest.approx(-KINDS["biquad"][1](OMEGA))
+    assert answer(back, OMEGA, REFERENCE) == pytest.approx(np.ones(len(OMEGA)))
+    loop = filtered(KINDS["biquad"][0].replace("kind", 'path = "feedback"\nkind'), cascade())
+    assert answer(loop, OMEGA, STAGE) == pytest.approx(np.full(len(OMEGA), -3000.0))
+    assert answer(loop, OMEGA, VELOCITY) == pytest.approx(-50 * KINDS["biquad"][1](OMEGA))
+
+
+def test_bode_of_a_loop_with_filters_is_stable_where_its_poles_are() -> None:
+    machine = filtered(
+        FORWARD_FILTERS + FEEDBACK_FILTERS, gains(2000, 5000, 60, extra='derivative_on = "measurement"\n')
+    )
+    closed = friso.linear(machine, part="closed")
+    case = friso.bode(machine).cases
+    assert {name: bool(item.margins.stable) for name, item in case.items()}["stuck"] == (closed.poles().real.max() < 0)
+    assert [*limit_cases(machine.flat())] == [*case]
+
+
+def commanded(machine: Stage, sample_time: float, errors: np.ndarray) -> np.ndarray:
+    """Forces of a drive for errors at its samples."""
+    flat = {**machine.flat(), "drive.sample_time": sample_time}
+    e, y = sp.symbols("e y", real=True)
+    force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, sp.S.Zero), 1)
+    parts = (force, *(number.update for number in held))
+    keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
+    once = sp.lambdify([e, y, *(number.symbol for number in held)], [part.subs(keys) for part in parts], "math")
+    kept, forces = [0.0] * len(held), []
+    for error in errors:
+        now, *kept = once(error, 0.0, *kept)
+        forces.append(now)
+    return np.array(forces)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_drive_takes_a_filter_by_tustin(kind: str) -> None:
+    """The difference equation of SciPy's bilinear transform."""
+    text, _ = KINDS[kind]
+    machine, t = filtered(text), 1e-3
+    errors = np.random.default_rng(1).normal(size=200)
+    system = compensator(machine.flat(), 1).take((REFERENCE,), (FORCE,))
+    upper, lower = signal.ss2tf(system.a[0], system.b[0], system.c[0], system.d[0])
+    assert commanded(machine, t, errors) == pytest.approx(
+        signal.lfilter(*signal.bilinear(upper[0], lower, 1 / t), errors), rel=1e-6, abs=1e-7
+    )
+    sampled = bilinear(system, t)
+    z = np.exp(1j * np.linspace(0.01, 3.0, 20))
+    s = 2 / t * (z - 1) / (z + 1)
+    assert sampled.at(z)[0, :, 0, 0] == pytest.approx(system.at(s)[0, :, 0, 0])
+
+
+def test_a_sampled_biquad_is_its_difference_equation() -> None:
+    """At its own sample time, to rounding: the numbers of a drive's manual go in and come out."""
+    b, a = [0.94, -1.85, 0.93], [-1.85, 0.87]
+    machine = filtered(a_filter("sampled_biquad", numerator=b, denominator=a, sample_time="125 us"))
+    errors = np.random.default_rng(2).normal(size=500)
+    by_hand = np.zeros(502)
+    u = np.concatenate([[0.0, 0.0], errors])
+    for n in range(2, 502):
+        by_hand[n] = b[0] * u[n] + b[1] * u[n - 1] + b[2] * u[n - 2] - a[0] * by_hand[n - 1] - a[1] * by_hand[n - 2]
+    assert np.abs(commanded(machine, 125e-6, errors) - by_hand[2:]).max() < 1e-10
+
+
+# the stage file
+
+
+@pytest.fixture
+def several() -> Stage:
+    return filtered(FORWARD_FILTERS + FEEDBACK_FILTERS)
+
+
+def test_saved_and_loaded_it_is_the_same(several: Stage, tmp_path: Path) -> None:
+    friso.save(several, tmp_path / "stage.toml")
+    again = friso.load(tmp_path / "stage.toml")
+    assert again == several
+    assert again.flat() == several.flat()
+    assert several.flat()[f"{PLACE}.3.numerator.2"] == -1.85
+    assert several.flat()[f"{PLACE}.4.path"] == "feedback"
+
+
+def test_a_key_of_one_filter_is_set_swept_linked_and_uncertain(several: Stage) -> None:
+    one = several.replace({f"{PLACE}.1.frequency": "70 Hz +/- 5 Hz", f"{PLACE}.3.denominator.2": 0.9})
+    assert one.flat()[f"{PLACE}.1.frequency"] == 70.0
+    assert one.flat()[f"{PLACE}.3.denominator.2"] == 0.9
+    assert several.flat()[f"{PLACE}.1.frequency"] == 60.0
+    interval = one.uncertain()[f"{PLACE}.1.frequency"]
+    assert (interval.low, interval.high) == (65.0, 75.0)
+    axis = read_axis(several, f"{PLACE}.1.width", "10 Hz..30 Hz:3", False)
+    assert isinstance(axis, SweptAxis) or axis.axis().values == pytest.approx([10.0, 20.0, 30.0])
+    link = {"friction.static": f"0.05 * {PLACE}.1.frequency"}
+    assert linked(link, {f"{PLACE}.1.frequency": 60.0}) == {"friction.static": pytest.approx(3.0)}
+    check_links(several, {f"{PLACE}.4.zero_frequency": f"1.5 * {PLACE}.1.frequency"}, frozenset())
+    assert numeric_keys(several.flat())[f"{PLACE}.5.pole_frequency"].unit == "Hz"
+    assert several.flat({f"{PLACE}.2.frequency": 250.0})[f"{PLACE}.2.frequency"] == 250.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({f"{PLACE}.6.frequency": "1 Hz"}, [f"{PLACE}.6.frequency", "1 to 5"]),
+        ({f"{PLACE}.1.frequency": "1 m"}, [f"{PLACE}.1.frequency", "not a frequency"]),
+        ({f"{PLACE}.1.freqency": "1 Hz"}, [f"{PLACE}.1.freqency", "did you mean frequency?"]),
+        ({f"{PLACE}.1.depth": 1.5}, [f"{PLACE}.1.depth", "depth = 1.5", "1 at most"]),
+        ({f"{PLACE}.2.order": 3}, [f"{PLACE}.2.order", "one of 1, 2"]),
+        ({f"{PLACE}.3.denominator": [-2.0, 0.5]}, [f"{PLACE}.3.denominator", "a filter that is stable"]),
+        ({f"{PLACE}.4.pole_damping": -0.1}, [f"{PLACE}.4.pole_damping", "a filter that is stable"]),
+        ({f"{PLACE}.1.kind": "nothc"}, [f"{PLACE}.1.kind", 'one of "notch"']),
+        ({f"{PLACE}.1": None}, [f"{PLACE}.1", "the whole array"]),
+        ({PLACE: "notch"}, [PLACE, "an array of at most 12 tables"]),
+        ({PLACE: [{"kind": "low_pass", "frequency": "1 Hz"}] * 13}, [PLACE, "13 tables"]),
+    ],
+)
+def test_what_is_wrong_is_told(several: Stage, changes: dict[str, Any], parts: list[str]) -> None:
+    with pytest.raises(friso.StageError) as refused:
+        several.replace(changes)
+    assert all(part in str(refused.value) for part in parts), str(refused.value)
+
+
+def test_a_sweep_into_an_unstable_filter_is_a_violation(several: Stage) -> None:
+    flat = several.flat({f"{PLACE}.4.pole_damping": np.array([0.5, -0.5])})
+    ((broken, why),) = friso.stage.violations(flat)
+    assert list(broken) == [False, True]
+    assert "stable" in why
