@@ -36,7 +36,7 @@ def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
     """What is held becomes at a sample what it is in the same motion a sample later."""
     blocks = Sampled(3)
     signal = BLOCKS[name](blocks, measured(GOING, sp.S.One, sp.S.One).position)
-    _, held = blocks.finished(Demand({}, signal, signal), None, Rest())
+    _, held = blocks.finished(Demand({}, signal, signal, signal), None, Rest())
     now = {each.symbol: each.settled for each in held}
     later = {POSITION: POSITION + VELOCITY * SAMPLE_TIME}
     for each in held:
@@ -59,7 +59,7 @@ def test_an_integrator_rests_at_each_limit_and_at_both(beyond: tuple[str, ...]) 
     blocks = Continuous(sp.S.One)
     signal = blocks.integral(measured(GOING, sp.S.One, sp.S.One).error, sp.S(2), limit=sp.S(3))
     bound = ForceLimit.of(signal, "clamp")
-    states, resting = blocks.finished(Demand({}, signal, signal), bound)
+    states, resting = blocks.finished(Demand({}, signal, signal, signal), bound)
     (integral,) = (each for each in states if each.role == Role.INTEGRAL)
     modes = {kink.beyond: 0 for kink in (*bound.kinks, *resting)} | {Kink("winding_up", ERROR).beyond: 1}
     for name in beyond:

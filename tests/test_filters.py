@@ -102,10 +102,10 @@ def commanded(machine: Stage, sample_time: float, errors: np.ndarray) -> np.ndar
     force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, sp.S.Zero), 1)
     parts = (force, *(number.update for number in held))
     keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
-    once = sp.lambdify([e, y, *(number.symbol for number in held)], [part.subs(keys) for part in parts], "math")
+    once = sp.lambdify([e, y, *keys, *(number.symbol for number in held)], parts, "math")
     kept, forces = [0.0] * len(held), []
     for error in errors:
-        now, *kept = once(error, 0.0, *kept)
+        now, *kept = once(error, 0.0, *keys.values(), *kept)
         forces.append(now)
     return np.array(forces)
 
