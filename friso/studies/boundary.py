@@ -47,7 +47,7 @@ def boundary(
     check_links(stage, followers, frozenset(swept.key for swept in ranges))
     if reason := cannot_hunt(stage):
         if reason == DITHERS:
-            raise InputError("controller.dither_amplitude", reason, "a controller without dither", EXAMPLE)
+            raise InputError("controller", reason, "a controller without dither", EXAMPLE)
         raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
     for swept in ranges:
         if swept.key.startswith("motion."):
