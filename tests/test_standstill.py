@@ -52,7 +52,7 @@ def by_hand(flat: dict[str, Any], times: np.ndarray, step: float) -> np.ndarray:
     def rates(t: float, y: float, v: float, z: float, x: float, pauses: bool) -> tuple[float, float, float, float]:
         e = -y
         share = factor if abs(e) < window else 1.0
-        demand = share * (KP * e - KD * v) + KI * x + push * ((e > reach) - (e < -reach))
+        demand = share * (KP * e - KD * v) + KI * x + push * (float(e > reach) - float(e < -reach))
         demand += amplitude * sin(2 * pi * frequency * t)
         force = min(max(demand, -bound), bound)
         level = 1.0 + 2.0 * exp(-((v / 1.6e-3) ** 2))
@@ -65,7 +65,7 @@ def by_hand(flat: dict[str, Any], times: np.ndarray, step: float) -> np.ndarray:
 
     state, t, positions = (2e-3, 0.0, 0.0, 0.0), 0.0, [2e-3]
     pauses = near > 2e-3
-    for now in times[1:]:
+    for now in times.tolist()[1:]:
         count = max(1, round((now - t) / step))
         h = (now - t) / count
         for _ in range(count):
