@@ -70,7 +70,7 @@ def test_slow_gains_are_those_of_the_pid_that_it_is() -> None:
 
 def test_trace_against_radau() -> None:
     """A move with feedforward, force limit and both integrals, friction and all."""
-    more = "velocity_feedforward = 0.9\n" + limit("4 N", "none")
+    more = "velocity_feedforward = 0.9\n" + limit("4 N")
     motion = there_and_back("0.6 s", "0.3 s", "2 m/s^2")
     ahead = {"acceleration_feedforward": "1.5 kg", "coulomb_feedforward": "1 N", "velocity_filter": "1 ms"}
     times = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms"}

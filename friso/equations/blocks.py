@@ -18,7 +18,7 @@ from friso.equations.component import STEADY, Component, Held, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
 from friso.stage.filters import FEEDBACK, FORWARD, Polynomial
-from friso.stage.standstill import Settings
+from friso.stage.standstill import FrictionSettings
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,9 @@ class Blocks(ABC):
         return key(ControllerSection.key(name))
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> FrictionSettings:
         """Which settings against friction there are."""
-        return self.form.settings if self.form else Settings()
+        return self.form.settings if self.form else FrictionSettings()
 
     @abstractmethod
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:

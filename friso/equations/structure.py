@@ -20,7 +20,7 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.filters import FilterForm, filter_forms
-from friso.stage.standstill import NO_SETTINGS, Settings, settings_of
+from friso.stage.standstill import NO_SETTINGS, FrictionSettings, settings_of
 from friso.stage.tables import friction_law
 from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
 
@@ -39,7 +39,7 @@ class ControllerForm:
     integral: bool
     anti_windup: AntiWindup | None = None
     filters: tuple[FilterForm, ...] = ()
-    settings: Settings = NO_SETTINGS
+    settings: FrictionSettings = NO_SETTINGS
 
     @property
     def law(self) -> type[ControllerSection]:

@@ -12,7 +12,7 @@ from friso.quantities import Quantity, Value, positive
 from friso.stage.filters import FILTER_ARRAY
 from friso.stage.lists import Rows
 from friso.stage.section import Section, SectionClass, Variants
-from friso.stage.standstill import Standstill
+from friso.stage.standstill import AgainstFriction
 
 CONTROLLER = "controller"
 KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME, FILTERS_KEY = (
@@ -30,14 +30,13 @@ DEFAULT_ANTI_WINDUP: AntiWindup = "clamp"
 BACK_CALCULATION: AntiWindup = "back_calculation"
 
 
-class ControllerSection(Standstill):
+class ControllerSection(AgainstFriction):
     """Base of the controllers, each of which declares its keys, `kind: Literal["name"]`, its blocks, and what the house
     asks of any controller: nobody else asks for its keys.
 
     Several forms of one kind, distinguished by their keys, derive from the class that declares the kind.
     """
 
-    kind: Any
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
     anti_windup: AntiWindup | None = None
     anti_windup_time: Annotated[Value | None, Quantity("s", positive, "50 ms")] = None

@@ -49,7 +49,7 @@ FILTER_ARRAY = TableArray(FILTERS, '[[controller.filters]] kind = "notch", frequ
 
 
 @FILTERS.register
-class Notch(FilterSection):
+class NotchFilter(FilterSection):
     """(s^2 + (1 - depth) w s + w_0^2)/(s^2 + w s + w_0^2), w being the width between the points at -3 dB of a notch
     that is as deep as can be."""
 
@@ -65,13 +65,14 @@ class Notch(FilterSection):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        """The formula of the class."""
         omega, width = _omega(row["frequency"]), _omega(row["width"])
         damping, bend = width / omega**2, 1 / omega**2
         return Transfer((1, (1 - row["depth"]) * damping, bend), (1, damping, bend))
 
 
 @FILTERS.register
-class LowPass(FilterSection):
+class LowPassFilter(FilterSection):
     """1/(1 + s/w_0), or of the second order 1/(1 + 2 zeta s/w_0 + s^2/w_0^2)."""
 
     kind: Literal["low_pass"]
@@ -82,17 +83,19 @@ class LowPass(FilterSection):
 
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> int:
+        """The order."""
         return int(row["order"])
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: int) -> Transfer:
+        """The formula of the class."""
         omega = _omega(row["frequency"])
         lower = (1, 1 / omega, 0) if variant == 1 else _second_order(omega, row["damping_ratio"])
         return Transfer((1, 0, 0), lower)
 
 
 @FILTERS.register
-class LeadLag(FilterSection):
+class LeadLagFilter(FilterSection):
     """(1 + s/w_z)/(1 + s/w_p): a lead where the zero is the slower one."""
 
     kind: Literal["lead_lag"]
@@ -101,12 +104,13 @@ class LeadLag(FilterSection):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        """The formula of the class."""
         zero, pole = (_omega(row[f"{place}_frequency"]) for place in ("zero", "pole"))
         return Transfer((1, 1 / zero, 0), (1, 1 / pole, 0))
 
 
 @FILTERS.register
-class Biquad(FilterSection):
+class BiquadFilter(FilterSection):
     """(1 + 2 zeta_z s/w_z + s^2/w_z^2)/(1 + 2 zeta_p s/w_p + s^2/w_p^2), by its zeros and poles."""
 
     kind: Literal["biquad"]
@@ -126,6 +130,7 @@ class Biquad(FilterSection):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        """The formula of the class."""
         zeros, poles = (
             _second_order(_omega(row[f"{place}_frequency"]), row[f"{place}_damping"]) for place in ("zero", "pole")
         )
@@ -133,7 +138,7 @@ class Biquad(FilterSection):
 
 
 @FILTERS.register
-class SampledBiquad(FilterSection):
+class SampledBiquadFilter(FilterSection):
     """y = b0 u + b1 u' + b2 u'' - a1 y' - a2 y'', primes for samples before, as drives take it.
 
     In continuous time it is the filter of which these are the coefficients by the bilinear transform at `sample_time`.
@@ -156,6 +161,7 @@ class SampledBiquad(FilterSection):
 
     @classmethod
     def transfer(cls, row: Mapping[str, Any], variant: None) -> Transfer:
+        """The formula of the class."""
         half = row["sample_time"] / 2
         b0, b1, b2 = (row[f"numerator.{n}"] for n in (1, 2, 3))
         a1, a2 = (row[f"denominator.{n}"] for n in (1, 2))

@@ -12,9 +12,10 @@ from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage.section import UncertainSection
 
 
-class Standstill(UncertainSection):
+class AgainstFriction(UncertainSection):
     """Settings of a drive against friction."""
 
+    kind: Any
     integral_limit: Annotated[Value | None, Quantity("N", positive, "2 N")] = None
     """Of the force that each integral holds."""
     integral_leak: Annotated[Value | None, Quantity("Hz", positive, "0.1 Hz")] = None
@@ -65,7 +66,7 @@ EXAMPLES = {
 }
 
 
-class Settings(NamedTuple):
+class FrictionSettings(NamedTuple):
     """Which of the settings against friction a controller has."""
 
     limit: bool = False
@@ -78,13 +79,13 @@ class Settings(NamedTuple):
     dither: bool = False
 
 
-NO_SETTINGS = Settings()
+NO_SETTINGS = FrictionSettings()
 
 
-def settings_of(flat: Mapping[str, Any]) -> Settings:
+def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
     """Those of a stage given as flat keys."""
     names = ("integral_limit", "integral_leak", "integral_deadband", "integral_deadband_exit")
     limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
     gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)
     reset = bool(flat.get("controller.integral_reset", False))
-    return Settings(limit, leak, deadband, hysteresis, reset, gains, push, dither)
+    return FrictionSettings(limit, leak, deadband, hysteresis, reset, gains, push, dither)

@@ -29,7 +29,7 @@ POSITION_TIME, VELOCITY_TIME, PROPORTIONAL_ON, VELOCITY_FILTER = (
 FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "coulomb_feedforward", "viscous_feedforward")
 
 
-class Terms(NamedTuple):
+class CascadeTerms(NamedTuple):
     """Which terms there are; each absent term is absent from the equations."""
 
     position_integral: bool
@@ -88,9 +88,9 @@ class Cascade(ControllerSection):
     )
 
     @classmethod
-    def variant(cls, flat: Mapping[str, Any]) -> Terms:
+    def variant(cls, flat: Mapping[str, Any]) -> CascadeTerms:
         """Which terms there are."""
-        return Terms(
+        return CascadeTerms(
             position_integral=POSITION_TIME in flat,
             velocity_integral=VELOCITY_TIME in flat,
             proportional_on=flat[PROPORTIONAL_ON],
@@ -104,14 +104,14 @@ class Cascade(ControllerSection):
         return POSITION_TIME in flat or VELOCITY_TIME in flat
 
     @classmethod
-    def stiffness(cls, blocks: Blocks, variant: Terms) -> sp.Expr:
+    def stiffness(cls, blocks: Blocks, variant: CascadeTerms) -> sp.Expr:
         """The force on a stage that is displaced quickly [N/m]: the integral of its velocity is its displacement."""
         kv, kp = blocks.key("kv"), blocks.key("kp")
         stiffness = kp * kv if variant.proportional_on == "error" else 0
         return stiffness + (kp / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)
 
     @classmethod
-    def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
+    def declare(cls, measured: Measured, blocks: Blocks, variant: CascadeTerms) -> Mapping[str, Signal]:
         """The shares [N] of the position loop's command, of the velocity that opposes it, of the velocity loop's
         integral, and of the feedforward."""
         ahead = {name: blocks.key(name) for name in variant.feedforward}

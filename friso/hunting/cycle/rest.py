@@ -29,6 +29,8 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
 
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,)."""
-    rate = stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton
-    return stages.number("breakaway") / np.abs(rate)
+    """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,); where
+    it pauses instead, a time in which the loop moves."""
+    rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
+    with np.errstate(divide="ignore"):
+        return np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
