@@ -235,6 +235,51 @@ def test_sampled_blocks_are_the_difference_equations() -> None:
     assert str(SAMPLE_TIME) in flat
 
 
+def test_loops_at_their_own_rates() -> None:
+    """The position loop at every fourth sample, the velocity loop at every second."""
+    times = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms", "velocity_filter": "2 ms"}
+    machine = rigid(cascade(**times)).replace(
+        {"drive": {"sample_time": "250 us", "velocity_sample_time": "500 us", "position_sample_time": "1 ms"}}
+    )
+    flat, count = machine.flat(), 400
+    reading, reference = np.random.default_rng(3).normal(size=(2, count)).cumsum(axis=1) * 2e-4
+    forces, low, before, outer, inner, command, velocity = [], reading[0], reading[0], 0.0, 0.0, 0.0, 0.0
+    for k, (y, e) in enumerate(zip(reading, reference - reading, strict=True)):
+        if k % 4 == 0:
+            outer += 1e-3 * e
+            command = KV * (e + outer / 0.09)
+        if k % 2 == 0:
+            low = ((4e-3 - 5e-4) * low + 5e-4 * (y + before)) / (4e-3 + 5e-4)
+            velocity, before = (y - low) / 2e-3, y
+            inner += 5e-4 * (command - velocity)
+            wanted = command
+        forces.append(KP * (wanted - velocity + inner / 0.03))
+    assert commanded(flat, reference - reading, reading) == pytest.approx(np.array(forces), rel=1e-9, abs=1e-9)
+    with pytest.raises(friso.InputError, match="analysed in frequency"):
+        friso.bode(machine)
+
+
+@pytest.mark.parametrize("ratio", ["100 us", "400 us", "900 us"])
+def test_sample_times_are_whole_multiples(ratio: str) -> None:
+    with pytest.raises(friso.StageError, match="a whole multiple of the faster sample time"):
+        rigid(cascade()).replace({"drive": {"sample_time": "250 us", "position_sample_time": ratio}})
+
+
+def commanded(flat: dict[str, Any], errors: np.ndarray, reading: np.ndarray) -> np.ndarray:
+    """Forces of a drive, the reference at rest, that begins at its first reading."""
+    e, y = sp.symbols("e y", real=True)
+    force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, sp.S.Zero), 1)
+    parts = (force, *(number.update for number in held))
+    keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
+    once = sp.lambdify([e, y, *keys, *(number.symbol for number in held)], parts, [CLIP, "math"])
+    passed = {state(name) for name in ("signal_before_position", "low_passed_position")}
+    kept, forces = [reading[0] if number.symbol in passed else 0.0 for number in held], []
+    for row in zip(errors, reading, strict=True):
+        now, *kept = once(*row, *keys.values(), *kept)
+        forces.append(now)
+    return np.array(forces)
+
+
 # what the house asks of any controller
 
 

@@ -8,7 +8,8 @@ drive carries it out.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -130,6 +131,15 @@ class Blocks(ABC):
 
     nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
     """A signal that is always 0."""
+
+    @contextmanager
+    def loop(self, name: str) -> Iterator[None]:
+        """Blocks within it are those of a loop, "position" or "velocity", which a drive may carry out more slowly."""
+        yield
+
+    def handed_on(self, signal: Signal, name: str) -> Signal:
+        """What a loop hands to a faster one: held there until it is due again."""
+        return signal
 
     def key(self, name: str) -> sp.Symbol:
         """The parameter with this name in the table [controller] [SI]."""

@@ -6,6 +6,8 @@ integrals as their controller says. Without a filter a derivative is a differenc
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
@@ -73,7 +75,35 @@ class Sampled(Blocks):
         self.velocity_samples = velocity_samples
         self.held: list[Held] = []
         self.gains: Any = sp.S.One  # the factor of standstill
+        self.period: sp.Expr = SAMPLE_TIME
+        self.due: Any = None  # at which samples the present loop is carried out; None: at all
         self._integrals: list[_Integral] = []
+
+    @contextmanager
+    def loop(self, name: str) -> Iterator[None]:
+        """By a counter of samples; what the blocks hold changes where the loop is due."""
+        if self.form is None or name not in self.form.loops:
+            yield
+            return
+        before, first = (self.period, self.due), len(self.held)
+        passed = state(f"samples_of_{name}")
+        self.period, self.due = key(f"drive.{name}_sample_time"), passed < sp.Rational(1, 2)
+        yield
+        due = self.due
+        self.held[first:] = [
+            replace(number, update=sp.Piecewise((number.update, due), (number.symbol, True)))
+            for number in self.held[first:]
+        ]
+        again = passed + 1 > self.period / SAMPLE_TIME - sp.Rational(1, 2)
+        self.held.append(Held(passed, sp.Piecewise((0, again), (passed + 1, True))))
+        self.period, self.due = before
+
+    def handed_on(self, signal: Signal, name: str) -> Signal:
+        """By a number, where the loop is not carried out at every sample."""
+        if self.due is None:
+            return signal
+        kept = self._previous(f"{name}_handed_on", signal.value, signal.settled)
+        return replace(signal, value=sp.Piecewise((signal.value, self.due), (kept, True)), rate=None, before=None)
 
     def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
         """The number that a value was at the sample before."""
@@ -84,20 +114,20 @@ class Sampled(Blocks):
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
         """By the bilinear transform; `tau` [s]."""
         before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
-        passed = ((2 * tau - SAMPLE_TIME) * low + SAMPLE_TIME * (signal.value + before)) / (2 * tau + SAMPLE_TIME)
+        passed = ((2 * tau - self.period) * low + self.period * (signal.value + before)) / (2 * tau + self.period)
         self.held += [Held(before, signal.value, signal.settled), Held(low, passed, signal.settled)]
         return replace(signal, value=passed, rate=None, before=low)
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
         """With a filter by the bilinear transform, else a difference over samples; `tau` [s]."""
-        scale = signal.scale / SAMPLE_TIME
+        scale = signal.scale / self.period
         if tau is not None:
             slope = (signal.value - self.low_pass(signal, tau, name).value) / tau
             return Signal(slope, scale, signal.settled_rate, sp.S.Zero)
         count, past = self.velocity_samples, signal.value
         for n in range(1, count + 1):
-            past = self._previous(f"{name}_before_{n}", past, signal.settled - n * SAMPLE_TIME * signal.settled_rate)
-        return Signal((signal.value - past) / (count * SAMPLE_TIME), scale, signal.settled_rate, sp.S.Zero)
+            past = self._previous(f"{name}_before_{n}", past, signal.settled - n * self.period * signal.settled_rate)
+        return Signal((signal.value - past) / (count * self.period), scale, signal.settled_rate, sp.S.Zero)
 
     def integral(
         self,
@@ -109,20 +139,22 @@ class Sampled(Blocks):
     ) -> Signal:
         """A number that a sample adds to; `gain` in N per unit of it."""
         symbol, following = state(name), state(f"next_{name}")
-        share = SAMPLE_TIME * signal.value
+        share = self.period * signal.value
         if rule == "bilinear":
             before = signal.before
             if before is None:
                 before = self._previous(f"{name}_signal_before", signal.value, signal.settled)
-            share = SAMPLE_TIME / 2 * (signal.value + before)
+            share = self.period / 2 * (signal.value + before)
+        if self.due is not None:
+            share = sp.Piecewise((share, self.due), (0, True))
         self._integrals.append(_Integral(symbol, following, share, gain, limit))
-        return Signal(gain * following, gain * signal.scale * SAMPLE_TIME, gain * symbol, sp.S.Zero)
+        return Signal(gain * following, gain * signal.scale * self.period, gain * symbol, sp.S.Zero)
 
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
         """By the bilinear transform, from two samples back."""
-        (b0, b1, b2), (a0, a1, a2) = map(_tustin, (upper, lower))
+        (b0, b1, b2), (a0, a1, a2) = (_tustin(polynomial, self.period) for polynomial in (upper, lower))
         settled = upper[0] * signal.settled + (upper[1] - upper[0] * lower[1]) * signal.settled_rate
-        back = SAMPLE_TIME * signal.settled_rate
+        back = self.period * signal.settled_rate
         u1, u2 = state(f"signal_before_{name}"), state(f"signal_before_{name}_2")
         y1, y2 = state(f"filtered_{name}"), state(f"filtered_{name}_2")
         value = (b0 * signal.value + b1 * u1 + b2 * u2 - a1 * y1 - a2 * y2) / a0
@@ -229,8 +261,9 @@ class Sampled(Blocks):
         return force.xreplace(updates), tuple(held)
 
 
-def _tustin(polynomial: Polynomial) -> Polynomial:
-    """The coefficients of 1, 1/z and 1/z^2 of a polynomial in s by the bilinear transform, times (1 + 1/z)^2."""
-    double = 2 / SAMPLE_TIME
+def _tustin(polynomial: Polynomial, period: sp.Expr) -> Polynomial:
+    """The coefficients of 1, 1/z and 1/z^2 of a polynomial in s by the bilinear transform with a period [s], times
+    (1 + 1/z)^2."""
+    double = 2 / period
     p0, p1, p2 = polynomial[0], polynomial[1] * double, polynomial[2] * double**2
     return p0 + p1 + p2, 2 * p0 - 2 * p2, p0 - p1 + p2

@@ -30,8 +30,8 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 @dataclass(frozen=True)
 class ControllerForm:
     """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
-    it has integral action; what that does at the limit of the force (None: there is no limit); its filters; and its
-    settings against friction."""
+    it has integral action; what that does at the limit of the force (None: there is no limit); its filters; its
+    settings against friction; and which of its loops have sample times of their own."""
 
     kind: str
     form: str
@@ -40,6 +40,7 @@ class ControllerForm:
     anti_windup: AntiWindup | None = None
     filters: tuple[FilterForm, ...] = ()
     settings: FrictionSettings = NO_SETTINGS
+    loops: tuple[str, ...] = ()
 
     @property
     def law(self) -> type[ControllerSection]:
@@ -144,4 +145,5 @@ def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
         anti_windup=flat.get(ANTI_WINDUP, DEFAULT_ANTI_WINDUP) if FORCE_LIMIT in flat else None,
         filters=filter_forms(flat, FILTERS_KEY),
         settings=settings_of(flat),
+        loops=tuple(name for name in ("velocity", "position") if f"drive.{name}_sample_time" in flat),
     )

@@ -43,7 +43,13 @@ class DriveTiming:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
-        """The drive of a stage. Raises InputError for a delay of more samples than are followed."""
+        """The drive of a stage. Raises InputError for a delay of more samples than are followed, and for loops with
+        sample times of their own."""
+        for key in ("drive.position_sample_time", "drive.velocity_sample_time"):
+            if key in flat and flat[key] > flat["drive.sample_time"] * (1 + 1e-9):
+                expected = "loops that are all carried out at drive.sample_time: no others are analysed in frequency"
+                text = f"{flat[key]:g} s, with drive.sample_time = {flat['drive.sample_time']:g} s"
+                raise InputError(key, text, expected, 'sample_time = "125 us", without it')
         drive = cls(flat.get("drive.sample_time", 0.0), flat.get("drive.delay", 0.0))
         if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
             text = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Self
 
+import numpy as np
 from pydantic import model_validator
 
 from friso.errors import InputError, StageError
@@ -27,11 +28,30 @@ above_minus_1 = Bound("greater than -1", lambda value: value > -1)
 seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & (value < 1e15) & (value % 1 == 0))
 
 
+def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
+    """The rule that one sample time is a whole multiple of another."""
+    optional = "velocity" in fast
+
+    def holds(flat: Mapping[str, Any]) -> Any:
+        if slow not in flat or (fast not in flat and optional):
+            return True
+        if fast not in flat:
+            return False
+        ratio = flat[slow] / flat[fast]
+        return (ratio > 1 - 1e-9) & (abs(ratio - np.round(ratio)) < 1e-9 * ratio)
+
+    example = f"{slow.split('.')[1]} = {longer} with {fast.split('.')[1]} = {shorter}"
+    return Rule((slow, fast), holds, "a whole multiple of the faster sample time, which is given too", example)
+
+
 class Drive(UncertainSection):
     """How the controller is carried out: friso bode reads sample_time and delay, friso rig all of it."""
 
     sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
+    velocity_sample_time: Annotated[Value | None, Quantity("s", positive, "125 us")] = None
+    position_sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
+    """Of the loops of a cascade that are slower than sample_time, a whole number of samples each."""
     velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
     """Over how many samples the position's difference is taken for its velocity; only a log's simulation reads it."""
     current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
@@ -55,6 +75,9 @@ class Drive(UncertainSection):
     """Whether the integrator is reset to 0 where the error changes sign."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
+        _multiple("drive.velocity_sample_time", "drive.sample_time", '"125 us"', '"62.5 us"'),
+        _multiple("drive.position_sample_time", "drive.sample_time", '"1 ms"', '"125 us"'),
+        _multiple("drive.position_sample_time", "drive.velocity_sample_time", '"1 ms"', '"125 us"'),
         Rule(
             ("drive.velocity_samples",),
             lambda f: f.get("drive.velocity_samples", 1.0) % 1 == 0,

@@ -117,21 +117,25 @@ class Cascade(ControllerSection):
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
         lag = blocks.key("velocity_filter") if variant.filtered else None
-        velocity = blocks.fed_back(blocks.derivative(measured.position, "position", lag))
-        command = measured.error * kv
-        if variant.position_integral:
-            gain = kv / blocks.key("position_integral_time")
-            command += blocks.integral(measured.error, gain, "position_integral", "sum")
-        command += measured.reference_velocity * ahead.get("velocity_feedforward", 0)
+        with blocks.loop("position"):
+            command = measured.error * kv
+            if variant.position_integral:
+                gain = kv / blocks.key("position_integral_time")
+                command += blocks.integral(measured.error, gain, "position_integral", "sum")
+            command += measured.reference_velocity * ahead.get("velocity_feedforward", 0)
+            command = blocks.handed_on(command, "command")
         integral = blocks.nothing
-        if variant.velocity_integral:
-            gain = kp / blocks.key("velocity_integral_time")
-            integral = blocks.integral(command - velocity, gain, "velocity_integral", "sum")
+        with blocks.loop("velocity"):
+            velocity = blocks.fed_back(blocks.derivative(measured.position, "position", lag))
+            if variant.velocity_integral:
+                gain = kp / blocks.key("velocity_integral_time")
+                integral = blocks.integral(command - velocity, gain, "velocity_integral", "sum")
+            wanted, velocity = blocks.handed_on(command, "wanted"), blocks.handed_on(velocity, "velocity")
         feedforward = measured.reference_acceleration * ahead.get("acceleration_feedforward", 0)
         feedforward += measured.reference_velocity * ahead.get("viscous_feedforward", 0)
         feedforward += measured.reference_direction * ahead.get("coulomb_feedforward", 0)
         return {
-            "p": command * kp if variant.proportional_on == "error" else blocks.nothing,
+            "p": wanted * kp if variant.proportional_on == "error" else blocks.nothing,
             "v": -(velocity * kp),
             "i": integral,
             "f": feedforward,
