@@ -79,7 +79,8 @@ def cascade(
     keys = {name.removeprefix("controller."): value for name, value in flat.items() if name.startswith("controller.")}
     rates: dict[str, float] = {}
     if keys["velocity_filter"] > 0:
-        v = rates["filtered_position"] = (y - s["filtered_position"]) / keys["velocity_filter"]
+        rates["filtered_velocity"] = (v - s["filtered_velocity"]) / keys["velocity_filter"]
+        v = s["filtered_velocity"]
     v = filtered(flat, s, "feedback", v, rates)
     wanted = keys["kv"] * error + keys["velocity_feedforward"] * r_rate
     if "position_integral_time" in keys:

@@ -80,7 +80,7 @@ def test_trace_against_radau() -> None:
         "position",
         "velocity",
         "bristle_deflection",
-        "filtered_position",
+        "filtered_velocity",
         "position_integral",
         "velocity_integral",
     )
@@ -184,11 +184,11 @@ def difference_equations(flat: dict[str, Any], error: np.ndarray, reading: np.nd
     """The forces of a drive: the filter by Tustin, both integrals summed up, clamped at the limit."""
     key = {name.removeprefix("controller."): value for name, value in flat.items()}
     t, lag = flat["drive.sample_time"], key["velocity_filter"]
-    low, before, outer, inner = reading[0], reading[0], 0.0, 0.0
+    velocity, speed_before, before, outer, inner = 0.0, 0.0, reading[0], 0.0, 0.0
     forces = []
     for e, y, r_rate in zip(error, reading, speed, strict=True):
-        low = ((2 * lag - t) * low + t * (y + before)) / (2 * lag + t)
-        velocity, before = (y - low) / lag, y
+        velocity = ((2 * lag - t) * velocity + t * ((y - before) / t + speed_before)) / (2 * lag + t)
+        speed_before, before = (y - before) / t, y
 
         def force(outer: float, inner: float, e: float = e, r: float = r_rate, v: float = velocity) -> float:
             wanted = key["kv"] * (e + outer / key["position_integral_time"]) + key["velocity_feedforward"] * r
@@ -223,7 +223,7 @@ def test_sampled_blocks_are_the_difference_equations() -> None:
     parts = (force, *(number.update for number in held))
     keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
     step_once = sp.lambdify([e, y, r, *keys, *(number.symbol for number in held)], parts, [CLIP, "math"])
-    passed = {state(name) for name in ("signal_before_position", "low_passed_position")}
+    passed = {state("position_before_1")}
     kept = [reading[0] if number.symbol in passed else 0.0 for number in held]
     forces = []
     for row in zip(reference - reading, reading, speed, strict=True):
@@ -243,14 +243,14 @@ def test_loops_at_their_own_rates() -> None:
     )
     flat, count = machine.flat(), 400
     reading, reference = np.random.default_rng(3).normal(size=(2, count)).cumsum(axis=1) * 2e-4
-    forces, low, before, outer, inner, command, velocity = [], reading[0], reading[0], 0.0, 0.0, 0.0, 0.0
+    forces, speed, before, outer, inner, command, velocity = [], 0.0, reading[0], 0.0, 0.0, 0.0, 0.0
     for k, (y, e) in enumerate(zip(reading, reference - reading, strict=True)):
         if k % 4 == 0:
             outer += 1e-3 * e
             command = KV * (e + outer / 0.09)
         if k % 2 == 0:
-            low = ((4e-3 - 5e-4) * low + 5e-4 * (y + before)) / (4e-3 + 5e-4)
-            velocity, before = (y - low) / 2e-3, y
+            velocity = ((4e-3 - 5e-4) * velocity + 5e-4 * ((y - before) / 5e-4 + speed)) / (4e-3 + 5e-4)
+            speed, before = (y - before) / 5e-4, y
             inner += 5e-4 * (command - velocity)
             wanted = command
         forces.append(KP * (wanted - velocity + inner / 0.03))
@@ -272,7 +272,7 @@ def commanded(flat: dict[str, Any], errors: np.ndarray, reading: np.ndarray) -> 
     parts = (force, *(number.update for number in held))
     keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
     once = sp.lambdify([e, y, *keys, *(number.symbol for number in held)], parts, [CLIP, "math"])
-    passed = {state(name) for name in ("signal_before_position", "low_passed_position")}
+    passed = {state("position_before_1")}
     kept, forces = [reading[0] if number.symbol in passed else 0.0 for number in held], []
     for row in zip(errors, reading, strict=True):
         now, *kept = once(*row, *keys.values(), *kept)

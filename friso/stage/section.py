@@ -187,7 +187,7 @@ class TableArray:
     example: str
     most: int
 
-    def read(self, entries: Any) -> Rows:
+    def read(self, entries: Any, info: ValidationInfo) -> Rows:
         """The sections for an array of tables. Raises InputError, under the number of the one that is wrong."""
         size = len(entries) if isinstance(entries, list | tuple) else None
         if size is None or size > self.most:
@@ -196,7 +196,7 @@ class TableArray:
         rows = []
         for number, entry in enumerate(entries, start=1):
             try:
-                rows.append(Table(self.variants.pick, self.example).read(entry))
+                rows.append(Table(self.variants.pick, self.example).read(entry, info))
             except InputError as error:
                 raise error.under(str(number)) from None
         return Rows(rows)
@@ -206,7 +206,7 @@ class TableArray:
         return {place: self.variants.pick(keys_below(flat, place)) for place in row_keys(flat, key)}
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
+        return core_schema.with_info_plain_validator_function(self.read)
 
 
 def table_arrays(cls: type[Section]) -> dict[str, TableArray]:

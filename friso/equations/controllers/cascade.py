@@ -116,7 +116,6 @@ class Cascade(ControllerSection):
         integral, and of the feedforward."""
         ahead = {name: blocks.key(name) for name in variant.feedforward}
         kv, kp = blocks.key("kv"), blocks.key("kp")
-        lag = blocks.key("velocity_filter") if variant.filtered else None
         with blocks.loop("position"):
             command = measured.error * kv
             if variant.position_integral:
@@ -126,7 +125,10 @@ class Cascade(ControllerSection):
             command = blocks.handed_on(command, "command")
         integral = blocks.nothing
         with blocks.loop("velocity"):
-            velocity = blocks.fed_back(blocks.derivative(measured.position, "position", lag))
+            velocity = blocks.derivative(measured.position, "position")
+            if variant.filtered:
+                velocity = blocks.low_pass(velocity, blocks.key("velocity_filter"), "velocity")
+            velocity = blocks.fed_back(velocity)
             if variant.velocity_integral:
                 gain = kp / blocks.key("velocity_integral_time")
                 integral = blocks.integral(command - velocity, gain, "velocity_integral", "sum")
