@@ -309,7 +309,11 @@ def stepping(command: sp.Expr, held: tuple[Held, ...]) -> tuple[list[str], Calla
     """A sample as a function of numbers with these names; a deviate is the sine of the sum of its arguments."""
     expressions = [command, *(state.update for state in held)]
     names = sorted({str(symbol) for expression in expressions for symbol in expression.free_symbols})
-    plain = {"gaussian": lambda seed, tick: np.sin(seed + tick), "quantised": rounded}
+    plain = {
+        "gaussian": lambda seed, tick: np.sin(seed + tick),
+        "quantised": rounded,
+        "clipped": lambda x, end: np.clip(x, -end, end),
+    }
     return names, sp.lambdify([key(name) for name in names], expressions, [plain, "math"], cse=True)
 
 

@@ -53,7 +53,8 @@ def sampled_controller(
     limit = force_limit() if form.anti_windup else None
     pushed = replace(demand.force, value=demand.force.value + extra)
     force, held = blocks.finished(replace(demand, force=pushed), form.anti_windup, rest)
-    return clipped(force, limit) if limit is not None else force, held
+    within: Any = force if limit is None else clipped(force, limit)
+    return within, held
 
 
 @dataclass(frozen=True)
@@ -244,7 +245,8 @@ class Sampled(Blocks):
                     rests = sp.Or(rests, winding)
             following = integral.symbol + share
             if anti_windup == BACK_CALCULATION:
-                cut = clipped(unlimited, force_limit()) - unlimited
+                within: Any = clipped(unlimited, force_limit())
+                cut = within - unlimited
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
                 following += SAMPLE_TIME * cut / (gain * unwinding_time())
             kept = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))

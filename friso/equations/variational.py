@@ -92,7 +92,7 @@ def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
     )
     with mp.workdps(DIGITS):
         for n in range(1, TRIED + 1):
-            point = [mp.mpf(prime(n + k) % 97) / (50 + n) + 1 for k in range(1, len(others) + 1)]
+            point = [mp.mpf(int(prime(n + k)) % 97) / (50 + n) + 1 for k in range(1, len(others) + 1)]
             at = -rest(0, *point) / slope(0, *point)
             if abs(difference(at, *point)) > NOTHING:
                 return False

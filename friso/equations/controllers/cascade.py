@@ -106,9 +106,9 @@ class Cascade(ControllerSection):
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: CascadeTerms) -> sp.Expr:
         """The force on a stage that is displaced quickly [N/m]: the integral of its velocity is its displacement."""
-        kv, kp = blocks.key("kv"), blocks.key("kp")
-        stiffness = kp * kv if variant.proportional_on == "error" else 0
-        return stiffness + (kp / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)
+        rate = blocks.key("kv") if variant.proportional_on == "error" else 0
+        rate = rate + (1 / blocks.key("velocity_integral_time") if variant.velocity_integral else 0)
+        return blocks.key("kp") * rate
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: CascadeTerms) -> Mapping[str, Signal]:
