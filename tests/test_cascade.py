@@ -3,6 +3,7 @@ commands."""
 
 from __future__ import annotations
 
+import tomllib
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 import plain
 import pytest
 import sympy as sp
+from emps import emps_log
 from patched import patched
 from scipy.integrate import solve_ivp
 from variants import cascade, gains, limit, lugre, release, stage, step, there_and_back
@@ -371,6 +373,25 @@ def test_identify_in_its_own_loop(whole: Stage) -> None:
     estimates = {estimate.name: estimate.value for estimate in identify_moves(log, flat, own_loop=True).estimates}
     assert sum(estimates[key] for key in flat if key.startswith("masses.")) == pytest.approx(1.7, rel=0.01)
     assert estimates["friction.coulomb"] == pytest.approx(1.0, rel=0.05)
+
+
+def test_emps_is_a_cascade(tmp_path: Path) -> None:
+    """The same forces predicted from its record by the cascade as by the PD of the same gains, sampled and all."""
+    axis = friso.load(DRIVE.with_name("emps_axis.toml")).replace(
+        {"drive.sample_time": "1 ms", "drive.velocity_samples": 2.0}
+    )
+    pd = gains(0, extra='derivative_on = "measurement"\nforce_limit = "351.507 N"\n')
+    flat = axis.flat()
+    stiffness, damping = flat["controller.kv"] * flat["controller.kp"], flat["controller.kp"]
+    table = tomllib.loads(pd) | {"kp": f"{stiffness!r} N/m", "kd": f"{damping!r} N*s/m"}
+    log = emps_log(tmp_path)
+    part = slice(log.segments[0].start, log.segments[0].start + 4000)
+    errors = [
+        closed_loop(machine.flat(), log, part, ()).residuals(np.zeros((1, 0)))[0]
+        for machine in (axis, axis.replace({"controller": table}))
+    ]
+    assert np.sqrt(np.mean(errors[0] ** 2)) > 1.0  # newtons: the model is not perfect
+    assert np.abs(errors[0] - errors[1]).max() < 1e-6
 
 
 def test_steps_rest_where_there_is_no_integral() -> None:
