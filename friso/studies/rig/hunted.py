@@ -21,7 +21,7 @@ from friso.rig.run import Recorded, run
 from friso.rig.task import MoveTask, point_to_point
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.sizes import interval, jointed
+from friso.studies.rig.sizes import interval, jointed, pace, quicker
 from friso.studies.shares import Share, share
 
 RAILS = 20
@@ -87,6 +87,13 @@ def crossover_key(stage: Stage) -> str:
         actual, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
         raise InputError(CONTROLLER, actual, expected, 'crossover = "8 Hz"')
     return key
+
+
+def at_crossovers(stage: Stage, frequencies: np.ndarray) -> dict[str, np.ndarray]:
+    """The keys of the controller at crossovers [Hz], their values of the same shape: one that states none is made
+    faster as a whole, from that of a van Dijk controller of the same proportional gain (`pace`)."""
+    key = stage.controller.bandwidth_key
+    return quicker(stage, frequencies / pace(stage)) if key is None else {key: frequencies}
 
 
 def rails(stage: Stage) -> np.ndarray:

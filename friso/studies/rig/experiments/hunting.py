@@ -16,8 +16,7 @@ from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig.hunted import (
     Hunted,
-    crossover,
-    crossover_key,
+    at_crossovers,
     distance,
     follow,
     joined,
@@ -30,6 +29,7 @@ from friso.studies.rig.hunted import (
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, rig_log
+from friso.studies.rig.sizes import pace
 from friso.studies.shares import Share
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
@@ -103,11 +103,11 @@ class HuntingResult:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """The move at all crossovers on all rails, and releases with the joint locked. Raises InputError without a joint,
-    a crossover or a motion that moves the stage."""
+    """The move at all crossovers on all rails, and releases with the joint locked. Raises InputError without a joint or
+    a motion that moves the stage."""
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
-    frequencies, seeds = crossover(stage) * CROSSOVERS, rails(stage)
-    changes = on_rails(stage, {crossover_key(stage): frequencies}, seeds)
+    frequencies, seeds = pace(stage) * CROSSOVERS, rails(stage)
+    changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     moves = {}
     for case, variant in stages.items():
         numbers = numbers_of(seed, len(frequencies), len(seeds))
@@ -115,7 +115,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         moves[case] = runs.shaped(len(frequencies), len(seeds))
     started = _releases(stages["locked"], seed, frequencies, seeds, progress)
     rail = int(np.argmax(moves["locked"].counted[SHOWN[0]]))
-    machine = on_rails(stage, {crossover_key(stage): frequencies}, seeds[[rail]])
+    machine = on_rails(stage, at_crossovers(stage, frequencies), seeds[[rail]])
     again = {
         case: once(variant, move(stage), [seed + rail] * len(frequencies), machine) for case, variant in stages.items()
     }
@@ -128,19 +128,20 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     logs = []
     for case, row in product(CASES, SHOWN):
         name = f"hunting_{case}_{frequencies[row]:.3g}_hz"
-        file = machine_file(stages[case], seeds[rail], {crossover_key(stage): f"{frequencies[row]:.6g} Hz"})
+        tuned = {key: float(f"{value:.6g}") for key, value in at_crossovers(stage, frequencies[row]).items()}
+        file = machine_file(stages[case].with_numbers(tuned), seeds[rail])
         logs.append(rig_log(again[case], row, name, "moves", file, seed + rail))
     return Outcome("hunting", stage, seed, tuple(logs), result, _notes(stage, result))
 
 
-def machine_file(stage: Stage, rail: float, changes: Mapping[str, str]) -> Stage:
-    """The stage file of a machine on a rail of another seed, with changes."""
-    return stage.replace(dict(changes) | ({} if stage.rail is None else {"rail.seed": rail}))
+def machine_file(stage: Stage, rail: float) -> Stage:
+    """The stage file of a machine on a rail of another seed."""
+    return stage if stage.rail is None else stage.replace({"rail.seed": rail})
 
 
 def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, progress: Progress) -> Hunted:
     """Releases at crossovers [Hz] on all rails, shape (displacements, crossovers, rails)."""
-    changes = on_rails(stage, {crossover_key(stage): frequencies}, seeds)
+    changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     numbers = numbers_of(seed, len(frequencies), len(seeds))
     tasks = [released(stage, share * distance(stage)) for share in DISPLACEMENTS]
     parts = [follow(stage, task, numbers, changes, progress, "releases, joint locked") for task in tasks]
@@ -158,7 +159,7 @@ def _startable(
         return None
     row, size, rail = map(int, places[0])
     displacement = DISPLACEMENTS[size] * distance(stage)
-    changes = on_rails(stage, {crossover_key(stage): frequencies[[row]]}, seeds[[rail]])
+    changes = on_rails(stage, at_crossovers(stage, frequencies[[row]]), seeds[[rail]])
     tasks = (move(stage), released(stage, displacement))
     quiet, swings = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)
     return Startable(quiet, swings, float(frequencies[row]), rail, displacement)
