@@ -31,6 +31,12 @@ AGREEMENT = 1e-3
 """Relative difference that numbers of different processors may have: fused products round differently, and a run over
 20 s carries that on."""
 
+OF_SWINGS = {"peak_to_peak", "period"}
+"""What is compared where the stage swings: of what comes to rest, they are those of the solver's errors."""
+
+OF_SOLVER = {"steps", "rejected"}
+"""What may differ: steps of the solver, which are another number where rounding decides on one."""
+
 DEBIAN, PYTHON, GLIBC = "bookworm", "3.11", 36
 """The release, its Python, and its C library (2.36), which says what wheels run there."""
 
@@ -86,9 +92,9 @@ def differences(here: Answers, there: Answers) -> list[tuple[str, str]]:
     verdicts = [[case["verdict"] for case in machine.check["cases"].values()] for machine in (here, there)]
     rows = [("verdicts of the check", str(sum(a != b for a, b in zip(*verdicts, strict=True))))]
     swings = here.runs["outcome"].values == "swings"
-    for name in here.runs.data_vars:
+    for name in sorted(here.runs.data_vars.keys() - OF_SOLVER):
         one, other = here.runs[name].values, there.runs[name].values
-        if name == "period":  # of what comes to rest, it is that of rounding errors, where there is one
+        if name in OF_SWINGS:
             one, other = one[swings], other[swings]
         if one.dtype.kind != "f":
             rows.append((f"map, {name}", str(int((one.astype(str) != other.astype(str)).sum()))))
