@@ -99,6 +99,10 @@ def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
     seen = model.clock.seen if model.clock else {}
     arguments = [*model.symbols, *flags, *model.fixed, *seen, TIME, TICK, *model.parameters]
     known = {"quantised": _quantised, "gaussian": lambda seed, tick: 0.0}
+    known |= {
+        "clipped": lambda value, end: min(max(value, -end), end),
+        "sine": lambda turn: math.sin(2 * math.pi * turn),
+    }
 
     def compiled(expressions: Any) -> Any:
         return sp.lambdify([*arguments], list(expressions), modules=[known, "math"], cse=True)
