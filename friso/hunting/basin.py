@@ -23,6 +23,10 @@ from friso.stage import Stage
 LAST = 1.5
 """Periods at the end of a run by which it is judged."""
 
+SOON, CAUGHT = 16.0, 0.003
+"""Periods after which runs are looked at for the first time: those whose swing differs by no more than this share from
+that which attracts have come to it, and need not be followed for as long as the slowest."""
+
 RTOL = 1e-6
 """Relative tolerance of these runs."""
 
@@ -31,6 +35,9 @@ RANGE, POINTS = (1 / 30, 300.0), 128
 
 EDGE = 0.01
 """Share to which the edges of the windows are found."""
+
+BETWEEN = 7
+"""Kicks between two that enclose an edge: as many runs take hardly longer than one."""
 
 MOVES = 128
 """Moves drawn."""
@@ -89,16 +96,36 @@ def ends_in(
     the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; and
     which were completed; both of shape (count,). The target is the same for all, or there is one for each. `how`:
     `RunOptions`."""
-    end = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
-    band = np.broadcast_to(target.amplitude / 2, (count,))
-    long = {**flat, "motion.duration": end}
+    corner, size = np.max(last_corner(flat)), np.broadcast_to(2 * target.amplitude, (count,))
+    after = np.broadcast_to(corner + target.lasting, (count,))
+    swing, completed = _last_swing(flat, np.minimum(after, corner + SOON * target.period), target, starts, rtol, **how)
+    ends = completed & (np.abs(swing / size - 1) <= CAUGHT)
+    if (on := np.flatnonzero(completed & ~ends)).size:
+        part = {key: value[on] if np.ndim(value) else value for key, value in flat.items()}
+        still = target.of(on) if np.ndim(target.amplitude) else target
+        begin = None if starts is None else starts[on]
+        swing, completed[on] = _last_swing(part, after[on], still, begin, rtol, **how)
+        ends[on] = lasts(swing, 0.0, size[on] / 4) & completed[on]
+    return ends, completed
+
+
+def _last_swing(
+    flat: Mapping[str, Any],
+    end: np.ndarray,
+    target: Target,
+    starts: np.ndarray | None,
+    rtol: float,
+    **how: Any,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Peak to peak at the ends of runs [s], (count,), and which runs were completed."""
+    long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - LAST * target.period / end))
     options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **how)
-    ends, completed = np.zeros(count, bool), np.zeros(count, bool)
+    swing, completed = np.zeros(count), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
         completed[runs.numbers] = runs.results.statuses == Status.DONE
-        ends[runs.numbers] = lasts(swing_of(runs), 0.0, band[runs.numbers]) & completed[runs.numbers]
-    return ends, completed
+        swing[runs.numbers] = swing_of(runs)
+    return swing, completed
 
 
 def displacements(stage: Stage, target: Target) -> Kick:
@@ -124,15 +151,16 @@ def pushes(stage: Stage, target: Target) -> Kick:
 
 
 def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
-    """The windows of kicks that hunt, searched on a grid about `unit`, their edges by bisection."""
+    """The windows of kicks that hunt, searched on a grid about `unit`, their edges closer and closer."""
     kicks = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
     hunting = hunts(kicks)
     edges = np.flatnonzero(hunting[1:] != hunting[:-1])
     low, high = kicks[edges], kicks[edges + 1]
     while edges.size and np.any(high > (1 + EDGE) * low):
-        middle = np.sqrt(low * high)
-        like_low = hunts(middle) == hunting[edges]
-        low, high = np.where(like_low, middle, low), np.where(like_low, high, middle)
+        between = np.geomspace(low, high, BETWEEN + 2, axis=1)
+        unlike = hunts(between[:, 1:-1].ravel()).reshape(-1, BETWEEN) != hunting[edges, None]
+        last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), BETWEEN)
+        low, high = (between[np.arange(len(edges)), last + step] for step in (0, 1))
     places = np.where(hunting[edges], low, high)  # the side that hunts
     ends = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
     windows = tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))

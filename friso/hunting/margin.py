@@ -12,7 +12,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.outward import PRECISE, AttractionEnd, Beyond, Outward
+from friso.hunting.outward import ALONG, PRECISE, AttractionEnd, Beyond, Outward
 from friso.stage import Stage
 
 FARTHEST = 10.0
@@ -110,11 +110,13 @@ class _Grid:
         for motion in survey.motions:
             self.motions[motion.stage].append(motion)
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
+        self.inspected: set[int] = set()
 
     def know(self, here: int, survey: Attractors) -> None:
         """Take over what a thorough survey of one of the stages shows."""
         self.attracts[here], self.decided[here] = survey.attracts[0], survey.decided[0]
         self.motions[here] = list(survey.motions)
+        self.inspected.add(here)
 
     def last_edge(self, here: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
@@ -136,10 +138,13 @@ class _Grid:
 
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
         """The end of what attracts at a factor, by number, while nothing does at the next one, above (`ahead` 1) or
-        below (-1). None if it attracts as far as the search goes: then it is known to do so everywhere up to there."""
+        below (-1). None if it attracts as far as the search goes: then it is known to do so everywhere up to there; or
+        if it does not attract on closer inspection, which is known then."""
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
         outward = Outward(self.flat, FARTHEST**ahead)
+        if not self.proved(at, outward):
+            return None
         try:
             end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + ahead]))
         except Beyond:
@@ -156,6 +161,17 @@ class _Grid:
         last = int(np.flatnonzero(beyond <= 0)[-1 if ahead > 0 else 0])
         self.ends[at, ahead] = self.ends[last, ahead] = end
         return end
+
+    def proved(self, at: int, outward: Outward) -> bool:
+        """Whether something attracts at a factor, by number, once orbits were tried to be closed."""
+        motions = self.motions[at]
+        if motions and at not in self.inspected and all(motion.cycles is None for motion in motions):
+            distances = np.outer([motion.distance for motion in motions], ALONG).ravel()
+            survey = outward.surveyed(self.factors[at : at + 1], distances)
+            self.attracts[at], self.decided[at] = survey.attracts[0], survey.decided[0]
+            self.motions[at] = list(survey.motions)
+        self.inspected.add(at)
+        return bool(self.attracts[at])
 
     def lower_end(self, here: int) -> AttractionEnd | None:
         """The end below of what attracts at a number; None if it attracts as far as the search goes, or if it is not

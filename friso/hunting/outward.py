@@ -22,7 +22,10 @@ SCALE = 0.06
 """Change of the logarithm of the bandwidth that counts as much as one of the logarithms of distance and time."""
 
 PRECISE = 1e-5
-"""Step along a branch that ends the search for its end."""
+"""Share of the bandwidth up to which the end of a branch is known."""
+
+PACE = 6.0
+"""How much faster branches are followed than where they are drawn."""
 
 BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
@@ -92,7 +95,7 @@ class Outward:
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
-            survey = self.surveyed(np.array([next_to]), ALONG * distance)
+            survey = self.surveyed(np.array([next_to]), ALONG * distance, at_once=True)
             if not survey.attracts[0]:
                 return AttractionEnd(at, next_to, ended and bool(survey.decided[0]), reserve)
             at, motions = next_to, survey.motions
@@ -110,11 +113,14 @@ class Outward:
         return AttractionEnd(at if last < 0 else float(factors[last]), float(factors[last + 1]), False)
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def surveyed(self, factors: np.ndarray, distances: np.ndarray | None = None, cycles: bool = True) -> Attractors:
-        """What attracts at some factors, tried from distances [m] as well. Without `cycles` simulations alone tell:
-        orbits that attract from a narrow range show where they are followed from wider ones."""
+    def surveyed(
+        self, factors: np.ndarray, distances: np.ndarray | None = None, cycles: bool = True, at_once: bool = False
+    ) -> Attractors:
+        """What attracts at some factors, tried from distances [m] as well, all starts `at_once` or not. Without
+        `cycles` simulations alone tell: orbits that attract from a narrow range show where they are followed from wider
+        ones."""
         tried = None if distances is None else np.tile(distances, (len(factors), 1))
-        return attractors(self._stages(factors), tried=tried, cycles=cycles, at_once=cycles and len(factors) == 1)
+        return attractors(self._stages(factors), tried=tried, cycles=cycles, at_once=at_once)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
@@ -133,7 +139,7 @@ class Outward:
             return self._stages(at * np.exp(ahead * SCALE * places))
 
         length = abs(float(np.log(self.farthest / at))) / SCALE
-        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings)
+        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=PACE)
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest = start
 
@@ -147,7 +153,7 @@ class Outward:
         ended = reason == REACHED
         first, second = ([start, *points])[-2:] if points else (start, start)
         if points and not abs(second.multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
-            last = last_inside(tracer, first, second, _kind(first, second), PRECISE)
+            last = last_inside(tracer, first, second, _kind(first, second), PRECISE / SCALE)
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):

@@ -11,7 +11,7 @@ from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 
 PERIODS, CONSTANTS = (60.0, 600.0), 8.0
 """Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
@@ -98,16 +98,16 @@ def attractors(
     Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite. Without
-    `cycles` many stages are surveyed by simulations alone. Starts are tried `at_once`, and beside the cycles, by a
+    `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted. Starts are tried `at_once`, and beside the cycles, by a
     thorough survey and where nothing is thought to attract: one run alone takes as long as eight together."""
-    survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
+    survey, every = Survey(stages.count, thorough, rtol, prove=cycles), np.arange(stages.count)
     at_once = thorough or at_once
     suggested = families(stages, rtol) if at_once and cycles else ()
-    starts = Starts(stages)
-    starts.spread(thorough)
-    _take_notice(starts, survey, every, suggested)
+    starts = Starts(stages) if cycles else Starts(stages, ROUGH)
     if tried is not None:
         starts.stuck_at(tried)
+    starts.spread(thorough)
+    _take_notice(starts, survey, every, suggested)
     for runs, of in starts.waves(at_once):
         survey.follow(runs, of)
     if cycles and not at_once:

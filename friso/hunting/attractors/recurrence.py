@@ -13,6 +13,8 @@ SAME = 0.03
 """Share of the largest swing by which one that repeats another may differ: runs at usual tolerances scatter by half of
 it where a stage swings by far less than it is displaced by the break-away force."""
 
+EARLIER = 16
+"""Swings before the last ones, to see whether a motion approaches what it repeats."""
 
 CLOSER = 0.2
 """Share of the error after fewer swings that there is after more if the motion repeats itself after these."""
@@ -31,6 +33,7 @@ class Recurrence:
     better_time: np.ndarray
     size: np.ndarray
     off: np.ndarray
+    earlier: np.ndarray
     mean: np.ndarray
 
     def take(self, numbers: np.ndarray) -> Recurrence:
@@ -49,17 +52,30 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
     there = np.isfinite(values)
     size = np.max(values, axis=1, initial=-np.inf, where=there) - np.min(values, axis=1, initial=np.inf, where=there)
     swings, better = np.zeros(runs, np.int64), np.zeros(runs, np.int64)
-    time, better_time, least = (np.full(runs, np.nan) for _ in range(3))
+    time, better_time, least, earlier = (np.full(runs, np.nan) for _ in range(4))
     for n in range(1, MOST + 1):
-        seen = max(n, 4)  # and all of these have to repeat what was n swings before
+        seen = _seen(n)
         if room < seen + n:
             break
-        last, before = slice(room - seen, room), slice(room - seen - n, room - n)
-        off = np.abs(values[:, last] - (-1) ** n * values[:, before]).max(axis=1) / size
-        takes = (times[:, last] - times[:, before]).mean(axis=1)
+        off = _off(values, n, room) / size
+        takes = (times[:, room - seen :] - times[:, room - seen - n : room - n]).mean(axis=1)
         same = (off <= SAME) & (mirrored | (n % 2 == 0))
         first = same & (swings == 0)
         swings[first], time[first] = n, takes[first]
         closer = first | (same & (off < CLOSER * least))
         better[closer], better_time[closer], least[closer] = n, takes[closer], off[closer]
-    return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, mean)
+        if room - EARLIER >= seen + n:
+            earlier[closer] = (_off(values, n, room - EARLIER) / size)[closer]
+    return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, earlier, mean)
+
+
+def _off(values: np.ndarray, swings: int, end: int) -> np.ndarray:
+    """By how much swings up to a number fail to repeat what was some swings before [m], shape (runs,)."""
+    seen = _seen(swings)
+    last, before = values[:, end - seen : end], values[:, end - seen - swings : end - swings]
+    return np.asarray(np.abs(last - (-1) ** swings * before).max(axis=1))
+
+
+def _seen(swings: int) -> int:
+    """How many swings have to repeat what was some swings before."""
+    return max(swings, 4)

@@ -40,7 +40,7 @@ LEG = 0.25
 RESOLVED = 0.0004
 """Least swing that is looked at, in units of the deflection of the loop by the break-away force."""
 
-CREEPS = np.geomspace(0.001, 1.0, 31)
+CREEPS = np.geomspace(0.001, 1.0, 16)
 """Distances, in the same units, that are tried for the one from which on a stage breaks away."""
 
 ACROSS = 0.05

@@ -29,7 +29,7 @@ integrated the distance, in units of the time in which the loop moves."""
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
 
-EVERY = 16, 4, 1
+EVERY = 64, 16, 4, 1
 """One start in so many is tried first, then one in so many of the others, and so on."""
 
 ASIDE = (-0.03, -0.003, 0.003, 0.03)

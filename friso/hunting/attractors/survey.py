@@ -43,6 +43,10 @@ EXACT = 1e-7
 """Share of peak to peak up to which a motion repeats itself that is taken for attracted at once: so near a cycle that
 repels no run comes by chance."""
 
+CONVERGED, APPROACHES = 1e-4, 0.7
+"""The same where nothing has to be proved, and the share of what it was some swings before below which it does for
+motions that are about to repeat themselves (`SETTLED`)."""
+
 CLOSED = 3
 """Orbits that are tried to be closed for a stage after one round of a thorough survey, of others one."""
 
@@ -121,13 +125,15 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
 
 @dataclass
 class Survey:
-    """What has been learned of stages so far: the motions that attract; and of which stages that is `unknown`, because
+    """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or takes
+    motions that have converged for attracted. The motions that attract; and of which stages that is `unknown`, because
     a run failed or had to be given up, the time constant of the cycle that repels most slowly, `slowest` [s] (0: none),
     and the steps that its runs may take still, `left`, all of shape (count,)."""
 
     count: int
     thorough: bool
     rtol: float
+    prove: bool = True
     attracting: list[Swinging] = field(default_factory=list)
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
@@ -198,6 +204,8 @@ class Survey:
         ready = on & (ends.repeats.swings > 0)
         if early:
             ready &= (ends.repeats.off < SETTLED) & ~self._repels(of, ends)
+        if not self.prove:
+            ready &= ~self._exact(of, ends)
         self._close(runs, of, ends, np.flatnonzero(ready))
         return np.flatnonzero(on & ~self._alike(of, ends))
 
@@ -230,20 +238,29 @@ class Survey:
         """Close orbits from one of each kind of runs, of those with some numbers."""
         most, repeats = CLOSED if self.thorough else 1, ends.repeats
         kinds = which[_kinds(of[which], ends.take(which), most)[0]]
-        for swings, times in ((repeats.swings, repeats.time), (repeats.better, repeats.better_time)):
-            if not kinds.size:
-                break
-            for group, cycles in closed(runs.take(kinds), swings[kinds], times[kinds], repeats.size[kinds], self.rtol):
-                numbers = kinds[group]
-                self.add(of_cycles(of[numbers], cycles, runs.stages.sticking))
-                self.slow_down(of[numbers], cycles)
-                for kinds_of, which in (
-                    (self._attracting_kinds, cycles.attracting),
-                    (self._others, ~cycles.attracting),
-                ):
-                    columns = (column[numbers[which]].tolist() for column in (of, repeats.size, repeats.time))
-                    kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
-            kinds = kinds[(repeats.better > repeats.swings)[kinds] & ~self._alike(of, ends)[kinds]]
+        pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
+        tries = (
+            (np.where(pairs, 1, 0), repeats.time / 2),
+            (repeats.swings, repeats.time),
+            (np.where(repeats.better > repeats.swings, repeats.better, 0), repeats.better_time),
+        )
+        for swings, times in tries:
+            on = kinds[(swings[kinds] > 0) & ~self._alike(of[kinds], ends.take(kinds))]
+            if on.size:
+                self._close_after(runs, of, ends, on, swings[on], times[on])
+
+    def _close_after(
+        self, runs: Pending, of: np.ndarray, ends: Ends, on: np.ndarray, swings: np.ndarray, times: np.ndarray
+    ) -> None:
+        """Close orbits from the runs with the numbers `on`, after numbers of swings and times [s]."""
+        repeats = ends.repeats
+        for group, cycles in closed(runs.take(on), swings, times, repeats.size[on], self.rtol):
+            numbers = on[group]
+            self.add(of_cycles(of[numbers], cycles, runs.stages.sticking))
+            self.slow_down(of[numbers], cycles)
+            for kinds_of, which in ((self._attracting_kinds, cycles.attracting), (self._others, ~cycles.attracting)):
+                columns = (column[numbers[which]].tolist() for column in (of, repeats.size, repeats.time))
+                kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
 
     def _last(self, runs: Pending, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Take runs that swing to the end for attracted, if they have not decayed; those that may be about to leave a
@@ -276,9 +293,13 @@ class Survey:
         return same & (ends.repeats.off < SETTLED) & ~self._repels(of, ends)
 
     def _exact(self, of: np.ndarray, ends: Ends) -> np.ndarray:
-        """Which runs repeat themselves as exactly as they do on what attracts alone, and unlike any closed cycle that
-        repels."""
-        return (ends.repeats.off < EXACT) & (ends.repeats.swings > 0) & ~_like(self._closed, of, ends)
+        """Which runs repeat themselves as exactly as they do on what attracts alone, or approach that where nothing
+        has to be proved, and unlike any closed cycle that repels."""
+        repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, of, ends)
+        if self.prove:
+            return unlike & (repeats.off < EXACT)
+        approaches = (repeats.off < SETTLED) & (repeats.off < APPROACHES * repeats.earlier)
+        return unlike & ((repeats.off < CONVERGED) | approaches)
 
     def _observe(self, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         repeats = ends.repeats

@@ -78,12 +78,20 @@ class Branch:
 
 class Tracer:
     """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
-    those of the cycle (the latter only if they are not as few as there may be)."""
+    those of the cycle (the latter only if they are not as few as there may be); `pace` times as fast as a curve is
+    drawn."""
 
     def __init__(
-        self, family: Family, sign: float, rtol: float = RTOL, farthest: float = 1.0, swings: int | None = None
+        self,
+        family: Family,
+        sign: float,
+        rtol: float = RTOL,
+        farthest: float = 1.0,
+        swings: int | None = None,
+        pace: float = 1.0,
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
+        self.first, self.longest = pace * FIRST, pace * LONGEST
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -105,14 +113,14 @@ class Tracer:
     def walk(self, start: Point, ahead: float, until: Callable[[Point], bool] | None = None) -> tuple[list[Point], str]:
         """The points that follow the start on one side, and how they end; `ahead` is 1 or -1. The first point of which
         `until` holds is the last, and asymmetric cycles are then followed on where they meet the symmetric one."""
-        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), FIRST
+        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
         while len(points) <= MOST:
             last = points[-1]
             states = _straight_on(points[-2], last, step) if len(points) > 1 else None
             point = self.solve(last, last.vector + step * direction, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
-            near = point is not None and 0 < length < (2 * step if len(points) > 1 else LONGEST)
+            near = point is not None and 0 < length < (2 * step if len(points) > 1 else self.longest)
             ahead = float(moved @ direction) / length if near else 0.0
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
@@ -122,7 +130,7 @@ class Tracer:
                     return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
                 continue
             coarse = abs(point.multiplier - last.multiplier) > SMOOTH and abs(last.multiplier) < STEEP
-            if coarse and step > FIRST:
+            if coarse and step > self.first:
                 step /= 2
                 continue
             if not 0 <= point.place <= self.farthest:
@@ -132,7 +140,7 @@ class Tracer:
             points.append(point)
             if until is not None and until(point):
                 return points[1:], REACHED
-            step = min(1.5 * step, LONGEST)
+            step = min(1.5 * step, self.longest)
             if reason := self._stop(point):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
