@@ -54,7 +54,7 @@ def fake_cycle(symmetric: bool = True, multiplier: float = -0.9312, apart: float
 def fake_hunting(*cycles: Cycle, reason: str = "", certain: bool = True) -> Hunting:
     distances = np.geomspace(5e-5, 4e-3, 32)[None, :]
     returns = np.where(distances > 2e-4, 1e-3 - 0.93 * distances, 0.0)
-    target = Target(5.2e-4, 1.6277, 100.0) if any(cycle.attracts for cycle in cycles) else None
+    target = Target(5.2e-4, 1.6277, 100.0, 25.0) if any(cycle.attracts for cycle in cycles) else None
     return Hunting(cycles, reason, certain, ReturnMap(distances, returns, np.ones((1, 32))), (), target)
 
 

@@ -23,9 +23,9 @@ from friso.stage import Stage
 LAST = 1.5
 """Periods at the end of a run by which it is judged."""
 
-SOON, CAUGHT = 16.0, 0.003
-"""Periods after which runs are looked at for the first time: those whose swing differs by no more than this share from
-that which attracts have come to it, and need not be followed for as long as the slowest."""
+CAUGHT = 0.003
+"""Share by which the swing of a run that is looked at early may differ from that which attracts it: then it need not be
+followed for as long as the slowest."""
 
 RTOL = 1e-6
 """Relative tolerance of these runs."""
@@ -97,10 +97,10 @@ def ends_in(
     which were completed; both of shape (count,). The target is the same for all, or there is one for each. `how`:
     `RunOptions`."""
     corner, size = np.max(last_corner(flat)), np.broadcast_to(2 * target.amplitude, (count,))
-    after = np.broadcast_to(corner + target.lasting, (count,))
-    swing, completed = _last_swing(flat, np.minimum(after, corner + SOON * target.period), target, starts, rtol, **how)
-    ends = completed & (np.abs(swing / size - 1) <= CAUGHT)
-    if (on := np.flatnonzero(completed & ~ends)).size:
+    early, after = (np.broadcast_to(corner + time, (count,)) for time in (target.early, target.lasting))
+    swing, completed = _last_swing(flat, early, target, starts, rtol, **how)
+    ends = completed & np.where(early < after, np.abs(swing / size - 1) <= CAUGHT, lasts(swing, 0.0, size / 4))
+    if (on := np.flatnonzero(completed & ~ends & (early < after))).size:
         part = {key: value[on] if np.ndim(value) else value for key, value in flat.items()}
         still = target.of(on) if np.ndim(target.amplitude) else target
         begin = None if starts is None else starts[on]

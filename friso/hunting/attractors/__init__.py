@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,10 @@ from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 PERIODS, CONSTANTS = (60.0, 600.0), 8.0
 """Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
 from that: near a flip transients last."""
+
+EARLY = 0.25
+"""Share of that time after which a motion that swings by as much as what attracts has come to it, if deviations from
+that shrink so fast that they are small by then: two time constants, or 15 periods."""
 
 PATIENT = 3.0
 """Longest period that these are counted in, in units of a typical one."""
@@ -31,15 +35,16 @@ WAITED = 6.0
 class Target:
     """What all motions of stages end in that do not come to rest, arrays of shape (count,) or numbers: they swing by
     the `amplitude` [m], half of peak to peak, at least; the `period` is not longer than this [s]; and they do so once
-    the time `lasting` has passed [s]."""
+    the time `lasting` has passed [s]. One that swings by that amplitude after the time `early` [s] will do so."""
 
     amplitude: Any
     period: Any
     lasting: Any
+    early: Any
 
     def of(self, numbers: Any) -> Target:
         """That of the stages with these numbers, or of one."""
-        return Target(self.amplitude[numbers], self.period[numbers], self.lasting[numbers])
+        return Target(*(getattr(self, field.name)[numbers] for field in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -66,14 +71,16 @@ class Attractors:
     @property
     def target(self) -> Target:
         """What the stages' motions end in, arrays of shape (count,): NaN where nothing attracts."""
-        amplitude, period, lasting = (np.full(len(self.decided), np.nan) for _ in range(3))
+        amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
         for motion in self.motions:
             k, unit = motion.stage, min(motion.period, PATIENT * self.typical[motion.stage])
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
-            periods = np.clip(np.nan_to_num(CONSTANTS * motion.time_constant / unit), *PERIODS)
-            lasting[k] = np.fmax(lasting[k], max(periods * unit, WAITED * motion.period))
-        return Target(amplitude, period, lasting)
+            constants = CONSTANTS * motion.time_constant / unit
+            until = max(np.clip(np.nan_to_num(constants), *PERIODS) * unit, WAITED * motion.period)
+            lasting[k] = np.fmax(lasting[k], until)
+            early[k] = np.fmax(early[k], EARLY * until if constants < PERIODS[1] else until)
+        return Target(amplitude, period, lasting, early)
 
     def take(self, numbers: np.ndarray) -> Attractors:
         """Those of the stages with these numbers."""
