@@ -19,13 +19,16 @@ from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.cycle.shooting import simplest
 
 SCALE = 0.06
-"""Change of the logarithm of the bandwidth that counts as much as one of the logarithms of distance and time."""
+"""Change of the logarithm of the bandwidth over which is simulated where no orbit can be followed."""
 
 PRECISE = 1e-5
 """Share of the bandwidth up to which the end of a branch is known."""
 
-PACE = 6.0
+PACE = 3.0
 """How much faster branches are followed than where they are drawn."""
+
+FLAT = 3e-4
+"""Step along a branch that ends the search for a fold: there the bandwidth changes with the square of it."""
 
 BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
@@ -136,9 +139,9 @@ class Outward:
         assert cycles is not None
 
         def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-            return self._stages(at * np.exp(ahead * SCALE * places))
+            return self._stages(at * np.exp(ahead * places))
 
-        length = abs(float(np.log(self.farthest / at))) / SCALE
+        length = abs(float(np.log(self.farthest / at)))
         tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=PACE)
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest = start
@@ -153,12 +156,13 @@ class Outward:
         ended = reason == REACHED
         first, second = ([start, *points])[-2:] if points else (start, start)
         if points and not abs(second.multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
-            last = last_inside(tracer, first, second, _kind(first, second), PRECISE / SCALE)
+            kind = _kind(first, second)
+            last = last_inside(tracer, first, second, kind, FLAT if kind == "fold" else PRECISE)
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
         elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):
             raise Beyond
-        return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit), ended
+        return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), ended
 
     @np.errstate(all="ignore")
     def _flip(self, at: float, outside: float) -> tuple[float, float] | None:

@@ -91,7 +91,7 @@ class Tracer:
         pace: float = 1.0,
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
-        self.first, self.longest = pace * FIRST, pace * LONGEST
+        self.first, self.longest, self.smooth = pace * FIRST, pace * LONGEST, pace * SMOOTH
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -129,7 +129,7 @@ class Tracer:
                 if step < SHORTEST:
                     return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
                 continue
-            coarse = abs(point.multiplier - last.multiplier) > SMOOTH and abs(last.multiplier) < STEEP
+            coarse = abs(point.multiplier - last.multiplier) > self.smooth and abs(last.multiplier) < STEEP
             if coarse and step > self.first:
                 step /= 2
                 continue
