@@ -11,11 +11,11 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
-from friso.hunting.attractors.survey import Swinging
+from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Kind, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting.cycle.find import families, hunting_cycles
 from friso.hunting.cycle.shooting import simplest
 
 SCALE = 0.06
@@ -33,6 +33,9 @@ FLAT = 3e-4
 BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
 multipliers rough."""
+
+BETWEEN = np.array([0.1, 0.3, 0.6])
+"""Shares of the way there at which cycles are looked for that attract over less."""
 
 SPREAD, ENOUGH = 9, 6
 """Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
@@ -99,10 +102,24 @@ class Outward:
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
             survey = self.surveyed(np.array([next_to]), ALONG * distance, at_once=True)
-            if not survey.attracts[0]:
+            closer = None if survey.attracts[0] else self._between(at, next_to, reserve)
+            if not survey.attracts[0] and closer is None:
                 return AttractionEnd(at, next_to, ended and bool(survey.decided[0]), reserve)
-            at, motions = next_to, survey.motions
+            at, motions = closer or (next_to, survey.motions)
         return self._quiet_from(at, motions)
+
+    def _between(self, at: float, quiet: float, reserve: float) -> tuple[float, tuple[Swinging, ...]] | None:
+        """The last factor between the end of an orbit, known up to a share of it, and one at which nothing attracts at
+        which a cycle that the return map suggests does, and that cycle; None if there is none."""
+        factors = at * (quiet / at) ** BETWEEN
+        factors = factors[np.abs(np.log(factors / at)) > reserve]
+        stages = self._stages(factors)
+        suggested = families(stages) if factors.size else ()
+        motions = [m for cycles in suggested for m in of_cycles(np.arange(factors.size), cycles, stages.sticking)]
+        if not motions:
+            return None
+        last = max(motion.stage for motion in motions)
+        return float(factors[last]), tuple(motion for motion in motions if motion.stage == last)
 
     def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
         """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""

@@ -105,8 +105,9 @@ def attractors(
     Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite. Without
-    `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted. Starts are tried `at_once`, and beside the cycles, by a
-    thorough survey and where nothing is thought to attract: one run alone takes as long as eight together."""
+    `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
+    Starts are tried `at_once`, and beside the cycles, by a thorough survey and where nothing is thought to attract: one
+    run alone takes as long as eight together."""
     survey, every = Survey(stages.count, thorough, rtol, prove=cycles), np.arange(stages.count)
     at_once = thorough or at_once
     suggested = families(stages, rtol) if at_once and cycles else ()

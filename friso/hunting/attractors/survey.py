@@ -125,10 +125,10 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
 
 @dataclass
 class Survey:
-    """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or takes
-    motions that have converged for attracted. The motions that attract; and of which stages that is `unknown`, because
-    a run failed or had to be given up, the time constant of the cycle that repels most slowly, `slowest` [s] (0: none),
-    and the steps that its runs may take still, `left`, all of shape (count,)."""
+    """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or
+    takes motions that have converged for attracted. The motions that attract; and of which stages that is `unknown`,
+    because a run failed or had to be given up, the time constant of the cycle that repels most slowly, `slowest` [s]
+    (0: none), and the steps that its runs may take still, `left`, all of shape (count,)."""
 
     count: int
     thorough: bool
