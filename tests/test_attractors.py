@@ -16,6 +16,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck
 from friso.hunting.margin import margin, searched
 from friso.hunting.outward import Beyond, Outward
+from friso.hunting.verdict import judge_many
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
@@ -155,6 +156,13 @@ def test_the_creeping_stage_just_below_and_above_its_edge(rtol: float) -> None:
         several = Ensemble.held(flat, 1).take(np.zeros(len(starts), np.int64))
         results = several.run(stuck(several, starts), np.full(len(starts), 2000.0), rtol, window=0.95)
         assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
+
+
+def test_many_stages_at_once_are_judged_alike_where_basins_are_narrow() -> None:
+    """From 12.95 Hz on the symmetric cycle of the creeping stage attracts from less than 0.25 % about its distance."""
+    flat, crossovers = CREEPING.flat(), np.array([12.6553, 12.9, 12.955, 12.98, 13.02, 13.04])
+    several = {**flat, "controller.crossover": crossovers * flat["controller.crossover"] / 12.3332}
+    assert list(judge_many(several, len(crossovers), 1e-6) == "bistable") == [True] * 5 + [False]
 
 
 UNWOUND = VARIANTS["rigid, limit, back-calculation"].replace(
