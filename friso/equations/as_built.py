@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from friso.equations.structure import Structure, structure
+from friso.errors import InputError
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -39,9 +40,13 @@ class AsBuilt:
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
         """The form of a stage's drive, given as flat keys."""
-        lags = "drive.current_bandwidth" in flat
+        form, lags = structure(flat), "drive.current_bandwidth" in flat
+        if form.transmission and form.transmission.position != form.transmission.velocity:
+            actual = f"position at the {form.transmission.position}, velocity at the {form.transmission.velocity}"
+            expected = "one encoder for both: the drive as built samples a single one"
+            raise InputError("encoder.velocity", actual, expected, f'velocity = "{form.transmission.position}"')
         samples = round(flat.get("drive.velocity_samples", 1.0))
-        return cls(structure(flat), whole_samples(flat), lags, samples)
+        return cls(form, whole_samples(flat), lags, samples)
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:

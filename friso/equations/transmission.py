@@ -27,13 +27,18 @@ def transmission(backlash: bool, motor: Body, load: Body) -> tuple[sp.Expr, Comp
     contact = stiffness * deflection + key("transmission.damping") * rate
     force, kinks = contact, ()
     if backlash:
-        kinks = stops(deflection, BACKLASH / 2, "flank")
+        kinks = flanks(deflection)
         force = beyond_stops(kinks, contact, stiffness * BACKLASH / 2)
     outputs = {
         "transmission_deflection": Output(deflection, "m", "motor minus load"),
         "transmission_force": Output(force, "N", "transmission force"),
     }
     return force, Component(kinks=kinks, outputs=outputs)
+
+
+def flanks(deflection: sp.Expr) -> tuple[Kink, Kink]:
+    """Where the transmission begins to pull, ahead and behind, for a deflection [m] of the motor against the load."""
+    return stops(deflection, BACKLASH / 2, "flank")
 
 
 def at_motor(friction: Friction, velocity: sp.Symbol, motor_velocity: sp.Symbol) -> Friction:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
+from friso.stage.transmission import STATE_PREFIX, as_friction, leading_friction
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -58,6 +59,27 @@ def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
     """The law of a stage; None without friction."""
     form = shared_structure(flat)
     return _law(form.friction, form.friction_variant)
+
+
+def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
+    """The law of the friction at the motor, its states under the names that they have there; None without any."""
+    form = shared_structure(flat).transmission
+    law = _law(form.friction, form.friction_variant) if form else None
+    if law is None:
+        return None
+    states = tuple(state(f"{STATE_PREFIX}{name}") for name in law.states)
+    return replace(law, declared=replace(law.declared, states=states))
+
+
+def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """The same as `operating_point` at the motor, which moves with the load and bears no bias."""
+    unbiased = replace(members, bias=np.zeros(len(members)))
+    point = operating_point({**flat, "friction.model": "none", **as_friction(flat)}, unbiased)
+    beyond = "beyond_"
+    return {
+        f"{beyond}{STATE_PREFIX}{name.removeprefix(beyond)}" if name.startswith(beyond) else f"{STATE_PREFIX}{name}": at
+        for name, at in point.items()
+    }
 
 
 @cache
@@ -105,12 +127,13 @@ def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[
 
 def level(flat: Mapping[str, Any], forward: bool) -> float:
     """Friction force [N] from which on a stuck cart breaks away; 0 for a law that creeps instead of sticking."""
-    law = law_of(flat)
+    law = law_of(leading_friction(flat))
     return float(steady_force(flat, np.zeros(1), forward)[0]) if law is not None and law.states else 0.0
 
 
 def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> np.ndarray:
     """Friction force [N] against a steady motion at speeds [m/s], both of shape (count,), in one direction."""
+    flat = leading_friction(flat)
     law, sign = law_of(flat), 1.0 if forward else -1.0
     (force,) = law.force({**flat, "velocity": sign * speeds, FORWARD: float(forward)}) if law else (np.zeros(1),)
     return np.broadcast_to(sign * np.asarray(force), speeds.shape)
@@ -118,6 +141,7 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Speeds [m/s] from creeping to so fast that friction hardly depends on it, shape (count,)."""
+    flat = leading_friction(flat)
     units = {key: quantity.unit for key, quantity in declared_keys(flat).items() if key.startswith("friction.")}
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
     if named:

@@ -11,6 +11,7 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.friction import level, speeds
+from friso.stage.transmission import leading_friction
 
 BIASES, SPEEDS = 65, 257
 """Bias forces and speeds of the family, of each state of the limiter."""
@@ -80,6 +81,7 @@ def joined(parts: list[Members]) -> Members:
 def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
     """The limit cases by name: "stuck" and "sliding" (fast), and both with "-touched" behind where the limiter is
     touched (Table 1); "given" for a stage that has just one."""
+    flat = leading_friction(flat)
     moves = ["sliding"] if flat["friction.model"] == "none" else ["stuck", "sliding"]
     limits = limiter_states(flat)
     if len(moves) == len(limits) == 1:
@@ -95,6 +97,7 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
 def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS) -> Members:
     """Every limit case's neighbours: stuck under bias forces up to nearly the break-away force, for and against the
     motion, and sliding at all speeds, in both directions if friction differs between them."""
+    flat = leading_friction(flat)
     if flat["friction.model"] == "none":
         return joined([*limit_cases(flat).values()])
     parts = []

@@ -10,17 +10,20 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
-from friso.equations.blocks import Loop
+from friso.equations.blocks import Controller, Loop
+from friso.equations.component import Component
 from friso.equations.continuous import continuous_controller
 from friso.equations.joint import touching
 from friso.equations.model import assemble
 from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
+from friso.equations.transmission import flanks
 from friso.errors import InputError
 from friso.frequency.declared import Declared
-from friso.frequency.friction import law_of, operating_point
+from friso.frequency.friction import law_of, motor_law_of, operating_point, operating_point_of_motor
 from friso.frequency.members import Members
 from friso.frequency.system import System
+from friso.stage.transmission import MOTOR_STATES
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
 REFERENCE_VELOCITY, REFERENCE_ACCELERATION = FEEDFORWARD = "reference velocity", "reference acceleration"
@@ -45,16 +48,26 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
-    values |= _limiter(members.touched)
+    values |= {**_limiter(members.touched), **_on_flank()}
+    bodies = {form.cart: law_of(flat)}
+    if form.motor:
+        bodies[form.motor] = motor_law_of(flat)
+        values |= operating_point_of_motor(flat, members)
     system = form.declared.at(values, len(members))
-    law = law_of(flat)
-    if law is None:
-        return system
-    return _following(system, form.cart, law.states) if members.stuck.all() else _without_constants(system, law.states)
+    for body, law in bodies.items():
+        if law is not None:
+            stuck = members.stuck.all()
+            system = _following(system, body, law.states) if stuck else _without_constants(system, law.states)
+    return system
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
-    """The masses without friction: from the forces on stage and cart to their positions, shape of `touched`."""
+    """The masses without friction: from the forces on stage and cart to their positions, shape of `touched`. Raises
+    InputError for a transmission with another nonlinearity than the friction of the guide."""
+    drive = shared_structure(flat).transmission
+    if drive is not None and (drive.backlash or drive.friction != "none"):
+        actual = "a backlash" if drive.backlash else "friction at the motor"
+        raise InputError("transmission", actual, "the friction of the guide alone", "friso check, which simulates")
     declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None)).declared
     return declared.at({**flat, **_limiter(touched)}, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
 
@@ -63,6 +76,12 @@ def _limiter(touched: np.ndarray) -> dict[str, Any]:
     """The modes of the limiter by name: free, or touched ahead."""
     ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
     return {ahead: touched.astype(float), behind: 0.0}
+
+
+def _on_flank() -> dict[str, Any]:
+    """The modes of a backlash by name: the transmission pulls."""
+    ahead, behind = (str(kink.beyond) for kink in flanks(sp.S.Zero))
+    return {ahead: 1.0, behind: 0.0}
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
@@ -84,24 +103,34 @@ def fed_forward(control: System) -> tuple[str, ...]:
 @dataclass(frozen=True)
 class _Plant:
     """The model's own equations, the controller replaced by a force; names of all velocities, and of position and
-    velocity of the cart."""
+    velocity of the cart and of the motor (none without a transmission)."""
 
     declared: Declared
     velocities: tuple[str, ...]
     cart: tuple[str, str]
+    motor: tuple[str, str] | None
 
 
 @cache
 def _plant(form: Structure) -> _Plant:
-    model = assemble(replace(form, controller=None, biased=("cart", "stage")))
+    push = sp.Symbol("actuator_force", real=True)
+    seen: list[Loop] = []
+
+    def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+        seen.append(loop)
+        return Controller(push, Component())
+
+    model = assemble(replace(form, controller=None, biased=("cart",)), control=control)
+    (loop,) = seen
     expressions = {name: output.expression for name, output in model.outputs.items()}
-    outputs = {STAGE: expressions["position"], CART: expressions["cart_position"], VELOCITY: expressions["velocity"]}
+    outputs = {STAGE: loop.position, CART: expressions["cart_position"], VELOCITY: loop.velocity}
     if "joint_deflection" in expressions:
         outputs[DEFLECTION] = expressions["joint_deflection"]
-    inputs = {FORCE: sp.Symbol("bias.stage", real=True), DISTURBANCE: sp.Symbol("bias.cart", real=True)}
+    inputs = {FORCE: push, DISTURBANCE: sp.Symbol("bias.cart", real=True)}
     velocities = tuple(str(state.symbol) for state in model.states if state.role == Role.VELOCITY)
     cart = (str(model.cart.position), str(model.cart.velocity))
-    return _Plant(Declared(model.symbols, model.rhs, inputs, outputs), velocities, cart)
+    motor = MOTOR_STATES if form.transmission else None
+    return _Plant(Declared(model.symbols, model.rhs, inputs, outputs), velocities, cart, motor)
 
 
 def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:

@@ -22,6 +22,7 @@ from friso.hunting.measures import BANDS, measure, options
 from friso.hunting.verdict import WORK, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
+from friso.stage.transmission import BACKLASH, leading_friction
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -137,10 +138,12 @@ def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
 def _breakaway(flat: Mapping[str, Any]) -> float:
     """The least force of the actuator [N] that may move what sticks: constant forces may help it, and friction may be
     smaller to one side. 0 without friction."""
-    if structure(flat).friction == "none":
+    if leading_friction(flat)["friction.model"] == "none":
         return 0.0
     uneven = abs(flat.get("friction.asymmetry") or 0.0)
-    least = float(Ensemble.held(flat, 1).number("breakaway")[0]) * (1 - uneven) / (1 + uneven)
+    stages = Ensemble.held(flat, 1)
+    play = float(stages.number("stiffness")[0]) * flat.get(BACKLASH, 0.0) / 2  # no force that moves anything
+    least = (float(stages.number("breakaway")[0]) - play) * (1 - uneven) / (1 + uneven)
     return max(least - sum(abs(value) for key, value in flat.items() if key.startswith("bias.") and value), 0.0)
 
 

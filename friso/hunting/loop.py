@@ -9,6 +9,7 @@ import numpy as np
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.stage import Stage
+from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
 
@@ -34,6 +35,12 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
     return tuple(state for state, matrix in loops.items() if np.linalg.eigvals(matrix).real.max() > limit)
 
 
+def _motor_state(stages: Ensemble, which: int) -> int:
+    """Which state is the position (0) or the velocity (1) of the motor; the first without a transmission."""
+    names = stages.kernel.states
+    return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
+
+
 def _moved(stages: Ensemble) -> list[np.ndarray]:
     """Each state moved a little from rest at the reference, all others at rest."""
     return list((STEP * np.diag(stages.scales[0]))[:, None])
@@ -41,29 +48,38 @@ def _moved(stages: Ensemble) -> list[np.ndarray]:
 
 def _rates(stages: Ensemble) -> np.ndarray:
     """Derivatives of the rates at rest by the states, in units of the magnitudes of these."""
-    columns = [(stages.rates(step) - stages.rates(-step))[0] / (2 * STEP) for step in _moved(stages)]
+    flank = np.zeros((1, len(stages.kernel.states)))
+    if stages.structure.plays:  # the loop is open within a backlash
+        flank[0, _motor_state(stages, 0)] = stages.flat[BACKLASH]
+    moved = ((flank + step, flank - step) for step in _moved(stages))
+    columns = [(stages.rates(ahead) - stages.rates(behind))[0] / (2 * STEP) for ahead, behind in moved]
     return np.array(columns).T / stages.scales[0][:, None]
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray) -> np.ndarray:
     """The same without friction but for its viscous share; without the states of the friction law."""
     kernel = stages.kernel
-    if "friction_force" not in kernel.outputs:
-        return stuck
-    cart, unit = kernel.cart_velocity, stages.scales[0, kernel.cart_velocity]
     bodies = ("cart", "stage") if stages.structure.joint == "rigid" else ("cart",)
     mass = sum(float(stages.flat.get(f"masses.{body}", 0.0)) for body in bodies)
     matrix = stuck.copy()
-    for k, step in enumerate(_moved(stages)):
-        matrix[cart, k] += (_friction(stages, step) - _friction(stages, -step)) / (2 * STEP * mass * unit)
-    matrix[cart, cart] -= _viscous(stages, FAST * unit) / mass
+    for output, body, own in (
+        ("friction_force", kernel.cart_velocity, mass),
+        ("motor_friction_force", _motor_state(stages, 1), float(stages.flat.get(MOTOR_MASS, 0.0))),
+    ):
+        if output not in kernel.outputs:
+            continue
+        unit = stages.scales[0, body]
+        for k, step in enumerate(_moved(stages)):
+            change = _force(stages, step, output) - _force(stages, -step, output)
+            matrix[body, k] += change / (2 * STEP * own * unit)
+        matrix[body, body] -= _viscous(stages, FAST * unit, output) / own
     bristles = kernel.having(Role.BRISTLE)
     return np.delete(np.delete(matrix, bristles, 0), bristles, 1)
 
 
-def _viscous(stages: Ensemble, speed: float) -> float:
-    """By how much friction rises with speed [N s/m] beyond a high one [m/s]."""
-    slow, fast = (_friction(stages, _slid(stages, times * speed)) for times in (1.0, 2.0))
+def _viscous(stages: Ensemble, speed: float, output: str) -> float:
+    """By how much a friction force rises with speed [N s/m] beyond a high one [m/s]."""
+    slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 
 
@@ -81,9 +97,9 @@ def _slid(stages: Ensemble, speed: float) -> np.ndarray:
     return states
 
 
-def _friction(stages: Ensemble, states: np.ndarray) -> float:
-    """Friction force [N]."""
+def _force(stages: Ensemble, states: np.ndarray, output: str) -> float:
+    """A force [N] among the outputs."""
     kernel = stages.kernel
     modes = kernel.modes(states.T, 0.0, np.zeros(3), stages.values)
     rows = kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), stages.values)
-    return float(np.ravel(rows[list(kernel.outputs).index("friction_force")])[0])
+    return float(np.ravel(rows[list(kernel.outputs).index(output)])[0])

@@ -19,6 +19,9 @@ MOTOR_MASS, INERTIA, LEAD, RATIO, BACKLASH = (
 STATE_PREFIX = "motor_"
 """How names begin of what belongs to the motor."""
 
+MOTOR_STATES = ("motor_position", "motor_velocity")
+"""Names of the motor's position and velocity, at the load."""
+
 Side = Literal["motor", "load"]
 """Of the transmission."""
 
@@ -66,6 +69,12 @@ def motor_mass(flat: Mapping[str, Any]) -> Any:
     """The mass of the motor at the load [kg] that follows from its inertia; None where none does."""
     lead = flat[LEAD] if LEAD in flat else 2 * pi / flat[RATIO] if RATIO in flat else None
     return None if INERTIA not in flat or lead is None else flat[INERTIA] * (2 * pi / lead) ** 2
+
+
+def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
+    """The keys with the friction at the motor in the place of that of the guide, where it alone is there."""
+    alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
+    return {**flat, **as_friction(flat)} if alone else flat
 
 
 def moving_mass(flat: Mapping[str, Any]) -> Any:

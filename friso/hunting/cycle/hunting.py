@@ -148,7 +148,8 @@ def cannot_hunt(stage: Stage) -> str:
 
 def why_not(form: Structure) -> str:
     """Why stages of this structure cannot hunt, or why their cycles are not searched; "" if they are."""
-    if form.friction == "none":
+    drive = form.transmission
+    if form.friction == "none" and (drive is None or (drive.friction == "none" and not drive.backlash)):
         return "there is no friction to stick to"
     if form.controller is None or not form.controller.integral:
         return "the controller has no integral action that could wind up"
