@@ -10,7 +10,7 @@ from typing import Any, cast
 
 import sympy as sp
 
-from friso.equations.component import Component, Output, State, key
+from friso.equations.component import Component, Kink, Output, State, key
 from friso.equations.friction.common import Friction
 from friso.equations.masses import Body, beyond_stops, stops
 from friso.stage.transmission import MOTOR_FRICTION, STATE_PREFIX

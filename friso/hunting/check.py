@@ -17,6 +17,7 @@ from friso.equations.structure import structure
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import cannot_hunt
+from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure, options
 from friso.hunting.verdict import WORK, Judgement, judge
@@ -51,8 +52,8 @@ class Case:
     quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
     `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what sticks, constant
     forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`; `unstable` tells in which
-    of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`). `trace` holds the time
-    response if asked for.
+    of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`); `feeding`, with a
+    backlash, without what hunting ends. `trace` holds the time response if asked for.
     """
 
     stage: Stage
@@ -67,6 +68,7 @@ class Case:
     solver: Solver
     breakaway: float = 0.0
     unstable: tuple[LoopState, ...] = ()
+    feeding: Feeding | None = None
     trace: xr.Dataset | None = None
 
     @property
@@ -131,6 +133,7 @@ def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
         solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
         breakaway=_breakaway(flat),
         unstable=unstable(stage),
+        feeding=feeding(stage) if judgement.swing else None,
         trace=simulate(stage, rtol) if traces else None,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from friso.views.check.words import answer
@@ -10,6 +11,7 @@ from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Judgement, Margin, Swing
+    from friso.hunting.feeding import Feeding
     from friso.hunting.outward import AttractionEnd
     from friso.studies.draws import Draws
     from friso.studies.shares import Share
@@ -22,6 +24,12 @@ def check_document(cases: Mapping[str, Case], draws: Draws | None = None) -> dic
         for name, case in document.items():
             case["draws"] = draws_document(draws, name)
     return plain_json({"conclusion": " ".join(answer(cases)), "stage": cases["given"].stage.name, "cases": document})
+
+
+def _feeding(feeding: Feeding) -> dict[str, Any]:
+    """Down to which share of friction, and of backlash, hunting lasts, and from which on it does not."""
+    parts = {"friction": feeding.friction, "backlash": feeding.backlash}
+    return {name: asdict(part) | {"needed": part.needed} for name, part in parts.items() if part}
 
 
 def _case(case: Case) -> dict[str, Any]:
@@ -48,6 +56,7 @@ def _case(case: Case) -> dict[str, Any]:
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
         "loop_unstable_while_it": case.unstable,
+        **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
         "certain": judgement.hunting.certain,
         "solver": {

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
+from friso.views.check.feeding_words import feeding_sentences
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
 
 if TYPE_CHECKING:
@@ -28,8 +30,9 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
     if case.verdict not in says:
         return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
+    feeds = feeding_sentences(case.feeding) if case.feeding else []
     after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
-    return " ".join([*loop, says[case.verdict](case), *_doubts(case), *after])
+    return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *after])
 
 
 def _loop(case: Case) -> list[str]:
@@ -62,7 +65,7 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
 
 def at_the_end(case: Case) -> str:
     """Peak to peak; below a nanometre the digits would be those of the solver, not of the stage."""
-    return "< 1 nm" if case.peak_to_peak < 1e-9 else with_unit(case.peak_to_peak, "m")
+    return axis_shown().text("< 1 nm") if case.peak_to_peak < 1e-9 else with_unit(case.peak_to_peak, "m")
 
 
 def _hunting(case: Case) -> str:

@@ -1,0 +1,83 @@
+"""What feeds the hunting of a stage with a backlash: whether it lasts while the dry friction, or the backlash, is taken to
+nothing, step by step.
+
+Each of both is scaled down on its own, the stage being surveyed anew at every share, so that it does not matter
+whether the cycle changes its form on the way. Viscous friction stays: it only damps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.structure import structure
+from friso.hunting.attractors import attractors
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.stage import Stage
+from friso.stage.stage import declared_keys
+from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
+
+SHARES = np.array([0.7, 0.5, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001])
+"""Of what feeds, the last of which stands for nothing."""
+
+
+@dataclass(frozen=True)
+class Decline:
+    """What becomes of hunting as one cause is scaled down: the least share at which something `lasts` that attracts,
+    and the greatest below it at which nothing does, `gone` (None: something attracts down to the last share); and
+    whether all of this is `certain`."""
+
+    lasts: float
+    gone: float | None
+    certain: bool
+
+    @property
+    def needed(self) -> bool:
+        """Whether hunting ends without it."""
+        return self.gone is not None
+
+
+@dataclass(frozen=True)
+class Feeding:
+    """What becomes of the hunting of a stage without its dry friction (None: it has none), and without its backlash."""
+
+    friction: Decline | None
+    backlash: Decline
+
+
+def feeding(stage: Stage) -> Feeding | None:
+    """What feeds the cycle that attracts a stage with a backlash; None for a stage without."""
+    flat = stage.flat()
+    if not structure(flat).plays:
+        return None
+    dry = dry_friction(flat)
+    return Feeding(_decline(flat, dry) if dry else None, _decline(flat, (BACKLASH,)))
+
+
+def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
+    """The keys in proportion to all of which the dry friction of guide and motor goes: forces, and what makes the
+    bristles as much softer."""
+    units = {key: field.unit for key, field in declared_keys(flat).items() if key in flat}
+    tables = ("friction.", f"{MOTOR_FRICTION}.")
+    return tuple(
+        key
+        for key, unit in units.items()
+        if key.startswith(tables) and unit.startswith("N") and not key.endswith(".viscous")
+    )
+
+
+def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
+    """What becomes of hunting with some keys at all shares."""
+    scaled = {**flat, **{key: flat[key] * SHARES for key in keys}}
+    survey = attractors(Ensemble.held(scaled, len(SHARES), form=structure(flat)))
+    attracts = survey.attracts
+    gone = np.flatnonzero(~attracts)
+    first = int(gone[0]) if gone.size else len(SHARES)
+    return Decline(
+        lasts=float(SHARES[first - 1]) if first else 1.0,
+        gone=float(SHARES[first]) if gone.size else None,
+        certain=bool(survey.decided[: first + 1].all()),
+    )

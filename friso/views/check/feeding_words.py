@@ -1,0 +1,35 @@
+"""What feeds the hunting of a stage with a backlash, in words."""
+
+from __future__ import annotations
+
+from friso.hunting.feeding import Decline, Feeding
+
+
+def feeding_sentences(feeding: Feeding) -> list[str]:
+    """Whether hunting ends without friction, or without backlash, and where."""
+    friction, backlash = feeding.friction, feeding.backlash
+    if friction is None:
+        feeds = "The backlash feeds it" if backlash.needed else "It is not the backlash that feeds it"
+        return [f"{feeds}: there is no dry friction; {_course('backlash', backlash)}.", *_doubt(backlash)]
+    feeds = {
+        (True, True): "Friction and backlash feed it together, and it ends without either",
+        (True, False): "Friction feeds it, not the backlash",
+        (False, True): "The backlash feeds it, not the friction",
+        (False, False): "Either friction or backlash alone would feed it",
+    }[friction.needed, backlash.needed]
+    return [
+        f"{feeds}: {_course('dry friction', friction)}; {_course('backlash', backlash)}.",
+        *_doubt(friction, backlash),
+    ]
+
+
+def _course(name: str, decline: Decline) -> str:
+    """What becomes of it as one of both is scaled down."""
+    if decline.gone is None:
+        return f"it lasts with {decline.lasts:.1%} of the {name}"
+    return f"it lasts with {decline.lasts:.3g} times the {name} and is gone with {decline.gone:.3g} times"
+
+
+def _doubt(*declines: Decline) -> list[str]:
+    certain = all(decline.certain for decline in declines)
+    return [] if certain else ["That is not certain: some simulations had to be given up."]
