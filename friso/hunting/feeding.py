@@ -1,5 +1,5 @@
-"""What feeds the hunting of a stage with a backlash: whether it lasts while the dry friction, or the backlash, is taken to
-nothing, step by step.
+"""What feeds the hunting of a stage with a backlash: whether it lasts while the dry friction, or the backlash, is taken
+to nothing, step by step.
 
 Each of both is scaled down on its own, the stage being surveyed anew at every share, so that it does not matter
 whether the cycle changes its form on the way. Viscous friction stays: it only damps.

@@ -12,7 +12,7 @@ def feeding_sentences(feeding: Feeding) -> list[str]:
         feeds = "The backlash feeds it" if backlash.needed else "It is not the backlash that feeds it"
         return [f"{feeds}: there is no dry friction; {_course('backlash', backlash)}.", *_doubt(backlash)]
     feeds = {
-        (True, True): "Friction and backlash feed it together, and it ends without either",
+        (True, True): "Friction and backlash feed it together, and it ends without either of them",
         (True, False): "Friction feeds it, not the backlash",
         (False, True): "The backlash feeds it, not the friction",
         (False, False): "Either friction or backlash alone would feed it",

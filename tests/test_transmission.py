@@ -1,0 +1,259 @@
+"""A screw or belt between motor and load, with encoders on either side: against models written by hand."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import friso
+from friso.equations.as_built import AsBuilt
+from friso.equations.controllers.van_dijk import numbers
+from friso.equations.structure import structure
+from friso.errors import InputError, StageError
+from friso.frequency.members import limit_cases, member
+from friso.frequency.parts import plant
+from friso.hunting.cycle.hunting import cannot_hunt, hunting
+from friso.hunting.feeding import Decline, Feeding, dry_friction
+from friso.hunting.loop import unstable
+from friso.rig.run import as_built_keys
+from friso.stage import Stage
+from friso.views.check.feeding_words import feeding_sentences
+
+LUGRE = {
+    "model": "lugre",
+    "static": "12 N",
+    "coulomb": "8 N",
+    "stribeck_velocity": "3 mm/s",
+    "stribeck_exponent": 2,
+    "bristle_stiffness": "2e6 N/m",
+    "bristle_damping": "1e3 N*s/m",
+    "viscous": "50 N*s/m",
+}
+AT_MOTOR = {**LUGRE, "static": "30 N", "coulomb": "20 N", "stribeck_velocity": "2 mm/s", "bristle_stiffness": "1e7 N/m"}
+SCREW = {
+    "inertia": "1.2e-4 kg*m^2",
+    "lead": "10 mm",
+    "stiffness": "50 N/um",
+    "damping": "4e3 N*s/m",
+    "backlash": "20 um",
+}
+BELT = {"mass": "40 kg", "stiffness": "50 N/um", "damping": "8e3 N*s/m", "backlash": "20 um"}
+
+
+def machine(**tables: object) -> Stage:
+    usual = {
+        "masses": {"stage": "20 kg"},
+        "friction": LUGRE,
+        "motor_friction": AT_MOTOR,
+        "transmission": SCREW,
+        "encoder": {"position": "load", "velocity": "load"},
+        "controller": {"kind": "pid", "crossover": "15 Hz", "alpha": 0.1, "beta": 2},
+        "motion": {"kind": "step", "size": "1 mm", "duration": "0.5 s"},
+    }
+    return Stage(**{name: table for name, table in {**usual, **tables}.items() if table is not None})
+
+
+@pytest.fixture(scope="module")
+def backlash_alone() -> Stage:
+    controller = {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2}
+    return machine(transmission=BELT, friction=None, motor_friction=None, controller=controller)
+
+
+def test_it_is_read_and_written() -> None:
+    stage = machine()
+    assert friso.loads(stage.to_toml()) == stage
+    flat = stage.flat()
+    assert flat["transmission.mass"] == pytest.approx(1.2e-4 * (2 * np.pi / 0.01) ** 2)
+    assert flat["controller.tuned_mass"] == pytest.approx(20 + flat["transmission.mass"])
+    assert not structure(stage.replace({"transmission.backlash": None}).flat()).plays
+    turntable = friso.loads(
+        """
+[axis]
+kind = "rotary"
+[masses]
+stage = "0.5 kg*m^2"
+[transmission]
+inertia = "1.2e-4 kg*m^2"
+ratio = 20
+stiffness = "2e4 N*m/rad"
+damping = "20 N*m*s/rad"
+backlash = "2 arcmin"
+[encoder]
+position = "load"
+velocity = "motor"
+[controller]
+kind = "pid"
+kp = "2e3 N*m/rad"
+[motion]
+kind = "step"
+size = "1 deg"
+duration = "1 s"
+"""
+    )
+    assert turntable.flat()["transmission.mass"] == pytest.approx(1.2e-4 * 400)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fragment"),
+    [
+        ({"transmission": None, "motor_friction": None}, "a choice of encoders, but no"),
+        ({"transmission": None, "encoder": None}, "friction at the motor, but no"),
+        ({"encoder": None}, "but no [encoder]"),
+        ({"transmission": {**BELT, "inertia": "1e-4 kg*m^2"}}, "mass together with inertia"),
+        ({"transmission": {**BELT, "lead": "10 mm"}}, "mass together with lead"),
+        ({"transmission": {"stiffness": "50 N/um", "damping": "0 N*s/m"}}, "neither mass nor inertia"),
+        ({"transmission": {k: v for k, v in SCREW.items() if k != "lead"}}, "without lead or ratio"),
+        ({"transmission": {**{k: v for k, v in SCREW.items() if k != "lead"}, "ratio": 5}}, "a ratio on an axis"),
+        ({"transmission": {"backlash": "5 um"}}, "stiffness"),
+        ({"encoder": {"position": "screw", "velocity": "load"}}, '"motor", "load"'),
+        ({"motor_friction": {**AT_MOTOR, "static": "10 N"}}, "motor_friction.static"),
+    ],
+)
+def test_each_mistake_has_one_message(changes: dict[str, object], fragment: str) -> None:
+    with pytest.raises(StageError) as wrong:
+        machine(**changes)
+    assert fragment in str(wrong.value)
+
+
+def bristles(flat: dict[str, float], table: str, velocity: float, z: float) -> tuple[float, float]:
+    """Rate of the bristles of LuGre, and the friction force."""
+    key = {name.removeprefix(f"{table}."): value for name, value in flat.items() if name.startswith(f"{table}.")}
+    fall = np.exp(-((velocity / key["stribeck_velocity"]) ** 2))
+    level = key["coulomb"] + (key["static"] - key["coulomb"]) * fall
+    rate = velocity - key["bristle_stiffness"] * abs(velocity) / level * z
+    return rate, key["bristle_stiffness"] * z + key["bristle_damping"] * rate + key["viscous"] * velocity
+
+
+def by_hand(stage: Stage, times: np.ndarray) -> np.ndarray:
+    """Positions of load and motor [m] by SciPy's Radau, of a rigid stage with LuGre friction on both sides."""
+    flat, gains = stage.flat(), numbers(stage.flat())
+    load, motor = flat["masses.stage"], flat["transmission.mass"]
+    half, size = flat.get("transmission.backlash", 0.0) / 2, flat["motion.size"]
+
+    def rates(_: float, y: np.ndarray) -> list[float]:
+        x, v, big_x, big_v, z, big_z, passed, integral = y
+        error = size - (x if flat["encoder.position"] == "load" else big_x)
+        slope = (error - passed) / gains["tau_p"]
+        share = (1 + gains["tau_z"] / gains["tau_i"]) * passed + integral / gains["tau_i"] + gains["tau_z"] * slope
+        gap = big_x - x
+        force = 0.0
+        if abs(gap) > half:
+            force = flat["transmission.stiffness"] * (gap - np.sign(gap) * half)
+            force += flat["transmission.damping"] * (big_v - v)
+        z_rate, on_load = bristles(flat, "friction", v, z)
+        big_z_rate, on_motor = bristles(flat, "motor_friction", big_v, big_z)
+        pull = gains["k_p"] * share
+        return [
+            v,
+            (force - on_load) / load,
+            big_v,
+            (pull - force - on_motor) / motor,
+            z_rate,
+            big_z_rate,
+            slope,
+            passed,
+        ]
+
+    answer = solve_ivp(
+        rates, (0, times[-1]), np.zeros(8), "Radau", times, rtol=1e-9, atol=1e-13, max_step=times[-1] / 500
+    )
+    return answer.y[[0, 2]]
+
+
+@pytest.mark.parametrize("side", ["load", "motor"])
+def test_traces(side: str) -> None:
+    stage = machine(encoder={"position": side, "velocity": side})
+    response = friso.simulate(stage, rtol=1e-9, sample_time=2e-3)
+    load, motor = by_hand(stage, response.time.values)
+    measured, other = (load, motor) if side == "load" else (motor, load)
+    assert np.abs(response["position"].values - measured).max() < 2e-9
+    assert np.abs(response[f"{'motor' if side == 'load' else 'load'}_position"].values - other).max() < 2e-9
+
+
+def test_linear_cases_are_on_a_flank() -> None:
+    stage = machine()
+    flat = stage.flat()
+    load, motor = flat["masses.stage"], flat["transmission.mass"]
+    k, d = flat["transmission.stiffness"], flat["transmission.damping"]
+    stuck = plant(flat, limit_cases(flat)["stuck"])
+    k_load, d_load = flat["friction.bristle_stiffness"], flat["friction.bristle_damping"] + flat["friction.viscous"]
+    k_motor = flat["motor_friction.bristle_stiffness"]
+    d_motor = flat["motor_friction.bristle_damping"] + flat["motor_friction.viscous"]
+    a = np.array(
+        [
+            [0, 1, 0, 0],
+            [-(k + k_load) / load, -(d + d_load) / load, k / load, d / load],
+            [0, 0, 0, 1],
+            [k / motor, d / motor, -(k + k_motor) / motor, -(d + d_motor) / motor],
+        ]
+    )
+    assert np.allclose(np.sort_complex(np.linalg.eigvals(stuck.a[0])), np.sort_complex(np.linalg.eigvals(a)), rtol=1e-6)
+    at_load = stuck.take(("force",), ("stage",)).at(np.array([30j]))[0, 0, 0, 0]
+    at_motor = plant(stage.replace({"encoder.position": "motor"}).flat(), member()).take(("force",), ("stage",))
+    inverse = np.linalg.inv(30j * np.eye(4) - a)[:, 3] / motor
+    assert at_load == pytest.approx(inverse[0], rel=1e-6)
+    assert at_motor.at(np.array([30j]))[0, 0, 0, 0] == pytest.approx(inverse[2], rel=1e-6)
+
+
+def described(stage: Stage) -> tuple[float, float]:
+    """Amplitude of the load [m] and period [s] by the describing function of a dead zone, on whose flanks the damper
+    acts beside the spring: both are N times what they are without play."""
+    flat, gains = stage.flat(), numbers(stage.flat())
+    load, motor = flat["masses.stage"], flat["transmission.mass"]
+    k, d = flat["transmission.stiffness"], flat["transmission.damping"]
+
+    def poles(n: float) -> np.ndarray:
+        k_p, tau_z, tau_i, tau_p = gains.values()
+        a = np.zeros((6, 6))
+        a[0, 1] = a[2, 3] = a[5, 4] = 1
+        a[1, :4] = np.array([-k, -d, k, d]) * n / load
+        a[3, :4] = np.array([k, d, -k, -d]) * n / motor
+        a[3] += k_p / motor * np.array([-tau_z / tau_p, 0, 0, 0, 1 + tau_z / tau_i - tau_z / tau_p, 1 / tau_i])
+        a[4, [0, 4]] = -1 / tau_p
+        return np.linalg.eigvals(a)
+
+    n = brentq(lambda n: poles(n).real.max(), 1e-4, 0.999)
+    omega = abs(max(poles(n), key=lambda pole: pole.real).imag)
+
+    def dead_zone(beta: float) -> float:
+        return 1 - 2 / np.pi * (beta + np.sin(beta) * np.cos(beta)) - n
+
+    gap = flat["transmission.backlash"] / 2 / np.sin(brentq(dead_zone, 1e-9, np.pi / 2))
+    return n * abs(k + 1j * omega * d) * gap / (load * omega**2), 2 * np.pi / omega
+
+
+def test_an_integrator_across_a_backlash_hunts_without_friction(backlash_alone: Stage) -> None:
+    """A cycle without any friction: by shooting, by a long simulation within 1 %, and about as the describing function
+    has it."""
+    assert not cannot_hunt(backlash_alone)
+    assert not unstable(backlash_alone)
+    (cycle,) = hunting(backlash_alone).attracting
+    long = friso.simulate(backlash_alone.replace({"motion.duration": "6 s"}), rtol=1e-8, sample_time=1e-2)
+    times, turns = (long[name].values[-41:] for name in ("turning_time", "turning_deviation"))
+    assert cycle.symmetric
+    assert cycle.amplitude == pytest.approx(np.ptp(turns) / 2, rel=1e-4)
+    assert cycle.period == pytest.approx((times[-1] - times[0]) / 20, rel=1e-4)
+    amplitude, period = described(backlash_alone)
+    assert cycle.amplitude == pytest.approx(amplitude, rel=0.1)
+    assert cycle.period == pytest.approx(period, rel=0.05)
+
+
+def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> None:
+    assert cannot_hunt(backlash_alone.replace({"transmission.backlash": "0 um"}))
+
+
+def test_what_feeds_it_is_told() -> None:
+    keys = dry_friction(machine().flat())
+    assert {"friction.static", "motor_friction.bristle_stiffness", "friction.bristle_damping"} <= {*keys}
+    assert "friction.viscous" not in keys
+    lasting, ending = Decline(0.001, None, True), Decline(0.5, 0.3, True)
+    (sentence,) = feeding_sentences(Feeding(lasting, ending))
+    assert sentence.startswith("The backlash feeds it, not the friction")
+    assert feeding_sentences(Feeding(ending, lasting))[0].startswith("Friction feeds it, not the backlash")
+    assert len(feeding_sentences(Feeding(None, Decline(0.5, 0.3, False)))) == 2
+
+
+def test_a_drive_with_two_encoders_is_refused_where_one_is_sampled() -> None:
+    stage = machine(encoder={"position": "load", "velocity": "motor"})
+    with pytest.raises(InputError, match=r"one encoder for both"):
+        AsBuilt.of(as_built_keys(stage))
