@@ -15,6 +15,7 @@ from friso.errors import InputError
 from friso.rig.run import as_built_keys
 from friso.rig.task import own_motion
 from friso.stage import Stage
+from friso.stage.transmission import moving_mass as mass_moved
 
 WIDE = 8.0
 """Stroke of the identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
@@ -59,8 +60,8 @@ def pace(stage: Stage) -> float:
 
 
 def moving_mass(stage: Stage) -> float:
-    """Cart and stage [kg]."""
-    return sum(value for key, value in stage.flat().items() if key in ("masses.cart", "masses.stage"))
+    """All that the controller moves [kg]."""
+    return float(mass_moved(stage.flat()))
 
 
 def friction(stage: Stage) -> float:

@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.frequency.bode import Bode, BodeCase
 from friso.frequency.crossover import WANTED
+from friso.stage.transmission import moving_mass
 from friso.views.bode.states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.views.bode.table import decibels
 from friso.views.drawing.colours import ramp
@@ -249,10 +250,10 @@ def _loop_of(name: str, case: BodeCase) -> ResponseCurve:
 
 
 def _masses(bode: Bode) -> list[float]:
-    """All that moves, and the stage alone, if it can move alone [kg]."""
+    """All that moves, and what moves with the actuator, if that can move without the cart [kg]."""
     flat = bode.stage.flat()
-    masses = [float(flat[key]) for key in ("masses.cart", "masses.stage") if key in flat]
-    return [sum(masses), *(masses[1:] if "joint.locked" in flat and not flat["joint.locked"] else [])]
+    free = "joint.locked" in flat and not flat["joint.locked"]
+    return [float(moving_mass(flat)), *([float(moving_mass({**flat, "masses.cart": 0.0}))] if free else [])]
 
 
 def _hertz(bode: Bode) -> Array:
