@@ -39,7 +39,8 @@ class AsBuilt:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
-        """The form of a stage's drive, given as flat keys."""
+        """The form of a stage's drive, given as flat keys. Raises InputError for encoders on both sides of a
+        transmission."""
         form, lags = structure(flat), "drive.current_bandwidth" in flat
         if form.transmission and form.transmission.position != form.transmission.velocity:
             actual = f"position at the {form.transmission.position}, velocity at the {form.transmission.velocity}"
