@@ -164,7 +164,8 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
-        return Hunting((), reason, reason != DITHERS, None)
+        searched = reason != DITHERS and not structure(stage.flat()).plays  # a backlash may do without an integrator
+        return Hunting((), reason, searched, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
