@@ -16,7 +16,7 @@ from refusals import Refused
 from snapshots import Snapshots
 
 import friso
-from friso.cli.bode import bode as command
+from friso.cli.commands.bode import bode as command
 from friso.cli.output import MARKER
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.stage import Stage

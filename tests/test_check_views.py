@@ -35,7 +35,7 @@ from friso.hunting.outward import AttractionEnd
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
-from friso.views.check.page import conclusion, report_html, verdict_sentence
+from friso.views.check.page import check_html, conclusion, verdict_sentence
 from friso.views.check.table import rows
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
@@ -99,7 +99,7 @@ def test_what_a_stage_lacks_has_no_panel():
     bare = ["friction_force", "force_p", "force_i", "force_d", "joint_deflection"]
     case = replace(fake_case(drop=bare), judgement=cannot_hunt())
     assert [figure.name for figure in check_figures({"given": case})] == ["settled", "overview"]
-    assert "The friction" not in report_html({"given": case})
+    assert "The friction" not in check_html({"given": case})
 
 
 def test_a_share_that_is_always_zero_is_left_out():
@@ -151,7 +151,7 @@ def test_nan_of_a_failed_run_breaks_nothing(start):
     cases = {"given": failed, "locked": failed, "free": fake_case(stage=fake_stage(locked=False))}
     for figure in check_figures(cases):
         assert same(mpl_arrays(figure), plotly_arrays(figure))
-    page = report_html(cases)
+    page = check_html(cases)
     assert "step size underflow: use a looser rtol" in page
     assert "NaN" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
 
@@ -213,7 +213,7 @@ def test_response_of_one_run():
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    return report_html(both_joints())
+    return check_html(both_joints())
 
 
 def test_report_says_the_verdict_first(page):
@@ -253,8 +253,8 @@ def test_report_holds_a_print_of_every_figure(page):
 
 def test_names_and_files_cannot_inject_markup():
     evil = '</script><script>alert("x")</script><img src=x onerror=alert(1)>'
-    plain = report_html(both_joints())
-    page = report_html(both_joints(evil))
+    plain = check_html(both_joints())
+    page = check_html(both_joints(evil))
     assert sorted(Page(page).tags) == sorted(Page(plain).tags)
     assert evil in " ".join(Page(page).words)
     assert "&lt;script&gt;alert(" in page
@@ -262,7 +262,7 @@ def test_names_and_files_cannot_inject_markup():
 
 def test_report_without_traces_has_the_table_and_no_script():
     cases = {key: replace(case, trace=None) for key, case in both_joints().items()}
-    page = report_html(cases)
+    page = check_html(cases)
     assert "<script" not in page
     assert "±0.52 mm" in page
 

@@ -23,7 +23,7 @@ from snapshots import Snapshots
 
 import friso
 from friso.cli.app import main
-from friso.cli.design import design as command
+from friso.cli.commands.design import design as command
 from friso.cli.output import MARKER
 from friso.design import choice, controller, edges, front, hunting_map, method, population, verification
 from friso.design.edges import Corners

@@ -208,12 +208,12 @@ import hashlib, sys
 sys.path.insert(0, {tests!r})
 import made_up
 from friso.views.check.figures import check_figures
-from friso.views.check.page import report_html
+from friso.views.check.page import check_html
 from friso.views.drawing import matplotlib_renderer as m
 for figure in (made_up.small_figure(), check_figures(made_up.both_joints())[-1]):
     for form in m.FORMATS:
         print(hashlib.sha256(m.image(figure, form)).hexdigest())
-print(hashlib.sha256(report_html(made_up.both_joints()).encode()).hexdigest())
+print(hashlib.sha256(check_html(made_up.both_joints()).encode()).hexdigest())
 """
 
 

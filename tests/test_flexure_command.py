@@ -19,8 +19,8 @@ from refusals import Refused
 from snapshots import Snapshots
 
 import friso
-from friso.cli.flexure import EXAMPLE
-from friso.cli.flexure import flexure as command
+from friso.cli.commands.flexure import EXAMPLE
+from friso.cli.commands.flexure import flexure as command
 from friso.cli.output import MARKER
 from friso.errors import InputError
 from friso.flexure.beams import BeamFailure

@@ -45,9 +45,9 @@ from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
 from friso.studies.thesis.reproduce import _changed, _coarser, _enters, counted, lasting
 from friso.studies.thesis.verdicts import not_covered, verdict
-from friso.views.reproduce.document import claims_document
+from friso.views.reproduce.document import reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
-from friso.views.reproduce.page import reproduction_files, reproduction_html
+from friso.views.reproduce.page import reproduce_files, reproduce_html
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
@@ -457,19 +457,19 @@ def test_wrong_orders_are_refused(names: list[str] | None, points: int, refused:
 
 
 def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path) -> None:
-    document = claims_document(small)
+    document = reproduce_document(small)
     assert [entry["id"] for entry in document["claims"]] == [claim.id for claim in claims()]
     for entry in document["claims"]:
         covered = entry["judgement"] != "not yet covered"
         assert bool(entry["figure"] and entry["number"] and entry["criterion"]) == covered
         assert entry["reason"] or entry["judgement"] == "holds"
-    page = reproduction_html(small)
+    page = reproduce_html(small)
     for claim in claims():
         assert f">{claim.id}<" in page
     for number in ("5", "7", "8", "11", "12", "13", "14", "15", "16", "22", "23"):
         assert f'id="figure-figure-{number}"' in page
     assert "default-src 'none'" in page
-    paths = write({tmp_path / "new" / name: content for name, content in reproduction_files(small).items()})
+    paths = write({tmp_path / "new" / name: content for name, content in reproduce_files(small).items()})
     assert all(path.stat().st_size > 1000 for path in paths)
     assert {path.suffix for path in paths} == {".html", ".json", ".png", ".svg"}
 
@@ -514,7 +514,7 @@ def test_a_count_unknown_at_both_tolerances_does_not_differ(small: Reproduction)
     assert _changed({1e-4: loose, 1e-8: tight}) == (0.0, 0.0)
     other = loose.assign(distinct_peaks=loose.distinct_peaks.fillna(1.0))
     assert _changed({1e-4: loose, 1e-8: other})[1] == pytest.approx(float(np.isnan(loose.distinct_peaks).mean()))
-    document = claims_document(replace(small, tolerances={1e-4: loose, 1e-8: tight}))
+    document = reproduce_document(replace(small, tolerances={1e-4: loose, 1e-8: tight}))
     assert document["figure_14b"]["rtol"] == [1e-8, 1e-4]
 
 
@@ -540,9 +540,9 @@ def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction, monkeypatc
         found = reproduce([], points=3)
     finally:
         _JUDGES.pop("F28", None)
-    (entry,) = (each for each in claims_document(found)["claims"] if each["id"] == "F28")
+    (entry,) = (each for each in reproduce_document(found)["claims"] if each["id"] == "F28")
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
-    page = reproduction_html(replace(small, verdicts=found.verdicts))
+    page = reproduce_html(replace(small, verdicts=found.verdicts))
     assert "Figure 28" in page
     assert "&lt;b&gt;criterion&lt;/b&gt; &amp; more" in page
     assert "<script>alert(1)" not in page
@@ -576,7 +576,7 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     assert edge is not None
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
     shown = replace(small, cycles={"system": found})
-    assert "Peaks counted, but no cycle attracts" in reproduction_html(shown)
-    assert claims_document(shown)["cycles"]["system"]["cells"] == 9
+    assert "Peaks counted, but no cycle attracts" in reproduce_html(shown)
+    assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
     assert "edge of the attracting cycle" in labels

@@ -8,30 +8,14 @@ from __future__ import annotations
 import io
 import logging
 import sys
-from collections.abc import Callable, Iterable
 from contextvars import copy_context
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, NoReturn
 
 import typer
-from typer.core import TyperCommand
 
 from friso import interrupts
-from friso.cli.bode import bode
-from friso.cli.boundary import boundary
-from friso.cli.check import check
+from friso.cli.command import COMMANDS
 from friso.cli.common import INTERRUPTED, say
-from friso.cli.compare import compare
-from friso.cli.design import design
-from friso.cli.doctor import doctor
-from friso.cli.flexure import flexure
-from friso.cli.guideline import guideline
-from friso.cli.identify import identify, listed_kinds
-from friso.cli.init import init
-from friso.cli.logs import logs
-from friso.cli.map import map_cells
-from friso.cli.reproduce import reproduce
-from friso.cli.rig import listed_experiments, rig
-from friso.cli.simulate import simulate
 from friso.cli.terminal import escaping
 from friso.errors import InputError
 from friso.stage.foreign import installed
@@ -45,42 +29,8 @@ app = typer.Typer(
 )
 
 
-def ending_with(title: str, rows: Callable[[], Iterable[tuple[str, str]]]) -> type[TyperCommand]:
-    """A class of commands whose help ends with a list, read only when the help is asked for: names, and what each is
-    in one line."""
-
-    class ListingCommand(TyperCommand):
-        def format_epilog(self, ctx: Any, formatter: Any) -> None:
-            with formatter.section(title):
-                formatter.write_dl([*rows()])
-
-    return ListingCommand
-
-
-LISTS = {
-    "identify": ending_with("Kinds of experiment (--as)", listed_kinds),
-    "rig": ending_with("Experiments", listed_experiments),
-}
-"""Commands whose help lists what can be chosen."""
-
-for name, command in (
-    ("init", init),
-    ("check", check),
-    ("simulate", simulate),
-    ("map", map_cells),
-    ("bode", bode),
-    ("boundary", boundary),
-    ("flexure", flexure),
-    ("design", design),
-    ("logs", logs),
-    ("identify", identify),
-    ("rig", rig),
-    ("compare", compare),
-    ("reproduce", reproduce),
-    ("guideline", guideline),
-    ("doctor", doctor),
-):
-    app.command(name, cls=LISTS.get(name))(command)
+for name, command in sorted(((name, COMMANDS[name]) for name in COMMANDS), key=lambda item: item[1].place):
+    app.command(name, cls=command.help_class)(command.function)
 
 
 def main() -> NoReturn:

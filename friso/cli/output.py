@@ -21,7 +21,11 @@ from friso.errors import InputError
 from friso.escapes import one_line
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
+<<<<<<< HEAD
 from friso.system import device_in
+=======
+from friso.stage.foreign import foreign
+>>>>>>> 0974314 (Commands register themselves, one module each; check, boundary, simulate and reproduce name their files and documents as the others do; every JSON document lists files and plug-ins)
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -120,9 +124,9 @@ def write(files: Mapping[Path, Content], progress: Progress = silent) -> list[Pa
     return [path for path, content in files.items() if content is not None]
 
 
-def print_document(document: Mapping[str, Any], files: Iterable[Path] | None = None) -> None:
-    """The JSON document of a command, with the files that it has written, if it lists them."""
-    written = {} if files is None else {"files": [str(file) for file in files]}
+def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> None:
+    """The JSON document of a command, with the files that it has written and the plug-ins that are loaded."""
+    written = {"files": [str(file) for file in files], "plug_ins": foreign()}
     print(json.dumps({**document, **written}, allow_nan=False))
 
 

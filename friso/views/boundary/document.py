@@ -1,21 +1,15 @@
-"""The JSON document of `friso boundary`, and its files: the figure and the table of its points."""
+"""The JSON document of `friso boundary`."""
 
 from __future__ import annotations
 
-from functools import partial
-from itertools import repeat
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from friso.hunting.boundary import Diagram, Plane
 from friso.studies.boundary_lines import Line, corner_verdicts, end_verdicts, lines, lost_places
-from friso.views.boundary.figures import boundary_figure
 from friso.views.boundary.words import ShownKey, conclusion
 from friso.views.documents import plain_json
-from friso.views.drawing.matplotlib_renderer import FORMATS, save
-from friso.views.files import Content
 
 
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
@@ -87,34 +81,3 @@ def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
 def _numbers(values: np.ndarray, keys: tuple[ShownKey, ...]) -> list[list[float]]:
     """Values of both keys [SI], shape (n, 2), in the units shown."""
     return [[key.number(value) for key, value in zip(keys, row, strict=True)] for row in values.tolist()]
-
-
-def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], name: str, stem: str) -> dict[str, Content]:
-    """The figure in all formats, and the table of its points."""
-    figure = boundary_figure(traced, keys, name)
-    pictures: dict[str, Content] = {f"{stem}.{form}": partial(save, figure) for form in FORMATS}
-    return {**pictures, f"{stem}.csv": partial(_write_table, traced)}
-
-
-def _write_table(traced: Diagram | Plane, path: Path) -> None:
-    """One row per point of a line: special ones have a kind and an error."""
-    import pandas as pd
-
-    keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]
-    header = ["line", "cycle", "kind", *keys, *(f"error of {key}" for key in keys)]
-    rows = [
-        row
-        for number, line in enumerate(lines(traced))
-        for row in zip(
-            repeat(number),
-            repeat(line.shape),
-            line.kinds,
-            *line.at.T,
-            *line.error.T,
-            line.amplitude,
-            line.period,
-            line.multiplier,
-        )
-    ]
-    table = pd.DataFrame(rows, columns=[*header, "amplitude [m]", "period [s]", "multiplier"])
-    table.to_csv(path, index=False)

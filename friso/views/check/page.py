@@ -11,6 +11,7 @@ from friso.views.check.draws import draws_figure, draws_sentences
 from friso.views.check.figures import check_figures
 from friso.views.check.table import rows
 from friso.views.check.words import conclusion, verdict_sentence
+from friso.views.files import Content
 from friso.views.pages import Report
 
 if TYPE_CHECKING:
@@ -23,7 +24,12 @@ BASIS = (
 )
 
 
-def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
+def check_files(cases: Mapping[str, Case], draws: Draws | None = None) -> dict[str, Content]:
+    """The page, as `check_html`."""
+    return {"report.html": check_html(cases, draws)}
+
+
+def check_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
     """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
     adds what stages drawn from an uncertain one do."""
     in_order = shown_cases(cases)

@@ -35,7 +35,7 @@ _VERBS: tuple[tuple[Judgement, str, str], ...] = (
 """The judgements as said of one claim, and of several."""
 
 
-def claims_document(reproduction: Reproduction) -> dict[str, Any]:
+def reproduce_document(reproduction: Reproduction) -> dict[str, Any]:
     """All claims with their judgements, ready for JSON; how they were judged stands before them."""
     tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed

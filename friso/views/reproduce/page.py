@@ -15,7 +15,7 @@ from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report, print_image
-from friso.views.reproduce.document import claims_document, numbers
+from friso.views.reproduce.document import numbers, reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
 
 if TYPE_CHECKING:
@@ -35,18 +35,18 @@ class FigureSection:
     verdicts: tuple[Verdict, ...]
 
 
-def reproduction_files(reproduction: Reproduction) -> dict[str, Content]:
+def reproduce_files(reproduction: Reproduction) -> dict[str, Content]:
     """The page, the claims, and every figure as PNG and SVG in a folder of its own."""
-    text = json.dumps(claims_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(reproduce_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
     figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
-        "reproduction.html": reproduction_html(reproduction),
+        "reproduction.html": reproduce_html(reproduction),
         "claims.json": text + "\n",
         **{f"figures/{name}": content for name, content in figures.items()},
     }
 
 
-def reproduction_html(reproduction: Reproduction) -> str:
+def reproduce_html(reproduction: Reproduction) -> str:
     """The whole page: a table of all claims, then the figures with theirs. It opens offline."""
     parts = sections(reproduction_figures(reproduction), reproduction.verdicts)
     figures = [section.figure for section in parts if section.figure]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import (
     AsJson,
     Overrides,
@@ -70,7 +71,7 @@ def compare(
     if as_json:
         from friso.views.compare.document import compare_document
 
-        print_document(compare_document(comparison))
+        print_document(compare_document(comparison), files)
     else:
         _print(comparison, files)
     if any(result.failed for result in comparison.results):
@@ -113,3 +114,6 @@ def _print(comparison: Comparison, files: Sequence[Path]) -> None:
     for sentence in (*details(comparison), *population(comparison), *notes):
         print_wrapped(sentence)
     print_written(files)
+
+
+COMMAND = Command(compare, 120)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import AsJson, Overrides, StageFile, Tolerance, leave, print_answer, read_stage, read_tolerance
-from friso.cli.output import OutFolder, Overwrite, output_folder, print_document
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.stage import Stage, load
@@ -56,19 +57,18 @@ def check(
     draws = None if sample is None else _draws(stage, sample, seed, max(tolerance, LONG))
     files = []
     if target is not None:
-        from friso.views.check.page import report_html
+        from friso.views.check.page import check_files
 
-        files = target.write({"report.html": report_html(cases, draws)})
+        files = target.write(check_files(cases, draws))
     if as_json:
         from friso.views.check.document import check_document
 
-        print_document(check_document(cases, draws))
+        print_document(check_document(cases, draws), files)
     else:
         _print_cases(stage, cases)
         if draws is not None:
             _print_draws(draws)
-        for file in files:
-            print(f"report: {file}")
+        print_written(files)
     leave(all(case.solver.done for case in cases.values()))
 
 
@@ -112,3 +112,6 @@ def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
 
     cases_in_order = shown_cases(cases)
     print_answer(answer(cases), stage.name, [item.label for item in cases_in_order], rows(cases_in_order))
+
+
+COMMAND = Command(check, 20)

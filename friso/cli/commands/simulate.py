@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import (
     RTOL_HELP,
     AsJson,
@@ -48,7 +49,8 @@ def simulate(
     target = OutputFolder("simulate", out, overwrite, [] if cell else [Path(arguments[0])])
     from friso.engine.simulate import simulate as simulate_stage
     from friso.hunting.measures import measured_run
-    from friso.views.simulate.document import simulate_document, simulate_files
+    from friso.views.simulate.document import simulate_document
+    from friso.views.simulate.page import simulate_files
     from friso.views.simulate.words import conclusion
 
     response = simulate_stage(stage, rtol=tolerance or usual_rtol, sample_time=interval)
@@ -58,7 +60,7 @@ def simulate(
     deviation = float(response["position"][-1] - response["reference"][-1])
     sentence = conclusion(name if cell else stage.name or name, measures, deviation)
     if as_json:
-        print_document(simulate_document(response, measures, stage.name, sentence, written))
+        print_document(simulate_document(response, measures, stage.name, sentence), written)
     else:
         print_wrapped(sentence)
         print(f"{response.attrs['steps']} steps of the solver, {response.attrs['rejected']} rejected")
@@ -88,3 +90,6 @@ def _cell(store: Path, arguments: list[str], overrides: list[str] | None) -> tup
         raise InputError(f"--cell {store}", " ".join(arguments), f"one number per axis: {sizes}", "3 4")
     name = f"{store.with_suffix('').name}_cell_{'_'.join(arguments)}"
     return with_overrides(study.cell_stage(index), overrides), name, study.rtol
+
+
+COMMAND = Command(simulate, 30)

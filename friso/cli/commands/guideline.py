@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import AsJson, print_wrapped, say
 from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.cli.progress import ProgressBar
@@ -53,3 +54,6 @@ def guideline(
     for sentence in accuracy(result):
         print_wrapped(sentence)
     print_written(files)
+
+
+COMMAND = Command(guideline, 140)

@@ -10,7 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+<<<<<<< HEAD:friso/cli/map.py
 from friso.cli.common import AsJson, Overrides, in_units_of, read_stage, read_tolerance, say
+=======
+from friso.cli.command import Command
+from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
+>>>>>>> 0974314 (Commands register themselves, one module each; check, boundary, simulate and reproduce name their files and documents as the others do; every JSON document lists files and plug-ins):friso/cli/commands/map.py
 from friso.cli.map_options import (
     Axes,
     CheckStore,
@@ -231,3 +236,6 @@ def _report(runs: xr.Dataset, study: Study, store: Path, metric: str, files: lis
 
         print("\n".join([*sentences(runs, study, metric), f"store: {store}"]))
         print_written(files)
+
+
+COMMAND = Command(map_cells, 40)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Choices, Command
 from friso.cli.common import AsJson, Overrides, print_wrapped, with_overrides
 from friso.cli.log_options import Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, write
@@ -201,3 +202,6 @@ def listed_kinds() -> list[tuple[str, str]]:
     from friso.identify.kinds import KINDS
 
     return [(name, KINDS.one_line(name)) for name in KINDS]
+
+
+COMMAND = Command(identify, 100, Choices("Kinds of experiment (--as)", listed_kinds))

@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import AsJson, print_wrapped
 from friso.cli.output import print_document
 
@@ -34,3 +35,6 @@ def doctor(
                 print(f"  to mend it: {check.remedy}")
     if not all(check.works for check in looked_at):
         raise typer.Exit(1)
+
+
+COMMAND = Command(doctor, 150)

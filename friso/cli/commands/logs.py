@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from friso.cli.command import Command
 from friso.cli.common import AsJson, print_table, print_wrapped
 from friso.cli.log_options import Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
@@ -53,7 +54,7 @@ def logs(
     if as_json and not wrong:
         from friso.views.logs.document import logs_document
 
-        print_document(logs_document(contents), None if target is None else files)
+        print_document(logs_document(contents), files)
         return
     _print(contents)
     print_written(files)
@@ -74,3 +75,6 @@ def _print(contents: Sequence[LogContent]) -> None:
         for line in content.warnings:
             print_wrapped(f"note: {line}", "  ")
         print(f"next: {next_command(content)}\n")
+
+
+COMMAND = Command(logs, 90)

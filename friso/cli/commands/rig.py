@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Choices, Command
 from friso.cli.common import AsJson, Overrides, StageFile, print_wrapped, say, with_overrides
 from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
@@ -69,7 +70,7 @@ def rig(
     if as_json:
         from friso.views.rig.document import rig_document
 
-        print_document(rig_document(outcome))
+        print_document(rig_document(outcome), files)
     else:
         _print(outcome, files)
     if failed := [log.name for log in outcome.logs if log.failure]:
@@ -107,3 +108,6 @@ def listed_experiments() -> list[tuple[str, str]]:
     from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
     return [(name, RIG_EXPERIMENTS.one_line(name)) for name in RIG_EXPERIMENTS]
+
+
+COMMAND = Command(rig, 110, Choices("Experiments", listed_experiments))

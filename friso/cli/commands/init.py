@@ -8,7 +8,12 @@ from typing import Annotated
 
 import typer
 
+<<<<<<< HEAD:friso/cli/init.py
 from friso.cli.output import Overwrite, refuse_device, write
+=======
+from friso.cli.command import Command
+from friso.cli.output import Overwrite, write
+>>>>>>> 0974314 (Commands register themselves, one module each; check, boundary, simulate and reproduce name their files and documents as the others do; every JSON document lists files and plug-ins):friso/cli/commands/init.py
 from friso.errors import InputError
 
 
@@ -32,3 +37,6 @@ def init(
         expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
         raise InputError("STAGE.toml", str(path), expected, "friso init new.toml") from None
     print(f"wrote {path}; edit it, then: friso check {path}")
+
+
+COMMAND = Command(init, 10)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import (
     AS_BUILT,
     AsJson,
@@ -101,3 +102,6 @@ def _print(result: Design, files: list[Path]) -> None:
     figures = len({path.stem for path in pictures})
     print(f"\nwrote {', '.join(map(str, named))}, and {figures} figures as PNG, SVG and PDF")
     print(f"next: friso check {files[0]}")
+
+
+COMMAND = Command(design, 80)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import (
     AS_BUILT,
     AsJson,
@@ -63,7 +64,7 @@ def bode(
     if as_json:
         from friso.views.bode.document import bode_document
 
-        print_document(bode_document(result))
+        print_document(bode_document(result), files)
         return
     _print(result)
     print_written(files)
@@ -95,3 +96,6 @@ def _print(result: Bode) -> None:
 
     states = shown_states(result)
     print_answer(sentences(result), result.stage.name, [item.label for item in states], rows(states))
+
+
+COMMAND = Command(bode, 50)

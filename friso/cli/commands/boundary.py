@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import (
     AsJson,
     Overrides,
@@ -59,13 +60,13 @@ def boundary(
         traced = boundary_of(stage, axes, links, tolerance, log)
         keys = tuple(_printed(swept, text) for swept, text in zip(traced.space.ranges, axes.values(), strict=True))
         if target is not None:
-            from friso.views.boundary.document import boundary_files
+            from friso.views.boundary.page import boundary_files
 
             files = target.write(boundary_files(traced, keys, stage.name, f"{stage_file.stem}_boundary"), progress)
     if as_json:
         from friso.views.boundary.document import boundary_document
 
-        print_document(boundary_document(traced, keys))
+        print_document(boundary_document(traced, keys), files)
     else:
         from friso.views.boundary.words import sentences
 
@@ -81,3 +82,6 @@ def _printed(swept: KeyRange, text: str) -> ShownKey:
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)
     unit = match[1].strip() if match else ""
     return ShownKey(swept.key, unit, Quantity(swept.unit, any_sign, "").factor(unit)) if unit else ShownKey(swept.key)
+
+
+COMMAND = Command(boundary, 60)

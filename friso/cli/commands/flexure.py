@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import AsJson, Overrides, StageFile, leave, print_answer, read_stage, say
 from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
@@ -57,7 +58,7 @@ def flexure(
     if as_json:
         from friso.views.flexure.document import flexure_document
 
-        print_document(flexure_document(evaluated))
+        print_document(flexure_document(evaluated), files)
     else:
         _print(evaluated)
         print_written(files)
@@ -99,3 +100,6 @@ def _print(evaluated: BothModels) -> None:
     from friso.views.flexure.words import sentences
 
     print_answer(sentences(evaluated), evaluated.stage.name, list(evaluated.models), rows(evaluated))
+
+
+COMMAND = Command(flexure, 70)

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from friso.cli.command import Command
 from friso.cli.common import AsJson, Tolerance, print_wrapped, read_tolerance
 from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.cli.progress import ProgressBar
@@ -30,13 +31,13 @@ def reproduce(
     tolerance = read_tolerance(rtol)
     target = OutputFolder("reproduce", out, overwrite)
     from friso.studies.thesis.reproduce import reproduce as reproduce_thesis
-    from friso.views.reproduce.document import claims_document
-    from friso.views.reproduce.page import reproduction_files
+    from friso.views.reproduce.document import reproduce_document
+    from friso.views.reproduce.page import reproduce_files
 
     with ProgressBar() as progress:
         result = reproduce_thesis(names, points, tolerance, progress)
-        files = target.write(reproduction_files(result), progress)
-    document = claims_document(result)
+        files = target.write(reproduce_files(result), progress)
+    document = reproduce_document(result)
     if as_json:
         print_document(document, files)
         return
@@ -50,3 +51,6 @@ def reproduce(
             f"in {cells['dormant']} none are counted although one does"
         )
     print_written(path for path in files if path.suffix in (".html", ".json"))
+
+
+COMMAND = Command(reproduce, 130)

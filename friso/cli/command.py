@@ -1,0 +1,46 @@
+"""What a module of friso/cli/commands declares: a command, its place in `friso --help`, and a list below its help."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from typer.core import TyperCommand
+
+from friso.registry import Registry
+
+
+@dataclass(frozen=True)
+class Choices:
+    """A list below the help of a command, read only when the help is asked for: (name, what it is in one line)."""
+
+    title: str
+    rows: Callable[[], Iterable[tuple[str, str]]]
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command of friso: the function that typer calls, whose docstring is the help, and its `place` in the list of
+    commands, which goes by increasing numbers."""
+
+    function: Callable[..., None]
+    place: int
+    choices: Choices | None = None
+
+    @property
+    def help_class(self) -> type[TyperCommand]:
+        """The class of typer that shows the help, with the choices below."""
+        choices = self.choices
+        if choices is None:
+            return TyperCommand
+
+        class ListingCommand(TyperCommand):
+            def format_epilog(self, ctx: Any, formatter: Any) -> None:
+                with formatter.section(choices.title):
+                    formatter.write_dl([*choices.rows()])
+
+        return ListingCommand
+
+
+COMMANDS = Registry[Command]("friso.cli.commands", "COMMAND")

@@ -1,0 +1,1 @@
+"""The commands: one module each, whose `COMMAND` is the command of the module's name."""
