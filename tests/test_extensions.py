@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 from friso.cli.app import main
+from friso.cli.command import COMMANDS, Command
+from friso.cli.output import OutputFolder, print_document
 from friso.identify.estimate import Estimate
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identify.kinds import KINDS, in_order
@@ -22,6 +24,7 @@ from friso.identify.logs.log import Log
 from friso.identify.logs.read import file_format, read_table
 from friso.progress import Progress
 from friso.stage import Stage
+from friso.stage.foreign import foreign
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.outcome import Outcome, RigLog
 from friso.views.drawing.figure import Axis, Figure, Panel, Series
@@ -157,6 +160,29 @@ def test_a_page_of_its_own_needs_no_template() -> None:
     page = Report("hold", "A stage", [figure], values=values).html()
     assert "<title>A stage: friso hold</title>" in page
     assert all(text in page for text in ("It &lt;holds&gt;.", "<td>2 N</td>", "Forces held", ", by hand."))
+
+
+def hold(out: Path) -> None:
+    """Hold still.
+
+    Example: friso hold out
+    """
+    files = OutputFolder("hold", out, False).write({"hold.html": Report("hold", "A stage").html()})
+    print_document({"conclusion": "held"}, files)
+
+
+def test_a_command_of_its_own_is_listed_and_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(COMMANDS.added, "hold", (Command(hold, 25), ""))
+    assert run(command="--help") == 0
+    lines = capsys.readouterr().out.partition("Commands:")[2].splitlines()
+    assert [line.split()[0] for line in lines if line.strip()][1:4] == ["check", "hold", "simulate"]
+    assert run(tmp_path / "out", command="hold") == 0
+    page = tmp_path / "out" / "hold.html"
+    expected = {"conclusion": "held", "files": [str(page)], "plug_ins": foreign()}
+    assert json.loads(capsys.readouterr().out) == expected
+    assert "friso hold" in page.read_text(encoding="utf-8")
 
 
 def test_what_is_registered_is_in_the_help(extended: None, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,8 +6,10 @@ from collections import defaultdict
 from pathlib import Path
 
 import pytest
+import typer
 
 import friso
+from friso.cli.app import command_line
 
 PACKAGE = Path(friso.__file__).parent
 ROOT = Path(__file__).parents[1]
@@ -36,10 +38,14 @@ RECIPES = {
     "controller": "equations/controllers",
     "friction law": "equations/friction",
     "kind of experiment": "identify/experiments",
-    "page": "views/",
+    "command and its page": "cli/commands",
     "log format": "identify/logs",
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
+
+
+LEFT = 38
+"""Width of the column of names in the drawing of docs/architecture.md."""
 
 
 def sources() -> dict[str, str]:
@@ -75,17 +81,34 @@ def test_views_stand_in_the_folder_of_their_command() -> None:
     assert {path.name for path in (PACKAGE / "views").glob("*.py")} - SHARED_VIEWS == set()
 
 
+def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
+    """A command that writes has <command>_files in page.py; every one with --json has <command>_document."""
+    group = typer.main.get_command(command_line())
+    assert isinstance(group, typer.core.TyperGroup)
+    missing = []
+    for name, command in group.commands.items():
+        options = {option for parameter in command.params for option in parameter.opts}
+        places = {"--out": ("page", f"{name}_files"), "--json": ("document", f"{name}_document")}
+        for module, function in (place for option, place in places.items() if option in options):
+            path = PACKAGE / "views" / name / f"{module}.py"
+            if not path.exists() or f"def {function}(" not in path.read_text(encoding="utf-8"):
+                missing.append(f"{path.relative_to(PACKAGE)}: {function}")
+    assert missing == []
+
+
 @pytest.mark.parametrize("kind", RECIPES)
 def test_there_is_a_recipe(kind: str) -> None:
     """A heading for what is added, and below it the folder of its file."""
     sections = GUIDE.read_text(encoding="utf-8").split("\n#")
     recipes = [section for section in sections if kind in section.partition("\n")[0].lower()]
-    assert recipes
-    assert any(RECIPES[kind] in recipe for recipe in recipes)
-    assert any((PACKAGE / RECIPES[kind]).glob("*"))
+    assert any(f"friso/{RECIPES[kind]}/" in recipe for recipe in recipes)
+    assert [*(PACKAGE / RECIPES[kind]).glob("[a-z]*.py")] != []
 
 
-def test_the_drawing_of_the_house_names_every_folder() -> None:
-    drawing = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+def test_the_drawing_of_the_house_is_of_the_folders_that_there_are() -> None:
+    """The first column of the drawing, a block of code: packages and modules."""
+    drawing = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8").split("```")[1]
+    drawn = set(re.findall(r"[a-z_]+", " ".join(line[:LEFT] for line in drawing.splitlines())))
     folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
-    assert {name for name in folders if name not in drawing} == set()
+    assert folders - drawn == set()
+    assert drawn - folders - {path.stem for path in PACKAGE.glob("*.py")} == set()

@@ -13,7 +13,7 @@ from filelock import FileLock
 from inside import friso_inside
 from refusals import Refused
 
-from friso.cli.app import app
+from friso.cli.app import command_line
 from friso.cli.drafts import DRAFTS, Drafts
 from friso.cli.output import MARKER, UNFINISHED, OutputFolder, write
 from friso.errors import InputError
@@ -43,7 +43,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
 
 def commands_with(option: str) -> set[str]:
     """The commands of friso that take an option."""
-    group = typer.main.get_command(app)
+    group = typer.main.get_command(command_line())
     return {name for name, command in group.commands.items() if option in {o for p in command.params for o in p.opts}}
 
 

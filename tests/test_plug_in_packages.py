@@ -1,5 +1,6 @@
 """Controllers and friction laws from installed packages: found by their entry points, named, and refused."""
 
+import json
 import os
 import subprocess
 import sys
@@ -68,11 +69,13 @@ def test_help_names_them(installed: Path) -> None:
     assert "friction law air (air_film)" in " ".join(done.stdout.split())
 
 
-def test_a_stage_file_uses_one_and_the_report_names_it(installed: Path) -> None:
-    done = friso_command(installed, "bode", "stage.toml", "--out", "out")
+def test_a_stage_file_uses_one_and_page_and_document_name_it(installed: Path) -> None:
+    done = friso_command(installed, "bode", "stage.toml", "--json", "--out", "out")
     assert done.returncode == 0, done.stderr
-    page = next((installed / "out").glob("*.html")).read_text(encoding="utf-8")
-    assert "controller pi-d (own_controller)" in page
+    document = json.loads(done.stdout)
+    (page,) = (Path(file) for file in document["files"] if file.endswith(".html"))
+    assert "controller pi-d (own_controller)" in (installed / page).read_text(encoding="utf-8")
+    assert "controller pi-d (own_controller)" in document["plug_ins"]
 
 
 @pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing")])

@@ -12,6 +12,7 @@ from inside import friso_inside
 from pages import Page
 from snapshots import FOLDER, Snapshots, alike, masked, read
 
+from friso.cli.command import COMMANDS
 from friso.views.drawing import matplotlib_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -55,6 +56,10 @@ def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
     """A narrow terminal, and no time for pictures, which say nothing here."""
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+
+
+def test_every_command_has_its_words_here() -> None:
+    assert sorted(MISTAKES) == list(COMMANDS)
 
 
 @pytest.mark.parametrize("command", MISTAKES)

@@ -1,5 +1,5 @@
 """The command line."""
 
-from friso.cli.app import app, main
+from friso.cli.app import main
 
-__all__ = ["app", "main"]
+__all__ = ["main"]

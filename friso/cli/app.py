@@ -21,16 +21,36 @@ from friso.errors import InputError
 from friso.stage.foreign import installed
 from friso.version import VERSION
 
-app = typer.Typer(
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+
+def _version(requested: bool) -> None:
+    if requested:
+        print(f"friso {VERSION}")
+        raise typer.Exit
 
 
-for name, command in sorted(((name, COMMANDS[name]) for name in COMMANDS), key=lambda item: item[1].place):
-    app.command(name, cls=command.help_class)(command.function)
+def friso(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Does a positioning stage on contact bearings hunt, why, and what stops it?
+
+    Start with: friso init stage.toml && friso check stage.toml
+    """
+
+
+def command_line() -> typer.Typer:
+    """The commands of friso, in the order of their places."""
+    app = typer.Typer(
+        add_completion=False,
+        rich_markup_mode=None,
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback()(friso)
+    for name, command in sorted(((name, COMMANDS[name]) for name in COMMANDS), key=lambda item: item[1].place):
+        app.command(name, cls=command.help_class)(command.function)
+    return app
 
 
 def main() -> NoReturn:
@@ -69,6 +89,7 @@ def _run() -> int:
     messages = logging.StreamHandler(sys.stderr)
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     logging.getLogger("friso").addHandler(messages)
+    app = command_line()
     if {"-h", "--help"} & {*sys.argv[1:2]}:
         app.info.epilog = _plug_ins()
     return copy_context().run(app, standalone_mode=False) or 0
@@ -98,21 +119,3 @@ def _plug_ins() -> str:
     """What installed packages add, for the help. Raises InputError for a name that is taken."""
     names = installed()
     return f"From other packages: {', '.join(names)}." if names else ""
-
-
-def _version(requested: bool) -> None:
-    if requested:
-        print(f"friso {VERSION}")
-        raise typer.Exit
-
-
-@app.callback()
-def friso(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
-    ] = False,
-) -> None:
-    """Does a positioning stage on contact bearings hunt, why, and what stops it?
-
-    Start with: friso init stage.toml && friso check stage.toml
-    """
