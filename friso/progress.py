@@ -6,13 +6,13 @@ from typing import Protocol
 
 
 class Progress(Protocol):
-    """Called with the steps done, the steps in all (0: not known), and what is being done now."""
+    """Called with the steps done, the total number of steps (0: unknown), and what is being done now."""
 
     def __call__(self, done: int, total: int, what: str, /) -> None: ...
 
 
 def silent(done: int, total: int, what: str) -> None:
-    """The progress that nobody watches."""
+    """Progress that is not shown."""
 
 
 def share_of(progress: Progress, number: int, count: int) -> Progress:

@@ -19,7 +19,7 @@ class Registry(Generic[Declared]):
     """What the modules of a `package` declare under the name `attribute`, by the name of the module with dashes:
     `break_away.py` declares "break-away".
 
-    The names, and what each is in one line, the first one of the module's docstring, are had without importing any of
+    The names, and what each is in one line, the first one of the module's docstring, are read without importing any of
     them; a module is imported when what it declares is first asked for. `added` takes what is declared elsewhere, as
     (declared, one line), by name.
     """

@@ -335,7 +335,7 @@ def test_moves_that_swing_or_take_too_long(found: Design, snapshots: Snapshots) 
     step = moves_step(other)
     assert [fact for fact in ("64 moves", "2 do not", "1 swing", "1 creep") if fact not in step.title] == []
     said = " ".join(step.sentences)
-    assert [fact for fact in ("95 %", "1.00 s", "NOT met", "1 mm") if fact not in said] == []
+    assert [fact for fact in ("95 %", "1.00 s", "Not met", "1 mm") if fact not in said] == []
     snapshots.check("design", "moves that swing", "\n".join([*step.sentences, headline(other)[-1][1]]))
     lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
     step = moves_step(replace(found, verification=replace(found.verification, free=lost)))

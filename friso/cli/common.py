@@ -147,7 +147,7 @@ def key_values(options: list[tuple[str, str]], example: str) -> dict[str, str]:
         if not (equals and key and value.strip()):
             raise InputError(option, text, "KEY=VALUE", example)
         if key in pairs:
-            raise InputError(option, f"{key} a second time", "each key once", example)
+            raise InputError(option, f"{key} given twice", "each key once", example)
         pairs[key] = value.strip()
     return pairs
 

@@ -30,8 +30,8 @@ Metric = Annotated[
     typer.Option(
         "--metric",
         metavar="NAME",
-        help="Quantity that colours the map; of runs: outcome (what they do at their end, the default), peaks, ...; of "
-        "what attracts the stage: verdict, multiplier, amplitude, period.",
+        help="Quantity shown in colour. Of each run: outcome (what it does at its end; default), peaks, ... Of the "
+        "stage: verdict, multiplier, amplitude, period.",
     ),
 ]
 MapTolerance = Annotated[
@@ -46,8 +46,8 @@ Scheduler = Annotated[
     typer.Option(
         "--scheduler",
         metavar="ADDRESS",
-        help="Run on the workers of a Dask scheduler. Whoever reaches the address can run code there and here, but for "
-        "tls://, with the certificates of Dask's configuration.",
+        help="Run on the workers of a Dask scheduler. Anyone who can reach the address can run code there and here; "
+        "tls://, with the certificates of Dask's configuration, keeps others out.",
     ),
 ]
 Exports = Annotated[list[Path] | None, typer.Option("--export", metavar="FILE", help="Also write a .nc or .csv file.")]
@@ -56,7 +56,7 @@ StoreFolder = Annotated[
 ]
 ReplaceStore = Annotated[
     bool,
-    typer.Option("--overwrite", help="Replace a store of another study, and figures and tables of the same names."),
+    typer.Option("--overwrite", help="Replace the store of another study, and figures and exports of the same name."),
 ]
-CheckStore = Annotated[bool, typer.Option("--check", help="Run nothing, but tell whether a STORE is whole.")]
+CheckStore = Annotated[bool, typer.Option("--check", help="Run nothing; report whether a STORE is intact.")]
 Confirmed = Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")]

@@ -21,11 +21,8 @@ from friso.errors import InputError
 from friso.escapes import one_line
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
-<<<<<<< HEAD
-from friso.system import device_in
-=======
 from friso.stage.foreign import foreign
->>>>>>> 0974314 (Commands register themselves, one module each; check, boundary, simulate and reproduce name their files and documents as the others do; every JSON document lists files and plug-ins)
+from friso.system import device_in
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -40,7 +37,10 @@ UNFINISHED = ".friso-unfinished"
 OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
 DefaultFolder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
 Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Write even where files of others are, and replace those of the same names.")
+    bool,
+    typer.Option(
+        "--overwrite", help="Write into the folder even if it holds other files, and replace files of the same name."
+    ),
 ]
 
 
@@ -56,7 +56,7 @@ class OutputFolder:
         self.is_own = maker == command or not _entries(folder)
         if not (self.is_own or overwrite):
             holds = f"made by friso {maker}" if maker else f"with {_listed(_entries(folder))} in it"
-            replaced = "which replaces those that have the name of a file it writes"
+            replaced = "which replaces files of the same name"
             expected = f"a new or empty folder, one that friso {command} made, or --overwrite, {replaced}"
             raise InputError("--out", f"{folder}, {holds}", expected, f"--out {folder}-2")
         self.check(name for name in self.files if self.is_own)
@@ -91,7 +91,7 @@ class OutputFolder:
         marker = {self.folder / MARKER: self._marker(files)} if self.is_own else {}
         write({**contents, **(beside or {}), **marker}, progress)
         if foreign:
-            say(f"replaced, as told by --overwrite: {', '.join(foreign)}")
+            say(f"replaced (--overwrite): {', '.join(foreign)}")
         return [path for path, content in contents.items() if content is not None]
 
     def _marker(self, files: Files) -> str:

@@ -20,7 +20,7 @@ SEARCHED = 60
 """Generations of the search for a geometry to start from."""
 
 SEED = 34
-"""Of its random numbers: the same front for the same specification."""
+"""Seed of the random numbers: the same front for the same specification."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
 
 @dataclass(frozen=True)
 class Judged:
-    """Of geometries: drive stiffness [N/m] and first interfering frequency [Hz], shape (count,), and by what factor
+    """Geometries: their drive stiffness [N/m] and first interfering frequency [Hz], shape (count,), and by what factor
     each requirement is broken, (count, requirements)."""
 
     stiffness: np.ndarray

@@ -18,7 +18,7 @@ LEVELS = (0.0, 0.5, 1.0)
 """Shares of each range of static friction and gap that the corners take: hunting is not monotonous in them."""
 
 SEED = 6
-"""Of the scrambled Sobol sequence: the same machines for the same specification."""
+"""Seed of the scrambled Sobol sequence: the same machines for the same specification."""
 
 DISTANT = 5.0
 """Time [s] from the start of a move to that of the way back, at least, as in the thesis's path."""

@@ -17,7 +17,7 @@ BEYOND = 3.0
 """Factor by which space and sheets are looked at beyond what the specification allows."""
 
 POPULATION, GENERATIONS, SEED = 16, 80, 5
-"""Of differential evolution (doi:10.1023/A:1008202821328)."""
+"""Population, generations and seed of differential evolution (doi:10.1023/A:1008202821328)."""
 
 UNMET = 10.0
 """Added to the objective where another requirement is not met: the logarithm of a factor beyond all relaxation."""

@@ -169,8 +169,8 @@ def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
 
 
 def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
-    """Of it, what the loads make [Pa]: a force across the leaf ends bends them in their plane as cantilevers, since
-    nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
+    """The part of that stress which the loads make [Pa]: a force across the leaf ends bends them in their plane as
+    cantilevers, since nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
     load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
     about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2
     edgewise = (float(load.force_y) * mechanism.length + float(load.moment_z)) / mechanism.leaves + about_x

@@ -108,7 +108,7 @@ class Status(IntEnum):
 _TEXTS = {
     Status.NOT_RUN: "not run: the computation was interrupted",
     Status.DONE: "done",
-    Status.BUDGET: "step budget used up: loosen rtol, shorten the motion, or look for contact that chatters",
+    Status.BUDGET: "step budget used up: loosen rtol, shorten the motion, or check for a chattering contact",
     Status.UNDERFLOW: "step size too small or state not finite: the loop is unstable or rtol is below rounding; "
     "check the controller's gains, or loosen rtol",
     Status.DIVERGED: "the stage runs away from its reference: the loop is unstable; check the controller's gains",

@@ -53,7 +53,7 @@ ROW = namedtuple("ROW", SCALARS + CLOCK + DRIVER)(*range(len(SCALARS + CLOCK + D
 """Numbers of the rows that are the same for every model: the first of the buffer."""
 
 AXES = ("first", "density", "last")
-"""Of the places and of the times of a table: where it begins, its points per unit, and the number of its last point."""
+"""The places and the times of a table: where it begins, its points per unit, and the number of its last point."""
 
 SIZES = (
     "lanes",

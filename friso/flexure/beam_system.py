@@ -24,7 +24,7 @@ ELEMENTS = 16
 """Elements along a leaf; its modes are reported at the nodes between them."""
 
 COORDINATES = 6
-"""Of a node: displacements along x, y, z and angles of successive rotations about them."""
+"""Coordinates of a node: displacements along x, y, z and angles of successive rotations about them."""
 
 
 class BeamFailure(RuntimeError):

@@ -31,7 +31,7 @@ FOLDED = 1.3
 """Angle [rad] of a node from which the mechanism is folded rather than deflected."""
 
 PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
-"""Of the six coordinates of the stage, those that move with the stroke, and the others."""
+"""Among the six coordinates of the stage, those that move with the stroke, and the others."""
 
 
 @dataclass(frozen=True)

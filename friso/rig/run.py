@@ -19,7 +19,7 @@ from friso.rig.task import MoveTask
 from friso.stage import Stage
 
 SAMPLE_TIME = 50e-6
-"""Of a drive that does not tell [s]: that of the thesis (Sec. 3.5.2)."""
+"""Sample time of a drive that states none [s]: that of the thesis (Sec. 3.5.2)."""
 
 RTOL, METHOD = 1e-4, "Rodas4"
 """Relative tolerance and method: a step is at most a sample long."""
@@ -54,7 +54,7 @@ class Recorded:
 
     @property
     def time(self) -> np.ndarray:
-        """Of the samples [s], shape (n,)."""
+        """Times of the samples [s], shape (n,)."""
         return np.arange(self.logged["position"].shape[1]) * self.interval
 
 

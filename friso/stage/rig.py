@@ -55,7 +55,7 @@ class Drive(UncertainSection):
     velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
     """Over how many samples the position's difference is taken for its velocity; only a log's simulation reads it."""
     current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
-    """Of the current loop, a first-order lag between the controller's force and the actuator's."""
+    """Bandwidth of the current loop, a first-order lag between the controller's force and the actuator's."""
     encoder_resolution: Annotated[Value | None, Quantity("m", positive, "1 nm")] = None
     encoder_noise: Annotated[Value | None, Quantity("m", non_negative, "0.5 nm")] = None
     """RMS, of each sample on its own."""

@@ -251,7 +251,7 @@ def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> Inp
     problems = [_problem(cls, problem, kind) for problem in others]
     if missing:
         keys = [".".join(map(str, problem["loc"])) for problem in missing]
-        actual = f"nothing; nor {', '.join(keys[1:])}" if keys[1:] else "nothing"
+        actual = f"nothing; also missing: {', '.join(keys[1:])}" if keys[1:] else "nothing"
         problems.append(InputError(keys[0], actual, *_described(cls, keys[0], kind)))
     return problems[0].together(problems[1:])
 

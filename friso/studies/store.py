@@ -256,7 +256,7 @@ def _refuse_other(path: Path, study: Study) -> None:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:
         text = "a store of another study:\n            " + "\n            ".join(differences)
-        expected = "the same study to go on with, or another --out; nothing was overwritten"
+        expected = "the same study, to resume it, or another --out; nothing was overwritten"
         raise StoreError("", text, expected, origin=str(path))
 
 

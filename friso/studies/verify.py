@@ -117,7 +117,7 @@ def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
 
 
 def _kinds(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
-    """Of each cell, whether it was "run" to its end, is `INFERRED`, or "" neither."""
+    """For each cell, whether it was "run" to its end, is `INFERRED`, or "" neither."""
     status, outcome = (_at(runs[name], study, cells).astype(str) for name in ("status", "outcome"))
     kinds = np.where(np.isin(outcome, ["invalid", "failed", ""]), "", "run")
     return np.where(np.char.startswith(status, INFERRED), INFERRED, kinds)

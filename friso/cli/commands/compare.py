@@ -52,8 +52,6 @@ def compare(
 ) -> None:
     """Buy a joint or change settings: which of seven options brings machines like this one to rest, and at what cost.
 
-    Takes about a quarter of an hour for 2000 machines and a run of 20 s on two cores.
-
     Example: friso compare examples/thesis_drive.toml --machines 200 --out compare
     """
     from friso.studies.compare.study import compare as compared

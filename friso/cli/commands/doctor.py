@@ -32,7 +32,7 @@ def doctor(
         for check in looked_at:
             print(f"{check.subject}: {check.text}")
             if check.remedy and not check.works:
-                print(f"  to mend it: {check.remedy}")
+                print(f"  remedy: {check.remedy}")
     if not all(check.works for check in looked_at):
         raise typer.Exit(1)
 

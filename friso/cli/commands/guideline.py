@@ -24,7 +24,7 @@ def guideline(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """The design guideline: guideline.md, its charts, guideline_edges.csv. Ten minutes on two cores, twenty if shared.
+    """The design guideline: guideline.md, its charts, guideline_edges.csv.
 
     Example: friso guideline --out guideline
     A quick try: friso guideline --samples 64 --out /tmp/guideline

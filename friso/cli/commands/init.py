@@ -8,12 +8,8 @@ from typing import Annotated
 
 import typer
 
-<<<<<<< HEAD:friso/cli/init.py
-from friso.cli.output import Overwrite, refuse_device, write
-=======
 from friso.cli.command import Command
-from friso.cli.output import Overwrite, write
->>>>>>> 0974314 (Commands register themselves, one module each; check, boundary, simulate and reproduce name their files and documents as the others do; every JSON document lists files and plug-ins):friso/cli/commands/init.py
+from friso.cli.output import Overwrite, refuse_device, write
 from friso.errors import InputError
 
 

@@ -10,12 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-<<<<<<< HEAD:friso/cli/map.py
-from friso.cli.common import AsJson, Overrides, in_units_of, read_stage, read_tolerance, say
-=======
 from friso.cli.command import Command
-from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
->>>>>>> 0974314 (Commands register themselves, one module each; check, boundary, simulate and reproduce name their files and documents as the others do; every JSON document lists files and plug-ins):friso/cli/commands/map.py
+from friso.cli.common import AsJson, Overrides, in_units_of, read_stage, read_tolerance, say
 from friso.cli.map_options import (
     Axes,
     CheckStore,
@@ -185,7 +181,7 @@ def _check(store: Path, as_json: bool) -> None:
         counts = {"blocks": state.blocks, "done": state.done}
         print_document({"store": str(store), **counts, "damaged": state.damaged, "damaged_files": state.files})
     else:
-        damage = f"damaged: {', '.join(damaged)} (friso map {store} makes what is damaged again)"
+        damage = f"damaged: {', '.join(damaged)} (friso map {store} recomputes the damaged blocks)"
         print(f"{store}: blocks done: {state.done} of {state.blocks}; {damage if damaged else 'nothing is damaged'}")
     if damaged:
         raise typer.Exit(1)

@@ -22,7 +22,7 @@ Experiment = Annotated[
     str,
     typer.Argument(
         metavar="EXPERIMENT",
-        help="One of those below.",
+        help="See the list below.",
     ),
 ]
 Seed = Annotated[
@@ -46,7 +46,7 @@ def rig(
 ) -> None:
     """Rehearse an experiment on the machine as built: sampled, quantised, saturated, on a rail that varies.
 
-    Writes logs that friso identify reads, and apart from them the truth behind each.
+    Writes logs for friso identify and, in a separate folder, the true signals behind each.
 
     Example: friso rig stiffness examples/thesis_drive.toml --out rig
     """

@@ -1,6 +1,6 @@
 """The boundary of hunting: cycles followed through one key or two, and where they stop attracting."""
 
-from friso.hunting.boundary.branch import Branch, Point
+from friso.hunting.boundary.branch import END_OF_RANGE, Branch, Point
 from friso.hunting.boundary.curve import Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
 from friso.hunting.boundary.locate import Kind, LocatedPoint
@@ -8,6 +8,7 @@ from friso.hunting.boundary.plane import Plane, plane
 from friso.hunting.boundary.space import KeyRange, Space
 
 __all__ = [
+    "END_OF_RANGE",
     "Branch",
     "Curve",
     "Diagram",

@@ -88,7 +88,7 @@ class Later:
 
 @np.errstate(all="ignore")
 def followed(recorded: Recorded, within: float) -> Later:
-    """Of a chunk of runs, whether they stay in position, `within` [m]."""
+    """For the runs of a chunk, whether they stay in position, `within` [m]."""
     deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE
     words = outcomes(end_of_traces(recorded.time, deviation, within, done), within, hold=recorded.time[-1] / 2)
@@ -109,7 +109,7 @@ def _rms(values: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class LoopRobustness:
-    """Of the linear loop of each machine, arrays of shape (count,): whether it is `stable` in all limit cases, and the
+    """For the linear loop of each machine, arrays of shape (count,): whether it is `stable` in all limit cases, and the
     least modulus `margin` of these (0 where it is not stable)."""
 
     stable: np.ndarray

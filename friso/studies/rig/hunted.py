@@ -25,10 +25,10 @@ from friso.studies.rig.sizes import interval, jointed, pace, quicker
 from friso.studies.shares import Share, share
 
 RAILS = 20
-"""Rails on which a machine is repeated: the issue's number, ours."""
+"""Rails on which a machine is repeated: our choice."""
 
 DURATION = 20.0
-"""Of a run at least [s], as in the thesis (Sec. 3.2.2), whose peaks count after 10 s."""
+"""Least duration of a run [s], as in the thesis (Sec. 3.2.2), whose peaks count after 10 s."""
 
 INTERVAL = 1e-3
 """Between the samples of a log, at most [s]: the thesis states none."""
@@ -41,8 +41,8 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 
 
 def distance(stage: Stage) -> float:
-    """Of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for the 90 mm
-    of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
+    """Distance of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for
+    the 90 mm of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
     exact = float(motion.size(stage.flat()))
     if not exact:
         raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that moves the stage", '"step"')
@@ -51,7 +51,7 @@ def distance(stage: Stage) -> float:
 
 
 def duration(stage: Stage) -> float:
-    """Of a run [s]."""
+    """Duration of a run [s]."""
     return max(DURATION, float(stage.flat()["motion.duration"]))
 
 
@@ -76,7 +76,7 @@ def with_joint(stage: Stage, locked: bool) -> Stage:
 
 
 def crossover(stage: Stage) -> float:
-    """Of the stage's controller [Hz]. Raises InputError for one that is given by its gains."""
+    """Crossover of the stage's controller [Hz]. Raises InputError for one that is given by its gains."""
     return float(stage.flat()[crossover_key(stage)])
 
 
@@ -223,7 +223,7 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Of the swings in the last half of a run, from its turning points, times [s] and values [m]: above, below,
+    """The swings in the last half of a run, from its turning points, times [s] and values [m]: above, below,
     rising, scatter of period and of height, as in `Hunted`."""
     nothing = (np.nan,) * 5
     if not swing > max(DISTINCT, 2 * BAND):

@@ -30,7 +30,7 @@ APART = 4
 """Where all were steady, it goes every fourth of their speeds, from the least on."""
 
 POINTS = 500
-"""Of a way, for its mean friction."""
+"""Points of a way, for its mean friction."""
 
 LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
 """Periods of the stage's own crossover that each speed takes, and for which it stands before; samples per period (0.4

@@ -67,16 +67,16 @@ COULOMB_LEVEL = 2.0
 
 SEED = 1
 RAILS = 20
-"""Of the moves and of the rails that vary."""
+"""Seed, and number, of the moves and of the rails that vary."""
 
 CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
 """Over 8 Hz (Sec. 4.3.2)."""
 
 DISPLACEMENTS = (-0.05, 0.05)
-"""Of the releases over the distance of the move: 5 mm to either side."""
+"""Displacements of the releases over the distance of the move: 5 mm to either side."""
 
 STROKES, LOOPS, GRID_RAILS = np.array([0.02, 0.3, 1.0]), np.array([4.0, 6.0, 8.0, 12.0]) / 8, 2
-"""Of Fig. 26, over 1 mm and 8 Hz, and the rails of each cell."""
+"""Strokes over 1 mm and crossovers over 8 Hz of Fig. 26, and the rails of each cell."""
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 EVERY = 2
-"""Of every so many values of each axis the stage is surveyed, to compare what attracts it with the peak count."""
+"""The stage is surveyed at every so many values of each axis, to compare what attracts it with the peak count."""
 
 NODES = 9
 """Stages along either axis from which curves are looked for."""

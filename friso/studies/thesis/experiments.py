@@ -50,7 +50,7 @@ FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
 """[Hz], at which the response with friction is computed."""
 
 SAMPLE_TIME = 1e-3
-"""Of the records [s]: the thesis gives none."""
+"""Sample time of the records [s]: the thesis gives none."""
 
 STEP, STEPS, STANDS = 0.3e-3, (1, 1, -1, -1, 1, -1), 2.0
 """Size of a step [m] (Sec. 4.2.2), their directions, and the time [s] for which each stands: both our choice."""

@@ -48,17 +48,13 @@ class Verdict:
         """One sentence on the open parameters, and one on tolerance and metric where they matter."""
         if self.finding is None:
             return ""
-        opened = "Nothing that the thesis leaves open is involved."
+        opened = "No open parameter of the thesis enters this claim."
         if self.tried:
             turns = (
-                f"a part changes its judgement with {_listed(self.depends_on)}"
-                if self.depends_on
-                else "none changes a judgement"
+                f"the judgement changes with {_listed(self.depends_on)}" if self.depends_on else "no judgement changes"
             )
-            opened = f"What the thesis leaves open, varied one at a time, {self.tried} values: {turns}."
-        return (
-            f"{opened} Method: a part changes its judgement with {_listed(self.hangs_on)}." if self.hangs_on else opened
-        )
+            opened = f"Parameters left open by the thesis, varied one at a time ({self.tried} values): {turns}."
+        return f"{opened} Method: the judgement changes with {_listed(self.hangs_on)}." if self.hangs_on else opened
 
 
 def _listed(dependences: Iterable[Dependence]) -> str:

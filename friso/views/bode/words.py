@@ -88,8 +88,8 @@ def caveats(bode: Bode) -> list[str]:
     half = ", half the sampling frequency" if timed and _crossing(bode) else ""
     end, causes = with_unit(max(ends), _unit(bode)), listed([*causes, "modes"], "and")
     return [
-        f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes} that the "
-        "stage file does not contain set the limit earlier."
+        f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes}, which the "
+        "stage file leaves out, set a lower limit."
     ]
 
 
@@ -154,8 +154,8 @@ def _why(bode: Bode) -> list[str]:
     if not all(speeds.falling for speeds in bode.unstable):
         return []
     return [
-        "There friction falls with speed (Stribeck effect), which makes a stage stick and slip; a higher crossover "
-        "may shrink the range. The settled states are stable; whether the stage hunts is determined by friso check."
+        "Friction falls with speed there (Stribeck effect), so the stage sticks and slips; a higher crossover may "
+        "shrink the range. The settled states are stable; friso check determines whether the stage hunts."
     ]
 
 

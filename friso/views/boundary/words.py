@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from friso.hunting.boundary import Diagram, KeyRange, Plane, Space
+from friso.hunting.boundary import END_OF_RANGE, Diagram, KeyRange, Plane, Space
 from friso.studies.boundary_lines import (
     ATTRACTS,
     INVALID,
@@ -151,7 +151,7 @@ def _followed(line: Line, key: ShownKey, space: Space) -> str:
     """Over which values a branch was followed, and how it ends."""
     pair = "Asymmetric cycles, which bound the basin of the hunting cycle where they repel,"
     name = pair if line.shape == "asymmetric" else "Hunting cycles"
-    return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}; ends: {_ends(line)}."
+    return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}{_ends(line)}."
 
 
 def end_sentence(traced: Diagram, key: ShownKey) -> str:
@@ -177,7 +177,7 @@ def _curve(line: Line, keys: tuple[ShownKey, ...], space: Space) -> str:
     extents = ", ".join(f"{key.key} {key.extent(values, swept)}" for key, values, swept in sides)
     errors = ", ".join(key.text(error, 1) for key, error in zip(keys, line.error.max(axis=0), strict=True))
     head = f"{line.kinds[0].capitalize()} of {CYCLES[line.shape]}: {len(line.at)} points, {extents}"
-    return f"{head}; ends: {_ends(line)}; largest error: {errors}."
+    return f"{head}{_ends(line)}; largest error: {errors}."
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
@@ -202,9 +202,11 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
         f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
         for key, swept in zip(keys, space.ranges, strict=True)
     )
-    return f"No place was found at which hunting begins or ends over {', '.join(between)}."
+    return f"No beginning or end of hunting was found for {', '.join(between)}."
 
 
 def _ends(line: Line) -> str:
-    """How a line ends; once where both ends are the same."""
-    return "; ".join(dict.fromkeys(line.ends))
+    """How a line ends, to follow where it runs."""
+    if set(line.ends) == {END_OF_RANGE}:
+        return ", to both ends of the range"
+    return f"; ends: {'; '.join(dict.fromkeys(line.ends))}"

@@ -18,9 +18,9 @@ from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_
 
 COLUMNS = (
     "Swings at the end",
-    "Has a distinct peak",
+    "With a distinct peak",
     "In position at the end",
-    "Stays there later",
+    "In position in the longer run",
     "Settling time",
     "In-position RMS",
     "Force RMS",
@@ -31,7 +31,7 @@ PAIRED = (
     "Swinging, difference",
     "In position sooner",
     "In position later",
-    "Alike",
+    "No difference",
     "In-position RMS, ratio",
     "Force RMS, ratio",
 )
@@ -224,14 +224,14 @@ def _recommendation(comparison: Comparison) -> list[str]:
         return ["These machines need neither a joint nor other settings."]
     if joint and settings:
         return [
-            f"Controller settings do what a joint does on these machines: {_names(settings)} needs no joint. Buy a "
-            "joint only if the controller cannot be set that way."
+            f"On these machines controller settings do what a joint does: with {_names(settings)} no joint is needed. "
+            "Buy one only if the controller cannot be set that way."
         ]
     if joint:
         return [f"Only a joint brings these machines to rest: {_names(joint)}. No setting does so alone."]
     if settings:
         tried = any(result.letter in JOINT for result in comparison.results)
-        return [f"Controller settings are enough: {_names(settings)}{'; a joint is not' if tried else ''}."]
+        return [f"Controller settings suffice ({_names(settings)}){'; a joint does not' if tried else ''}."]
     return []
 
 
@@ -256,8 +256,8 @@ def _failing(comparison: Comparison) -> list[str]:
     """What the machines do at the end with the other options."""
     return [
         f"{label(result)}: not enough. {percent(result.swinging)} of the machines swing at the end and "
-        f"{percent(result.settled)} are in position; throughout the last half of a run {LONGER} times as long "
-        f"{percent(result.stays)} are."
+        f"{percent(result.settled)} are in position; {percent(result.stays)} stay in position throughout the last half "
+        f"of a run {LONGER} times as long."
         for result in comparison.results
         if not result.rests
     ]

@@ -83,8 +83,8 @@ def _not_higher(design: Design) -> str:
     if short < ROUNDED:
         return text
     return (
-        f"{text} The crossover stays {percent(short)} below the first of these: sizes rounded to tenths of a "
-        "millimetre, and confirmation by the beam model, cost that much."
+        f"{text} The crossover is {percent(short)} below the first of these, because sizes are rounded to tenths of a "
+        "millimetre and must be confirmed by the beam model."
     )
 
 
@@ -144,7 +144,7 @@ def _met(design: Design) -> str:
     limit, time = design.spec.position.settling_time, design.verification.free.slower_than(0.05)
     if limit is None:
         return ""
-    return f"Specified for 95 % of the moves: {seconds(float(limit))}; that is {'' if time <= limit else 'NOT '}met."
+    return f"Required for 95 % of the moves: {seconds(float(limit))}. {'Met' if time <= limit else 'Not met'}."
 
 
 def _worst(outcome: MachineOutcomes) -> str:

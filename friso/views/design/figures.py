@@ -82,8 +82,8 @@ def _front(design: Design) -> Figure:
     )
     kinds = [f"{sheet.leaves:g} leaves of {size(sheet.thickness)} mm {sheet.material}" for sheet in sheets]
     caption = (
-        "The best that can be built: no leaves that meet all requirements are both softer and have a higher first "
-        "interfering frequency. The front ends on the right where the cart would break away within the stroke, at "
+        "Pareto front: no leaves meeting all requirements are both softer and higher in their first interfering "
+        "frequency. The front ends on the right where the cart would break away within the stroke, at "
         f"{newtons_per(stiffest, 'mm')}, or where space or available thicknesses end. On this front: "
         f"{listed(kinds, 'and')}."
     )
@@ -120,8 +120,8 @@ def _map(design: Design) -> Figure:
     panel = Panel("", *axes, tuple(upright), (point,), maps=(field,))
     caption = (
         f"The share of the {design.edges.population.count} corners of friction and masses in which the stage is not in "
-        "position a quarter of a minute after a typical move: it swings, or creeps so slowly that it might as "
-        "well swing. Drive stiffness as chosen."
+        "position a quarter of a minute after a typical move: it swings, or creeps too slowly to "
+        "settle. Drive stiffness as chosen."
     )
     return Figure("design_map", "Where moves do not come to rest, over crossover and stroke", caption, (panel,))
 

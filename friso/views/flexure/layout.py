@@ -10,7 +10,7 @@ from friso.flexure.mechanism import Mechanism
 from friso.views.flexure.svg import Point
 
 WIDTH, ROOM = 210.0, 202.0
-"""Of the sheet (A4 upright), and the height that the two views may take together [mm]."""
+"""Width of the sheet (A4 upright), and the height that the two views may take together [mm]."""
 
 LEFT, RIGHT = 30.0, 50.0
 """Beside the views, for dimensions and notes [mm]."""
@@ -19,7 +19,7 @@ ABOVE, BELOW = 15.0, 15.0
 """A view's heading and note above it, and its dimensions beneath [mm]."""
 
 CLAMP, RIM, STOP = 6.0, 5.0, 4.0
-"""Of the clamps: their thickness and how far they reach beyond the leaves; height of a limiter stop [mm]."""
+"""Clamps: their thickness and how far they reach beyond the leaves; height of a limiter stop [mm]."""
 
 LEAST_LEAF, LEAST_STROKE = 0.5, 1.6
 """Thickness of a leaf and stroke as drawn [mm] where they would be less to scale."""
@@ -28,7 +28,7 @@ BEYOND = 10.0
 """How far the block of the stage may reach beyond all else upwards and downwards before it is cut off [mm]."""
 
 SCALES = tuple(factor * 10.0**power for power in range(3, -4, -1) for factor in (5, 2, 1))
-"""Of ISO 5455: 5:1, 2:1, 1:1, 1:2, 1:5 and so on."""
+"""Scales of ISO 5455: 5:1, 2:1, 1:1, 1:2, 1:5 and so on."""
 
 FOOT = 26.0
 """Height of the title block [mm]."""

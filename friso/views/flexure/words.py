@@ -107,9 +107,8 @@ def _borne(evaluation: Evaluation) -> list[str]:
     lines, mechanism = [], evaluation.mechanism
     if evaluation.yield_margin < 1:
         lines.append(
-            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, but but "
-            f"the material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or a smaller "
-            "stroke, "
+            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, but the "
+            f"material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or a smaller stroke, "
             "would remedy this."
         )
     elif evaluation.fatigue_margin < 1:

@@ -124,8 +124,8 @@ def _one_window(sweep: Sweep) -> np.ndarray:
 
 
 def _worst(guideline: Guideline) -> dict[str, Any] | None:
-    """Of the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the ends
-    of their gap and stribeck groups, and how many of which kind; None without any."""
+    """Among the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the
+    ends of their gap and stribeck groups, and how many of which kind; None without any."""
     used = guideline.locked.sweep.usable
     off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
     far = used.take(off > np.log(FAR))

@@ -108,7 +108,7 @@ def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
 
 
 def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str:
-    """Of one state of the joint and one damping ratio."""
+    """The edges of one state of the joint and one damping ratio."""
     ends = {mode.frequency: getattr(mode, state) for mode in modes if mode.damping_ratio == damping}
     usable = {frequency: end for frequency, end in ends.items() if end}
     without = [f"{frequency:g}" for frequency, end in ends.items() if not end]

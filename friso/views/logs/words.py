@@ -9,7 +9,7 @@ from friso.views.drawing.figure import GREEN, ORANGE
 from friso.views.drawing.prefixes import NOTHING, range_with_unit, with_unit
 
 COLUMNS = ("Unit", "Range", "Course", "Samples", "Role, and why")
-"""Of the table of channels."""
+"""Columns of the table of channels."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 

@@ -70,7 +70,7 @@ class Question:
 
 _HUNTS = Question("verdict", "The stage hunts", ("hunts",))
 _BISTABLE = Question("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
-_ATTRACTS = Question("attractor", "Something attracts the stage that swings", (CYCLE, SWING))
+_ATTRACTS = Question("attractor", "A lasting swing attracts the stage", (CYCLE, SWING))
 _SWINGS = Question("outcome", "The run swings at its end", (SWINGS,))
 
 
@@ -94,9 +94,9 @@ def _answer(runs: xr.Dataset, question: Question) -> str:
     """In what share of the map it holds, and where."""
     holds, completed = _flags(runs, question)
     if not completed.any():
-        return f"{question.clause} nowhere: no cell of the map has a result."
+        return "No cell of the map has a result."
     if not holds.any() or np.array_equal(holds, completed):
-        return f"{question.clause} {'everywhere' if holds.any() else 'nowhere'} in the map."
+        return f"{question.clause} in {'every' if holds.any() else 'no'} cell of the map."
     share = f"{question.clause} in {_percent(holds.sum(), completed.sum())} of the map"
     axes, inside = axes_of(runs), completed.copy()
     where = []
@@ -110,8 +110,8 @@ def _answer(runs: xr.Dataset, question: Question) -> str:
         inside &= along.reshape([-1 if other == dim else 1 for other in range(holds.ndim)])
     if not where:
         return f"{share}, over the whole range of {'the axis' if len(axes) == 1 else 'every axis'}."
-    part = f"in {_percent(holds.sum(), inside.sum())} of the cells there"
-    filled = "everywhere there" if np.array_equal(inside, holds) else part
+    part = f"{_percent(holds.sum(), inside.sum())} of the cells in that range"
+    filled = "all cells in that range" if np.array_equal(inside, holds) else part
     return f"{share}: at {listed(where, 'and')} ({filled})."
 
 

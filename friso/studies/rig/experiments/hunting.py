@@ -39,7 +39,8 @@ SHOWN = (2, 3, 6)
 """The thesis's among them."""
 
 DISPLACEMENTS = (-0.05, -0.005, 0.005, 0.05)
-"""Of the releases, over the distance of the move: 0.5 and 5 mm to either side for the thesis's rig, our choice."""
+"""Displacements of the releases, over the distance of the move: 0.5 and 5 mm to either side for the thesis's rig, our
+choice."""
 
 CASES = {"locked": True, "free": False}
 
@@ -151,8 +152,8 @@ def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarra
 def _startable(
     stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, moved: Hunted, started: Hunted
 ) -> Startable | None:
-    """Of the rails on which no peaks are counted after the move, and which swing at the end after a release, one at the
-    lowest crossover."""
+    """Among the rails on which no peaks are counted after the move, those which swing at the end after a release, one
+    at the lowest crossover."""
     lasts = started.counted & started.swings & ~moved.counted
     places = np.argwhere(lasts.swapaxes(0, 1))
     if not len(places):

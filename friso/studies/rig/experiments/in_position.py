@@ -31,17 +31,18 @@ INTERVAL = 5e-4
 """Between the samples, at most [s]."""
 
 BITS = 14
-"""Of the drive's force between its limits: our choice. The rounding of uniform steps is the noise of its amplifier."""
+"""Resolution of the drive's force between its limits: our choice. The rounding of uniform steps is the noise of its
+amplifier."""
 
 LIMIT_FACTOR = 60.0
 """Largest force over the static friction, for a drive that states none: that of the thesis's rig, rounded."""
 
 FLOOR = {"frequency": ["1 Hz", "10 Hz", "100 Hz"], "acceleration": [f"{a} m/s^2/Hz^0.5" for a in (1e-5, 1e-4, 1e-4)]}
-"""Of a quiet laboratory, where the stage states none: our choice. In thirds of an octave its velocity stays below
-2.4 um/s RMS, and so below VC-E (3.1 um/s) of the usual vibration criteria."""
+"""Acceleration of the floor of a quiet laboratory, where the stage states none: our choice. In thirds of an octave its
+velocity stays below 2.4 um/s RMS, and so below VC-E (3.1 um/s) of the usual vibration criteria."""
 
 DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
-"""Of the joint with the stage's mass, our choice."""
+"""Damping ratios of the joint with the stage's mass, our choice."""
 
 SEGMENTS = 6
 """Into which what is watched is cut for its spectrum."""

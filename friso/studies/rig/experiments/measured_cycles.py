@@ -38,16 +38,16 @@ from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.shares import Share, share
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
-"""Of static and of Coulomb friction, over their means: our choice."""
+"""Standard deviations of static and of Coulomb friction, over their means: our choice."""
 
 LENGTHS = (2.0, 5.0, 10.0, 20.0)
 """Correlation lengths over the swing of the cycle on an even rail: our choice."""
 
 HARMONICS = (0.01, 0.02, 0.05, 0.1)
-"""Of the rolling elements, over the mean: our choice."""
+"""Amplitudes of the harmonic of the rolling elements, over the mean: our choice."""
 
 PITCH = 4.0
-"""Of the rolling elements over that swing, for a stage that states none."""
+"""Pitch of the rolling elements over that swing, for a stage that states none."""
 
 STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 """Friction levels over those of the stage, on an even rail: our choice."""
@@ -59,7 +59,7 @@ LONGER = 1.5
 """Over the time of other runs: slow cycles shall come often enough."""
 
 MASS_FACTOR = 1.47
-"""Of the mass line over the weighed mass (Sec. 4.2.1)."""
+"""Mass of the mass line over the weighed mass (Sec. 4.2.1)."""
 
 MOTORS = (1.0, 1 / MASS_FACTOR)
 """Motor constants over the stage's: the weaker one would show the measured mass line for the weighed mass."""

@@ -26,7 +26,7 @@ _SPIKE = 0.1
 """Time [s] within which a spike of the velocity follows a peak of the deflection."""
 
 _UNIFORM = "uniform friction along the rail, no noise"
-"""Of the simulated rig."""
+"""Assumptions about the simulated rig."""
 
 
 @judges("F19", figure="19", needs=(STEPPED,))

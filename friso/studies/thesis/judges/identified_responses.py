@@ -89,7 +89,7 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
             Part(
                 f"the first mode is about {FIRST:g} Hz (within {CLOSE:.0%}) with the cart stuck",
                 bool(abs(stuck.first / FIRST - 1) <= CLOSE),
-                f"{stuck.first:.3g} Hz stuck, {sliding.first:.3g} Hz sliding: the force did not move the cart much",
+                f"{stuck.first:.3g} Hz stuck, {sliding.first:.3g} Hz sliding: the force hardly moved the cart",
             ),
             Part(
                 f"a parasitic mode is about {_PARASITIC:g} Hz (within {CLOSE:.0%})",

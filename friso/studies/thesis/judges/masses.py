@@ -18,14 +18,14 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
     column = int(np.argmin(np.abs(stage - marker["masses.stage"])))
     other = hunts != hunts[row, column]
     ratio = cart[:, None] / stage[None, :]
-    text = f"{share(other, valid):.1%} of {valid.sum()} cells are otherwise, "
-    text += f"cart to stage from {ratio.min():.2g} to {ratio.max():.2g}"
+    text = f"{share(other, valid):.1%} of {valid.sum()} cells differ from the marker's; "
+    text += f"cart-to-stage mass ratio {ratio.min():.2g} to {ratio.max():.2g}"
     if (other & valid).any():
         text += f"; the others at {ratio[other & valid].min():.2g} to {ratio[other & valid].max():.2g}"
     return Finding(
         (
             Part(
-                f"few cells (at most {FEW:.0%}) hunt, unlike the marker's masses, which do not",
+                f"no peaks are counted at the marker's masses, and in few cells (at most {FEW:.0%})",
                 bool(not hunts[row, column] and share(other, valid) <= FEW),
                 text,
             ),

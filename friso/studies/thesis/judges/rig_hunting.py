@@ -82,7 +82,8 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
             Part(
                 f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
                 started > 0,
-                f"{started} of {int(settle.sum())} do, released {max(DISPLACEMENTS):.0%} of the move to either side",
+                f"{started} of {int(settle.sum())} such rails, released {max(DISPLACEMENTS):.0%} of the move to either "
+                "side",
                 why="here the place on the rail decides, not the start; friso rig hunting finds such rails at other "
                 "crossovers",
             ),

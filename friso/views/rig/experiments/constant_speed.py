@@ -19,7 +19,7 @@ from friso.views.identify.numbers import with_interval
 from friso.views.rig.outcome_view import OutcomeView
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
-"""Of the places."""
+"""Colours of the places."""
 
 
 def sentences(outcome: Outcome) -> list[str]:

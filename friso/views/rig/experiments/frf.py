@@ -48,10 +48,10 @@ def sentences(outcome: Outcome) -> list[str]:
         f"{with_unit(result.locked.band[0], 'Hz')} to {with_unit(result.locked.band[1], 'Hz')}.",
         f"Joint free: first mode near {with_unit(result.free.first_mode, 'Hz')}, above it a mass of "
         f"{_mass(result.free.mass)}.",
-        f"A motor that gives {RATIOS[1]:g} of the assumed force makes these masses {result.apparent[0, 1]:.3g} and "
-        f"{result.apparent[1, 1]:.3g} {pretty('kg')}; one that gives {RATIOS[2]:g} times the force makes them "
-        f"{result.apparent[0, 2]:.3g} and {result.apparent[1, 2]:.3g} {pretty('kg')}: a machine that appears "
-        "heavier has a motor weaker than assumed.",
+        f"With a motor that gives {RATIOS[1]:g} times the assumed force these masses read {result.apparent[0, 1]:.3g} "
+        f"and {result.apparent[1, 1]:.3g} {pretty('kg')}; with {RATIOS[2]:g} times the force, "
+        f"{result.apparent[0, 2]:.3g} and {result.apparent[1, 2]:.3g} {pretty('kg')}: a machine that reads heavy has a "
+        "motor weaker than assumed.",
         f"Joint locked, open loops cross 0 dB as follows: tuned to {tuned}; at the highest setting {above}.{unstable}",
         f"Joint free, the loop tuned to {with_unit(result.free_loop.tuned, 'Hz')} crosses at "
         f"{with_unit(result.free_loop.crossings[-1].value if result.free_loop.crossings else None, 'Hz')}; the highest "

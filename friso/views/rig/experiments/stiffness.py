@@ -18,13 +18,13 @@ def sentences(outcome: Outcome) -> list[str]:
     if not read.determined:
         return [f"The steps do not show the joint's stiffness: {read.reason}."]
     lines = [
-        f"The steps show {with_unit(read.value, 'N/m', 4)} ({range_with_unit(read.low, read.high, 'N/m', 4)}) of the "
-        f"joint's {with_unit(result.true, 'N/m', 4)}."
+        f"The steps give a joint stiffness of {with_unit(read.value, 'N/m', 4)} (95 %: "
+        f"{range_with_unit(read.low, read.high, 'N/m', 4)}); the true value is {with_unit(result.true, 'N/m', 4)}."
     ]
     if result.motor_constant_ratio != 1:
         lines.append(
-            f"The motor gives {result.motor_constant_ratio:g} of the assumed force, which alone would make it appear "
-            f"as {with_unit(result.apparent, 'N/m', 4)}."
+            f"The motor gives {result.motor_constant_ratio:g} times the assumed force; that alone would make the "
+            f"stiffness read {with_unit(result.apparent, 'N/m', 4)}."
         )
     return lines
 
