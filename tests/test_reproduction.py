@@ -563,7 +563,7 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
         found = cycles(study, small.maps["system"])
     counted = found.comparison
     assert counted.cells == 9
-    assert counted.agreed + counted.quiet + counted.transient + counted.dormant + counted.unknown == 9
+    assert counted.both + counted.neither + counted.counted_only + counted.attracted_only + counted.unknown == 9
     near = [
         (x, y)
         for edge in found.edges

@@ -47,8 +47,8 @@ def reproduce(
             print(f"{claim['id']:5} {claim['judgement']:14} {claim['number']}")
     for name, cells in document["cycles"].items():
         print_wrapped(
-            f"{name}: in {cells['transient']} of {cells['cells']} cells peaks are counted although no cycle attracts; "
-            f"in {cells['dormant']} none are counted although one does"
+            f"{name}: in {cells['counted_only']} of {cells['cells']} cells peaks are counted although no cycle "
+            f"attracts; in {cells['attracted_only']} none are counted although one does"
         )
     print_written(path for path in files if path.suffix in (".html", ".json"))
 

@@ -39,15 +39,15 @@ class Edge:
 
 @dataclass(frozen=True)
 class PeaksAgainstCycles:
-    """What the peak count and the survey say of the cells compared: peaks counted where something attracts (`agreed`)
-    or neither (`quiet`), peaks counted although nothing attracts (`transient`), something that attracts although no
-    peaks are counted (`dormant`: another move would start it), and cells of which it is not certain."""
+    """What the peak count and the survey say of the cells compared: peaks counted where something attracts (`both`)
+    or `neither`, peaks counted although nothing attracts (`counted_only`), something that attracts although no peaks
+    are counted (`attracted_only`: another move would start it), and cells of which it is not certain."""
 
     cells: int
-    agreed: int
-    quiet: int
-    transient: int
-    dormant: int
+    both: int
+    neither: int
+    counted_only: int
+    attracted_only: int
     unknown: int
 
 
@@ -76,10 +76,10 @@ def _comparison(runs: xr.Dataset) -> PeaksAgainstCycles:
     decided &= valid
     return PeaksAgainstCycles(
         cells=int(valid.sum()),
-        agreed=int((decided & attracts & peaks).sum()),
-        quiet=int((decided & ~attracts & ~peaks).sum()),
-        transient=int((decided & ~attracts & peaks).sum()),
-        dormant=int((decided & attracts & ~peaks).sum()),
+        both=int((decided & attracts & peaks).sum()),
+        neither=int((decided & ~attracts & ~peaks).sum()),
+        counted_only=int((decided & ~attracts & peaks).sum()),
+        attracted_only=int((decided & attracts & ~peaks).sum()),
         unknown=int((valid & ~decided).sum()),
     )
 

@@ -1,4 +1,4 @@
-"""What judges read off a map: where it hunts, limits, trends, blocks without hunting."""
+"""What judges read off a map: where runs keep moving, limits, trends, blocks where they come to rest."""
 
 from __future__ import annotations
 
@@ -26,19 +26,18 @@ def counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
     return runs["distinct_peaks"].transpose(rows, columns).values
 
 
-def ends(values: np.ndarray, hunts: np.ndarray) -> np.ndarray:
-    """For each column of `hunts`, shape (n, columns), the value beyond which it hunts no more.
+def ends(values: np.ndarray, moving: np.ndarray) -> np.ndarray:
+    """For each column of `moving`, shape (n, columns), the value beyond which no run keeps moving.
 
-    `values` ascend, shape (n,). The limit lies halfway from the last that hunts to the next. Where it is outside the
-    range, the end of the range stands for it.
-    """
+    `values` ascend, shape (n,). The limit lies halfway from the last that keeps moving to the next. Where it is outside
+    the range, the end of the range stands for it. """
     steps = np.concatenate((values[:1], (values[:-1] + values[1:]) / 2, values[-1:]))
-    return np.array([steps[np.flatnonzero(column)[-1] + 1] if column.any() else steps[0] for column in hunts.T])
+    return np.array([steps[np.flatnonzero(column)[-1] + 1] if column.any() else steps[0] for column in moving.T])
 
 
-def begins(values: np.ndarray, hunts: np.ndarray) -> np.ndarray:
-    """As `ends`, but the value below which it does not hunt yet."""
-    return -ends(-values[::-1], hunts[::-1])
+def begins(values: np.ndarray, moving: np.ndarray) -> np.ndarray:
+    """As `ends`, but the value below which no run keeps moving yet."""
+    return -ends(-values[::-1], moving[::-1])
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:
@@ -55,9 +54,9 @@ def trend_text(correlation: float) -> str:
     return f"{correlation:.2f}" if np.isfinite(correlation) else "undefined (too few cells, or all equal)"
 
 
-def free_square(hunts: np.ndarray, valid: np.ndarray) -> float:
-    """Share of the valid cells that the largest square of valid cells without hunting covers."""
-    free = valid & ~hunts
+def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
+    """Share of the valid cells that the largest square of valid cells that come to rest covers."""
+    free = valid & ~moving
     side = free.astype(int)  # of the largest free square whose last corner is the cell
     for i in range(1, side.shape[0]):
         for j in range(1, side.shape[1]):
@@ -71,6 +70,6 @@ def share(part: np.ndarray, total: np.ndarray) -> float:
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 
-def share_text(hunts: np.ndarray, cells: np.ndarray) -> str:
+def share_text(moving: np.ndarray, cells: np.ndarray) -> str:
     """The same share in words."""
-    return f"{share(hunts, cells):.0%}" if cells.any() else "none"
+    return f"{share(moving, cells):.0%}" if cells.any() else "none"

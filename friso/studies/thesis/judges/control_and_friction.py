@@ -14,15 +14,15 @@ _GAP = 1.0
 
 @judges("F12A", figure="12A", needs=("friction",))
 def gap_makes_hunting(evidence: Evidence) -> Finding:
-    """The smallest gap that hunts, and how the count goes with the gap."""
+    """The smallest gap at which runs keep moving, and how the count goes with the gap."""
     axes = ("friction.static", "friction.coulomb")
-    static, coulomb, hunts, _ = table(evidence.maps["friction"], *axes)
+    static, coulomb, moving, _ = table(evidence.maps["friction"], *axes)
     peaks = counts(evidence.maps["friction"], *axes)
     gap = static[:, None] - coulomb[None, :]
-    smallest = float(gap[hunts].min()) if hunts.any() else np.nan
-    rises = trend(gap[hunts], peaks[hunts])
-    at_static = _along(gap, peaks, hunts)
-    at_coulomb = _along(gap.T, peaks.T, hunts.T)
+    smallest = float(gap[moving].min()) if moving.any() else np.nan
+    rises = trend(gap[moving], peaks[moving])
+    at_static = _along(gap, peaks, moving)
+    at_coulomb = _along(gap.T, peaks.T, moving.T)
     at_fixed = {"F_s": at_static, "F_c": at_coulomb}
     flat = ", ".join(
         f"{name} (mean rank correlation {correlation:.2f})"
@@ -32,13 +32,14 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"the smallest gap F_s - F_c that hunts is about {_GAP:g} N (from {_GAP / ABOUT:.2g} to "
+                f"the smallest gap F_s - F_c at which the stage keeps moving is about {_GAP:g} N (from "
+                f"{_GAP / ABOUT:.2g} to "
                 f"{_GAP * ABOUT:.2g} N)",
                 bool(_GAP / ABOUT <= smallest <= _GAP * ABOUT),
-                f"smallest gap {smallest:.2g} N" if hunts.any() else "nothing hunts",
+                f"smallest gap {smallest:.2g} N" if moving.any() else "no cell keeps moving",
             ),
             Part(
-                f"over the cells that hunt, the count rises with the gap (rank correlation at least {TREND:g})",
+                f"over the cells that keep moving, the count rises with the gap (rank correlation at least {TREND:g})",
                 rises >= TREND,
                 f"rank correlation {trend_text(rises)}; at fixed F_s {trend_text(at_static)}, at fixed F_c "
                 f"{trend_text(at_coulomb)}",
@@ -50,41 +51,41 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
 
 @judges("F12B", figure="12B", needs=("control",))
 def control_is_no_cure(evidence: Evidence) -> Finding:
-    """How the count goes with alpha and beta, and whether either ends hunting."""
+    """How the count goes with alpha and beta, and whether either brings all runs to rest."""
     axes = (ALPHA, BETA)
-    alpha, beta, hunts, valid = table(evidence.maps["control"], *axes)
+    alpha, beta, moving, valid = table(evidence.maps["control"], *axes)
     peaks = counts(evidence.maps["control"], *axes)
-    ones = np.ones(hunts.shape)
-    with_beta = _along(beta[None, :] * ones, peaks, hunts)
-    with_alpha = _along((alpha[:, None] * ones).T, peaks.T, hunts.T)
-    free_lines = int((~hunts.any(axis=0)).sum() + (~hunts.any(axis=1)).sum())
-    square = free_square(hunts, valid)
+    ones = np.ones(moving.shape)
+    with_beta = _along(beta[None, :] * ones, peaks, moving)
+    with_alpha = _along((alpha[:, None] * ones).T, peaks.T, moving.T)
+    free_lines = int((~moving.any(axis=0)).sum() + (~moving.any(axis=1)).sum())
+    square = free_square(moving, valid)
     return Finding(
         (
             Part(
-                "at fixed alpha the count of the cells that hunt falls with beta (mean rank correlation at most "
+                "at fixed alpha the count of the cells that keep moving falls with beta (mean rank correlation at most "
                 f"{-TREND:g})",
                 with_beta <= -TREND,
                 f"mean rank correlation with beta {trend_text(with_beta)}",
             ),
             Part(
-                "at fixed beta the count of the cells that hunt rises with alpha (mean rank correlation at least "
-                f"{TREND:g})",
+                "at fixed beta the count of the cells that keep moving rises with alpha (mean rank correlation at "
+                f"least {TREND:g})",
                 with_alpha >= TREND,
                 f"with alpha {trend_text(with_alpha)}",
             ),
             Part(
-                "every alpha and every beta hunts somewhere, and the largest square without hunting covers few cells "
-                f"(at most {FEW:.0%})",
+                "every alpha and every beta has cells that keep moving, and the largest square at rest covers few "
+                f"cells (at most {FEW:.0%})",
                 free_lines == 0 and square <= FEW,
-                f"{share(hunts, valid):.0%} of the cells hunt; {free_lines} lines and a square of {square:.1%} are "
-                "free of hunting",
+                f"{share(moving, valid):.0%} of the cells keep moving; {free_lines} lines and a square of {square:.1%} "
+                "come to rest",
             ),
         )
     )
 
 
-def _along(x: np.ndarray, y: np.ndarray, hunts: np.ndarray) -> float:
-    """Mean over the rows of the rank correlation of x and y, all of one shape, over the cells that hunt."""
-    trends = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, hunts, strict=True))])
+def _along(x: np.ndarray, y: np.ndarray, moving: np.ndarray) -> float:
+    """Mean over the rows of the rank correlation of x and y, all of one shape, over the cells that keep moving."""
+    trends = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, moving, strict=True))])
     return float(trends[np.isfinite(trends)].mean()) if np.isfinite(trends).any() else np.nan

@@ -14,20 +14,21 @@ _SAME = 0.15
 
 @judges("F16A", figure="16A", needs=("isolator-crossover",))
 def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
-    """The crossover below which the isolated rig hunts, at each stroke."""
-    crossover, stroke, hunts, valid = table(evidence.maps["isolator-crossover"], *_AXES)
-    limits = ends(crossover, hunts)
+    """The crossover below which the isolated rig keeps moving, at each stroke."""
+    crossover, stroke, moving, valid = table(evidence.maps["isolator-crossover"], *_AXES)
+    limits = ends(crossover, moving)
     long, longest = stroke >= stroke[-1] / 2, stroke >= 0.75 * stroke[-1]
     third, fourth = limits[long & ~longest].mean(), limits[longest].mean()
     below = (crossover[:, None] < limits[None, :]) & long[None, :] & valid
     return Finding(
         (
             Part(
-                "at every stroke of the upper half of the range it hunts at some crossover, and at none from a higher "
+                "at every stroke of the upper half of the range it keeps moving at some crossover, and at none from a "
+                "higher "
                 "one on",
-                bool(hunts[:, long].any(axis=0).all() and not hunts[-1, long].any()),
+                bool(moving[:, long].any(axis=0).all() and not moving[-1, long].any()),
                 f"mean limit {limits[long].mean():.3g} Hz ({limits[long].min():.3g} to {limits[long].max():.3g} Hz); "
-                f"{share_text(hunts, below)} of the cells below it hunt",
+                f"{share_text(moving, below)} of the cells below it keep moving",
             ),
             Part(
                 "the mean limits over the third and over the fourth quarter of the strokes differ by at most "
@@ -45,7 +46,7 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     """The limits of both stiffnesses, stroke by stroke."""
     names = ("isolator-crossover", "isolator-crossover-soft")
     maps = [table(evidence.maps[name], *_AXES) for name in names]
-    stiff, soft = (ends(crossover, hunts) for crossover, _, hunts, _ in maps)
+    stiff, soft = (ends(crossover, moving) for crossover, _, moving, _ in maps)
     stroke = maps[0][1]
     long = stroke >= stroke[-1] / 2
     drop = (stiff - soft)[long]

@@ -34,15 +34,16 @@ def rules_of_design(evidence: Evidence) -> Finding:
 
 def _soft(evidence: Evidence) -> Part:
     """Whether a joint that is softer than one that does, does too."""
-    stiffness, stroke, hunts, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    stiffness, stroke, moving, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
     enough = stroke >= _STROKE
-    softest = ~hunts[0, enough]
-    limit = begins(stiffness, hunts)[enough]
+    softest = ~moving[0, enough]
+    limit = begins(stiffness, moving)[enough]
     return Part(
-        f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range settles, and at "
-        "most of these strokes a stiffer one hunts",
+        f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range comes to rest, "
+        "and at most of these strokes the stage keeps moving with a stiffer one",
         bool(softest.all() and np.mean(limit < stiffness[-1]) > 0.5),
-        f"softest settles at {softest.sum()} of {softest.size} strokes; a stiffer one hunts from {limit.min():.3g} to "
+        f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
+        f"{limit.min():.3g} to "
         f"{limit.max():.3g} N/m on",
     )
 
@@ -90,12 +91,13 @@ def _far() -> Part:
 
 
 def _stroke(evidence: Evidence) -> Part:
-    """The stroke beyond which nothing hunts at 8 Hz."""
-    stiffness, stroke, hunts, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    """The stroke beyond which nothing keeps moving at 8 Hz."""
+    stiffness, stroke, moving, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
-    needed = float(ends(stroke, hunts[nearest][:, None])[0])
+    needed = float(ends(stroke, moving[nearest][:, None])[0])
     return Part(
-        f"with {stiffness[nearest]:.3g} N/m at 8 Hz, nothing hunts from a stroke of about {_STROKE * 1e3:g} mm on "
+        f"with {stiffness[nearest]:.3g} N/m at 8 Hz, nothing keeps moving from a stroke of about "
+        f"{_STROKE * 1e3:g} mm on "
         f"(within a factor of {ABOUT:g})",
         about(needed, _STROKE),
         f"{needed * 1e3:.3g} mm",
@@ -104,13 +106,14 @@ def _stroke(evidence: Evidence) -> Part:
 
 
 def _gap(evidence: Evidence) -> Part:
-    static, coulomb, hunts, _ = table(evidence.maps["friction"], "friction.static", "friction.coulomb")
+    static, coulomb, moving, _ = table(evidence.maps["friction"], "friction.static", "friction.coulomb")
     gap = static[:, None] - coulomb[None, :]
-    smallest = float(gap[hunts].min()) if hunts.any() else np.nan
+    smallest = float(gap[moving].min()) if moving.any() else np.nan
     return Part(
-        f"the smallest gap F_s - F_c that hunts at 8 Hz is about {_GAP:g} N (within a factor of {ABOUT:g})",
+        f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
+        f"{ABOUT:g})",
         about(smallest, _GAP),
-        number_text(smallest, ".2g", "N") if hunts.any() else "nothing hunts",
+        number_text(smallest, ".2g", "N") if moving.any() else "no cell keeps moving",
     )
 
 
@@ -127,22 +130,23 @@ def _locked_edge() -> str:
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
-    """From where on the isolated and the locked rig do not hunt."""
-    crossover, stroke, hunts, _ = table(evidence.maps["isolator-crossover"], CROSSOVER, "joint.stroke")
-    free = float(np.mean(ends(crossover, hunts)[stroke >= _STROKE]))
-    crossover, mass, hunts, _ = table(evidence.maps["system"], CROSSOVER, "mass")
+    """From where on the isolated and the locked rig come to rest."""
+    crossover, stroke, moving, _ = table(evidence.maps["isolator-crossover"], CROSSOVER, "joint.stroke")
+    free = float(np.mean(ends(crossover, moving)[stroke >= _STROKE]))
+    crossover, mass, moving, _ = table(evidence.maps["system"], CROSSOVER, "mass")
     nearest = int(np.abs(mass - 1.7).argmin())
-    locked = float(ends(crossover, hunts)[nearest])
+    locked = float(ends(crossover, moving)[nearest])
     return (
         Part(
-            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing hunts from about 5 to 5.5 Hz on "
+            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to "
+            "5.5 Hz on "
             f"(within a factor of {ABOUT:g})",
             about(free, _WORKS),
             f"{free:.3g} Hz on average",
         ),
         Part(
-            f"locked, with {mass[nearest]:.2g} kg, nothing hunts from about {_LOCKED:g} Hz on (within a factor of "
-            f"{ABOUT:g})",
+            f"locked, with {mass[nearest]:.2g} kg, nothing keeps moving from about {_LOCKED:g} Hz on (within a factor "
+            f"of {ABOUT:g})",
             about(locked, _LOCKED),
             f"{locked:.3g} Hz",
             why=_locked_edge(),

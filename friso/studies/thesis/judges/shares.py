@@ -62,7 +62,11 @@ class Sticking:
 def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
     """Sticking time and integral share at break-away, at both gaps."""
     wide, narrow = (sticking(evidence.responses[name]) for name in (WIDE, NARROW))
-    why = "" if wide.both and narrow.both else "one of the two does not hunt: there is nothing to compare"
+    why = (
+        ""
+        if wide.both and narrow.both
+        else "one of the two does not stick in both directions: there is nothing to compare"
+    )
     return Finding(
         (
             Part(

@@ -22,36 +22,41 @@ _LARGE_DAMPING = 1e2
 
 @judges("F14A", figure="14A", needs=("isolator-stiffness", "locked"))
 def stiffness_has_a_limit(evidence: Evidence) -> Finding:
-    """The stiffness above which the isolated rig hunts, at each stroke."""
+    """The stiffness above which the isolated rig keeps moving, at each stroke."""
     runs = evidence.maps["isolator-stiffness"]
-    stiffness, stroke, hunts, _ = table(runs, "joint.stiffness", "joint.stroke")
-    limits = begins(stiffness, hunts)
-    works = ~hunts[0]  # strokes at which the softest joint of the range settles
+    stiffness, stroke, moving, _ = table(runs, "joint.stiffness", "joint.stroke")
+    limits = begins(stiffness, moving)
+    works = ~moving[0]  # strokes at which the softest joint of the range comes to rest
     rises = trend(stroke[works], limits[works])
     shortest = stroke[works][0] * 1e3 if works.any() else np.nan
     span = f"{limits[works][0]:.3g} N/m at {shortest:.2g} mm, {limits[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
     force = limits[works] * stroke[works]
     static = thesis_rig().flat()["friction.static"]
     why = (
-        f"idealisation: below {shortest:.2g} mm even the softest joint of the range hunts, and at the limit the joint "
-        f"carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static friction of "
-        f"{static:g} N: the force at "
-        "full stroke, on which the thesis bases its argument, does not set the limit"
+        f"idealisation: below {shortest:.2g} mm the stage keeps moving even with the softest joint of the range, and "
+        f"at the limit the joint carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static "
+        f"friction of {static:g} N: the force at full stroke, on which the thesis bases its argument, does not set "
+        "the limit"
         if works.any()
         else ""
     )
     return Finding(
         (
             Part(
-                "at the largest stroke the softest joint settles and the stiffest hunts",
-                bool(not hunts[0, -1] and hunts[-1, -1]),
-                f"limit {limits[-1]:.3g} N/m" if hunts[:, -1].any() else "no stiffness of the range hunts",
+                "at the largest stroke the stage comes to rest with the softest joint and keeps moving with the "
+                "stiffest",
+                bool(not moving[0, -1] and moving[-1, -1]),
+                f"limit {limits[-1]:.3g} N/m"
+                if moving[:, -1].any()
+                else "comes to rest at every stiffness of the range",
             ),
             Part(
-                "the limit rises as the stroke gets smaller, over the strokes at which the softest joint settles "
-                f"(rank correlation with the stroke at most {-TREND:g})",
+                "the limit rises as the stroke gets smaller, over the strokes at which the stage comes to rest with "
+                f"the softest joint (rank correlation with the stroke at most {-TREND:g})",
                 rises <= -TREND,
-                f"rank correlation {trend_text(rises)}: {span}" if works.any() else "the softest joint settles nowhere",
+                f"rank correlation {trend_text(rises)}: {span}"
+                if works.any()
+                else "comes to rest with the softest joint at no stroke",
                 why if rises >= TREND else "",
             ),
             _locked_at_no_stroke(runs, evidence.responses["locked"]),
@@ -73,9 +78,9 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
-    """The stroke that ends hunting where the limiter is damped much, and the hunting amplitude."""
-    damping, stroke, hunts, _ = table(evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke")
-    needed = np.exp(ends(np.log(stroke), hunts.T))
+    """The stroke from which runs come to rest where the limiter is damped much, and the amplitude."""
+    damping, stroke, moving, _ = table(evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke")
+    needed = np.exp(ends(np.log(stroke), moving.T))
     large, small = needed[damping >= _LARGE_DAMPING], needed[damping < 1]
     at_large = float(np.median(large))
     locked = evidence.responses["locked"].cell
@@ -84,7 +89,8 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"with limiter damping of {_LARGE_DAMPING:g} N s/m and more, the median stroke that ends hunting is "
+                f"with limiter damping of {_LARGE_DAMPING:g} N s/m and more, the median stroke from which the stage "
+                f"comes to rest is "
                 f"about {_NEEDED * 1e3:g} mm (from {_NEEDED / ABOUT * 1e3:.2g} to {_NEEDED * ABOUT * 1e3:.2g} mm)",
                 bool(_NEEDED / ABOUT <= at_large <= _NEEDED * ABOUT),
                 f"stroke needed {at_large * 1e3:.2g} mm; with damping below 1 N s/m {np.median(small) * 1e3:.2g} mm",
