@@ -63,7 +63,7 @@ def rig_in_position() -> Values:
 
 def rig_hunting() -> Values:
     found = rig("hunting")
-    rows, locked, free = found["crossovers_hz"], *(found["cases"][case]["hunts"] for case in ("locked", "free"))
+    rows, locked, free = found["crossovers_hz"], *(found["cases"][case]["counted"] for case in ("locked", "free"))
     rails = len(found["rail_seeds"])
     last = max(row for row, each in enumerate(locked) if each["share"] > 0)
     return {
@@ -138,7 +138,7 @@ def compare_thesis_rig() -> Values:
     values = {"machines": 2000.0}
     for letter, each in options.items():
         values |= {
-            f"{letter}_hunts": each["hunts"]["probability"],
+            f"{letter}_swings": each["swings"]["probability"],
             f"{letter}_in_position": each["in_position"]["probability"],
             f"{letter}_force_rms_n": each["force_rms_n"]["value"],
             f"{letter}_unstable": each["unstable"],

@@ -25,7 +25,7 @@ from friso.hunting import persistence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
-from friso.hunting.persistence import hunts_somehow
+from friso.hunting.persistence import swings_from_any_distance
 from friso.progress import Tally, silent
 from friso.stage import Stage
 from friso.studies.guideline import checks, compute, parasitic, sweeps, worked
@@ -169,7 +169,7 @@ def test_edge_of_the_free_rig() -> None:
 def test_simulation_agrees_where_hunting_ends() -> None:
     """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz."""
     flat = rigid().flat()
-    found, known = hunts_somehow(Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2))
+    found, known = swings_from_any_distance(Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2))
     assert found.tolist() == [True, False]
     assert known.all()
 
@@ -207,7 +207,7 @@ def test_simulation_sees_small_cycles() -> None:
     cycles = hunting_cycles(stages)
     assert cycles.attracting[0]
     assert 0.005 < cycles.amplitude[0] / stages.length[0] < 0.05
-    assert [each[0] for each in hunts_somehow(stages)] == [True, True]
+    assert [each[0] for each in swings_from_any_distance(stages)] == [True, True]
 
 
 @RIGID
@@ -216,7 +216,7 @@ def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPat
         return np.zeros(stages.count, bool), np.arange(stages.count) > 0
 
     monkeypatch.setattr(persistence, "still_swings", failing)
-    assert [each.tolist() for each in hunts_somehow(at(JUMPS, 0.1))] == [[False], [False]]
+    assert [each.tolist() for each in swings_from_any_distance(at(JUMPS, 0.1))] == [[False], [False]]
     found = swept(FAR_FLIP)
     assert found.kind[0] == UNKNOWN
     assert not found.located[0]

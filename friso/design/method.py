@@ -92,8 +92,8 @@ class Design:
 
     @property
     def unmet(self) -> tuple[Relaxation, ...]:
-        """What the verification found not to be met: the settling time, with that which would be; hunting is told by
-        the verification itself."""
+        """What the verification found not to be met: the settling time, with that which would be; moves that do not
+        come to rest are reported by the verification itself."""
         limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(SLOW)
         if limit is None or settling <= limit or not np.isfinite(settling):
             return ()
@@ -103,7 +103,7 @@ class Design:
 
     @property
     def meets(self) -> bool:
-        """Whether no move hunts, and moves settle in the time specified."""
+        """Whether all moves come to rest, and settle in the time specified."""
         limit, free = self.spec.position.settling_time, self.verification.free
         return not free.missed and (limit is None or free.slower_than(SLOW) <= limit)
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
-from friso.hunting.persistence import hunts_somehow
+from friso.hunting.persistence import swings_from_any_distance
 
 OF = (
     "the symmetric cycle (of stages that are not symmetric, that over a whole period); others may attract beyond, and "
@@ -100,7 +100,7 @@ def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> 
     cycles = hunting_cycles(some)
     attracts, failed, unsure = cycles.attracting, np.zeros(some.count, bool), np.flatnonzero(cycles.uncertain)
     if unsure.size:
-        attracts[unsure], decided = hunts_somehow(some.take(unsure))
+        attracts[unsure], decided = swings_from_any_distance(some.take(unsure))
         failed[unsure] = ~decided
     return _AtCrossovers(attracts, cycles.multiplier, cycles.uncertain, failed)
 
@@ -191,7 +191,7 @@ class _Search:
         for _ in range(STEPS):
             if not on.size:
                 return
-            hunts, decided = hunts_somehow(self.stages(self.which[on], np.exp(self.high[on])), LONG)
+            hunts, decided = swings_from_any_distance(self.stages(self.which[on], np.exp(self.high[on])), LONG)
             self.failed[on] |= ~decided
             on = on[hunts]
             self.low[on] = self.high[on]

@@ -73,11 +73,11 @@ def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tu
     return swings, completed
 
 
-def hunts_somehow(
+def swings_from_any_distance(
     stages: Ensemble, periods: float = PERIODS, distances: np.ndarray = DISTANCES
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages hunt for ever from some of the distances, and of which that is known, both of shape (count,): a
-    stage of which a run failed, while no other swings on, may hunt or not."""
+    """Which stages swing for ever from any of the distances, and of which that is known, both of shape (count,): a
+    stage of which a run failed, while no other swings on, may swing or not."""
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)
     swings, completed = (runs_of_stages.reshape(stages.count, -1) for runs_of_stages in runs)

@@ -223,7 +223,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     rough = [m for m in maps if not m.steady]
     if rough:
         speeds = ", ".join(sorted({f"{abs(m.velocity) * 1e3:.3g}" for m in rough}))
-        reasons.append(f"the motion at {speeds} mm/s is not steady (it hunts, sticks or swings)")
+        reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
     elif repeatability.value < REPEATS:

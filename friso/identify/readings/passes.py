@@ -18,9 +18,10 @@ LEAST, LEAST_SAMPLES = 0.1, 40
 """Shortest stretch, in seconds and in samples."""
 
 STEADY, QUICK = 0.3, 0.02
-"""Standard deviation of the velocity over its mean from which a motion is not steady: it hunts, sticks or swings; the
-second holds for swings quicker than the cutoff that stand clear of noise, and is so small since a swing above half the
-sampling rate looks slower than it is: one of 940 Hz, sampled at 1 kHz, like one of a seventeenth of its velocity."""
+"""Standard deviation of the velocity over its mean from which a motion is not steady: it sticks and slips, or
+oscillates; the second holds for swings quicker than the cutoff that stand clear of noise, and is so small since a swing
+above half the sampling rate looks slower than it is: one of 940 Hz, sampled at 1 kHz, like one of a seventeenth of its
+velocity."""
 
 ROUNDING, NEAR_INTEGER = 1e-6, 0.1
 """Share of the largest step of a position up to which steps are rounding of numbers, and how far those in digits may
@@ -160,7 +161,7 @@ def _digit(position: np.ndarray) -> float:
 
 def _quick_swing(position: np.ndarray, sample_time: float, cutoff: float, digit: float) -> float:
     """Standard deviation of the velocity [m/s] in the lines of its spectrum above the cutoff [Hz] that stand clear of
-    noise: a stage that hunts quickly goes smoothly for the filter. What is less than a digit [m] is no motion."""
+    noise: a stage that swings quickly goes smoothly for the filter. What is less than a digit [m] is no motion."""
     window = np.hanning(len(position))
     lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))
     frequency = np.fft.rfftfreq(len(position), sample_time)

@@ -1,4 +1,4 @@
-"""What becomes of a machine: hunting, settling, standstill, force; and the margin of its linear loop."""
+"""What becomes of a machine: swinging, settling, standstill, force; and the margin of its linear loop."""
 
 from __future__ import annotations
 

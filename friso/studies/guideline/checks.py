@@ -1,4 +1,4 @@
-"""Long simulations of samples below and above their edge: does hunting end there, however it is started?"""
+"""Long simulations of samples below and above their edge: do all runs come to rest there, however they begin?"""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ APART = 20.0
 
 @dataclass(frozen=True)
 class Checked:
-    """How many of the `samples` still hunt at the end, from some of the distances and after some of the moves, at
+    """How many of the `samples` still swing at the end, from some of the distances and after some of the moves, at
     0.9 and at 1.15 times their edge; `runs` in all, and how many of them `failed`."""
 
     samples: int
@@ -48,8 +48,8 @@ def checked(sweep: Sweep, most: int) -> Checked:
     """The first `most` samples that have an edge, which are random ones, simulated."""
     usable = sweep.usable
     some = usable.take(np.arange(min(most, len(usable.edge))))
-    runs = [_hunts(some, share, *how) for how in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
-    numbers = [int(hunts.any(axis=1).sum()) for hunts, _ in runs]
+    runs = [_still_swing(some, share, *how) for how in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
+    numbers = [int(swinging.any(axis=1).sum()) for swinging, _ in runs]
     completed = np.concatenate([done.ravel() for _, done in runs])
     return Checked(len(some.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
 
@@ -57,7 +57,7 @@ def checked(sweep: Sweep, most: int) -> Checked:
 _How = Callable[[Ensemble, np.ndarray, int], Begin]
 
 
-def _hunts(sweep: Sweep, share: float, how: _How, tried: int) -> tuple[np.ndarray, np.ndarray]:
+def _still_swing(sweep: Sweep, share: float, how: _How, tried: int) -> tuple[np.ndarray, np.ndarray]:
     """Which runs of each sample still swing at the end, and which were completed, shape (samples, tried)."""
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)

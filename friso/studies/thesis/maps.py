@@ -30,7 +30,7 @@ def ends(values: np.ndarray, moving: np.ndarray) -> np.ndarray:
     """For each column of `moving`, shape (n, columns), the value beyond which no run keeps moving.
 
     `values` ascend, shape (n,). The limit lies halfway from the last that keeps moving to the next. Where it is outside
-    the range, the end of the range stands for it. """
+    the range, the end of the range stands for it."""
     steps = np.concatenate((values[:1], (values[:-1] + values[1:]) / 2, values[-1:]))
     return np.array([steps[np.flatnonzero(column)[-1] + 1] if column.any() else steps[0] for column in moving.T])
 

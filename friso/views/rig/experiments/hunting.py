@@ -151,7 +151,8 @@ def _reach(traces: list[Trace]) -> float:
 
 
 def _crossovers(moves: HuntingResult) -> Figure:
-    """One panel for each case, a line for each crossover of the thesis and the one beyond which none hunts."""
+    """One panel for each case, a line for each crossover of the thesis and the one beyond which no peaks are
+    counted."""
     panels = []
     reach = _reach([moves.traces["locked", row] for row in moves.plotted])
     for case in COLOURS:
