@@ -27,6 +27,12 @@ PHYSICAL = re.compile(
 )
 """Names of arguments that have a unit."""
 
+_ATOM = r"(?:1|[kmunGM]?(?:m|s|N|g|Hz|Pa|V|A|W|J|rad)|deg|min|h|dB|K|%)(?:\^-?\d(?:\.\d)?)?"
+_GROUP = rf"(?:{_ATOM}|(?:sqrt)?\({_ATOM}(?: {_ATOM})*\))"
+_UNIT = rf"{_GROUP}(?:[*/ ]{_GROUP})*"
+UNITS = re.compile(rf"\[(?:SI(?:, [a-z ]+)?|-|log|[a-z /]*\bunit\b[a-z /]*|{_UNIT}(?:, {_UNIT})*)\]")
+"""Units in brackets: "[N/m]", "[kg, kg m, kg m^2]", "[-]", "[log]", "[SI]", "[input per output unit]"."""
+
 COMMON = {"stage", "text", "rtol", "threads"}
 """Arguments that mean the same everywhere: a relative tolerance of the solver, how many cores it takes."""
 
@@ -96,14 +102,19 @@ def test_errors_that_a_function_raises_itself_are_told() -> None:
 
 
 def test_arguments_that_are_physical_have_units() -> None:
-    """In brackets, anywhere in the docstring: which quantity has which unit is for its reader to judge."""
+    """A unit in brackets, anywhere in the docstring: which quantity has which unit is for its reader to judge."""
 
     def physical(argument: ast.arg) -> bool:
         kind = ast.unparse(argument.annotation) if argument.annotation else ""
         return kind in ARRAYS and PHYSICAL.fullmatch(argument.arg) is not None
 
-    bare = [function for function in FUNCTIONS if not re.search(r"\[[^\]]+\]", function.text)]
+    bare = [function for function in FUNCTIONS if not UNITS.search(function.text)]
     assert [function.place for function in bare if any(map(physical, function.arguments))] == []
+
+
+def test_what_counts_as_a_unit() -> None:
+    assert all(map(UNITS.search, ("[N s/m]", "[N/(m s)]", "[1/sqrt(kg)]", "[kg, kg m, kg m^2]", "[-]", "[SI]")))
+    assert not any(map(UNITS.search, ("[a, b]", "[0]", "[row]", "[friction]", "[masses]")))
 
 
 @pytest.mark.parametrize("name", friso.__all__)

@@ -14,6 +14,9 @@ from friso.views.guideline.words import parasitic_sentences
 
 ROOT = Path(__file__).parent.parent
 
+FEW = 20
+"""Machines below which a share is hardly one."""
+
 
 def test_the_equations_are_those_on_file() -> None:
     changed = differ(equations().numbers)
@@ -48,6 +51,16 @@ def test_documents_state_what_is_on_file(name: str) -> None:
     for document, phrases in entries()[name].stated.items():
         text = " ".join((ROOT / document).read_text(encoding="utf-8").split())
         assert [phrase for phrase in phrases if " ".join(phrase.split()) not in text] == []
+
+
+def test_findings_on_few_machines_say_so() -> None:
+    """A share that was measured on machines drawn at random says on how many; of fewer than 20, wherever it stands."""
+    drawn = [entry for entry in entries().values() if "drawn" in entry.about]
+    assert drawn
+    for entry in drawn:
+        count = f"{entry.values['machines']:g} machines"
+        few = entry.values["machines"] < FEW
+        assert not few or all(count in phrase for phrases in entry.stated.values() for phrase in phrases)
 
 
 def test_the_file_is_as_the_command_writes_it() -> None:

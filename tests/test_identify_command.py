@@ -274,10 +274,10 @@ def test_a_foreign_stage_file_is_not_overwritten(
 ) -> None:
     own = tmp_path / "identified.toml"
     own.write_bytes(inputs[1].read_bytes())
-    for given in (inputs[1], own):
-        status, out, said = run(capsys, inputs[0], "--stage", given, "--out", tmp_path)
+    for stage, remedy in ((inputs[1], "--overwrite"), (own, "another folder")):
+        status, out, message = run(capsys, inputs[0], "--stage", stage, "--out", tmp_path)
         assert (status, out) == (2, "")
-        assert "--overwrite" in said or "another folder" in " ".join(said.split())
+        assert remedy in " ".join(message.split())
     assert own.read_bytes() == inputs[1].read_bytes()
 
 

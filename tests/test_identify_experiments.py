@@ -654,7 +654,6 @@ def test_what_is_found_of_the_identification(claim: str, holds: tuple[bool, ...]
     finding = judged(claim)
     assert finding.pattern == holds, finding
     assert all(part.holds or part.why for part in finding.parts)
-    assert all(isinstance(part.holds, bool) for part in finding.parts)
     assert not re.search(r"\bnan\b", str(finding))
 
 

@@ -5,7 +5,6 @@ import os
 import struct
 import sys
 import zlib
-from contextlib import suppress
 from pathlib import Path
 
 import log_files
@@ -53,7 +52,7 @@ def test_text_in_any_writing(tmp_path: Path, delimiter: str, decimal: str, encod
     check_motion(table)
     assert channel(table, "force").unit == "N"
     assert f"decimal {'comma' if decimal == ',' else 'point'}" in table.read[0]
-    assert "5 lines before the numbers" in table.read[0] or "4 lines" in table.read[0]
+    assert "4 lines before the numbers" in table.read[0]
 
 
 @pytest.mark.parametrize(
@@ -622,12 +621,14 @@ def test_pipes_and_devices_are_refused_at_once(tmp_path: Path, refused: Refused)
 
 
 @pytest.mark.parametrize("column", [0, 2])
-def test_a_cell_of_forty_thousand_digits_is_no_trouble(tmp_path: Path, column: int) -> None:
+def test_a_column_of_forty_thousand_digits_is_left_out(tmp_path: Path, column: int) -> None:
     """Which once took a time that grew with the square of their number."""
     rows = [[f"{k}", f"{k % 7}", f"{k % 5}"] for k in range(300)]
     for row in rows:
         row[column] = "1" * 40_000
     path = tmp_path / "log.csv"
     path.write_text("\n".join(["time [s],position [mm],force [N]", *map(",".join, rows)]))
-    with suppress(InputError):
-        read_table(path)
+    read = {channel.name: channel.values for channel in read_table(path).channels}
+    others = {name: k for k, name in enumerate(("time", "position", "force")) if k != column}
+    assert read.keys() == others.keys()
+    assert all(np.array_equal(read[name], [float(row[k]) for row in rows]) for name, k in others.items())
