@@ -204,7 +204,7 @@ def _sensitivity(bode: Bode) -> Figure:
     caption = "How much of a disturbance remains: above 0 dB the controller amplifies it."
     lost = f"; {(~stable).sum()} unstable ones are left out; near them the sensitivity is unbounded"
     note = f"Band: smallest to largest of {stable.sum()} stable states{'' if stable.all() else lost}." if bands else ""
-    panel = Panel("", _frequency(_hertz(bode)), axis, lines, limits=(limit,), bands=bands)
+    panel = Panel("", Axis.of_frequency(_hertz(bode)), axis, lines, limits=(limit,), bands=bands)
     return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
 
 
@@ -224,7 +224,7 @@ def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, .
 
 def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
     lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
-    return Panel("", _frequency(hertz), axis, tuple(lines))
+    return Panel("", Axis.of_frequency(hertz), axis, tuple(lines))
 
 
 def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
@@ -237,7 +237,7 @@ def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
         least, most = least - QUARTER, most + QUARTER
     view = max(float(least), LEAST_PHASE) - 10, float(most) + 10
     step = QUARTER if view[1] - view[0] < 6 * QUARTER else 2 * QUARTER
-    return Panel("", _frequency(hertz), Axis("Phase", "°", view, step=step), lines)
+    return Panel("", Axis.of_frequency(hertz), Axis("Phase", "°", view, step=step), lines)
 
 
 def _curve(name: str, response: np.ndarray) -> ResponseCurve:
@@ -258,7 +258,3 @@ def _masses(bode: Bode) -> list[float]:
 
 def _hertz(bode: Bode) -> Array:
     return bode.omega / (2 * np.pi)
-
-
-def _frequency(hertz: Array) -> Axis:
-    return Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)

@@ -6,10 +6,9 @@ import numpy as np
 
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.studies.draws import Draws, Fates
-from friso.studies.shares import Share
 from friso.views.check.cases import case_labels
 from friso.views.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
-from friso.views.drawing.prefixes import NOTHING
+from friso.views.drawing.prefixes import NOTHING, share_with_interval
 
 COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
 
@@ -24,8 +23,8 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
     """The rows of the table of draws, one text per case."""
     fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
-        ("Hunts after this move", [_percent(fate.share(("hunts",))) for fate in fates]),
-        ("A cycle attracts", [_percent(fate.share(ATTRACTED)) for fate in fates]),
+        ("Hunts after this move", [share_with_interval(fate.share(("hunts",))) for fate in fates]),
+        ("A cycle attracts", [share_with_interval(fate.share(ATTRACTED)) for fate in fates]),
         *((f"Verdict {word}", [str(fate.counts[word]) for fate in fates]) for word in VERDICTS),
     ]
     separations = [fate.separations(draws.sample.keys) for fate in fates]
@@ -55,8 +54,8 @@ def draws_sentences(draws: Draws) -> list[str]:
 def _sentence(fates: Fates, draws: Draws) -> str:
     failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
     sentences = [
-        f"of {draws.sample.count} draws, hunts with a probability of {_percent(fates.share(('hunts',)))}, "
-        f"has a cycle that attracts with {_percent(fates.share(ATTRACTED))}."
+        f"of {draws.sample.count} draws, hunts with a probability of {share_with_interval(fates.share(('hunts',)))}, "
+        f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}."
     ]
     if failed:
         sentences.append(f"{failed} draws failed; the intervals cover both outcomes for them.")
@@ -64,12 +63,6 @@ def _sentence(fates: Fates, draws: Draws) -> str:
         key, how = next(iter(keys.items()))
         sentences.append(f"{key} matters most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")
     return " ".join(sentences)
-
-
-def _percent(share: Share) -> str:
-    low, high = (f"{100 * value:.1f}" for value in (share.low, share.high))
-    middle = f"{100 * share.probability:.1f} %" if share.probability == share.probability else "unknown"
-    return f"{middle} ({low} to {high} %)"
 
 
 def draws_figure(draws: Draws) -> Figure:

@@ -13,8 +13,7 @@ from friso.frequency.crossover import WANTED
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Result
-from friso.studies.shares import Share
-from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
+from friso.views.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval, with_unit
 
 COLUMNS = (
     "Swings at the end",
@@ -97,7 +96,10 @@ def table_rows(comparison: Comparison) -> list[Row]:
         (
             label(result),
             [
-                *(percent(share) for share in (result.swinging, result.counted, result.settled, result.stays)),
+                *(
+                    share_with_interval(share)
+                    for share in (result.swinging, result.counted, result.settled, result.stays)
+                ),
                 _time(result.settling),
                 *(_length(value, unit) for value, unit in ((result.in_position, "m"), (result.force, "N"))),
                 _margin(result, comparison),
@@ -115,20 +117,9 @@ def paired_rows(comparison: Comparison) -> list[Row]:
         points = [100 * value for value in (pair.swinging.value, pair.swinging.low, pair.swinging.high)]
         more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
         still = _ratio(pair.in_position) if comparison.shaken else UNSHAKEN
-        when = [percent(share) for share in (pair.sooner, pair.later, pair.alike)]
+        when = [share_with_interval(share) for share in (pair.sooner, pair.later, pair.alike)]
         rows.append((label(result), [more, *when, still, _ratio(pair.force)]))
     return rows
-
-
-def percent(share: Share) -> str:
-    middle = f"{_percent(share.probability)} %" if share.probability == share.probability else "unknown"
-    return f"{middle} ({_percent(share.low)} to {_percent(share.high)} %)"
-
-
-def _percent(part: float) -> str:
-    """A percentage; one that is not 0 or 100 does not look like that."""
-    digits = 1 if part in (0, 1) or 0.001 <= part <= 0.999 else 2
-    return f"{100 * part:.{digits}f}"
 
 
 def _time(median: EstimatedValue) -> str:
@@ -239,9 +230,9 @@ def _performance(comparison: Comparison) -> list[str]:
     """How fast the options that bring the machines to rest do so, how still these are then, and how sure that is."""
     resting, some = _resting(comparison), min(FOLLOWED, comparison.machines.count)
     lines = [
-        f"{label(result)}: in position in {with_unit(result.settling.value, 's')} (median)"
-        f"{_still(result, comparison)}; at least {_percent(result.settled.low)} % of such machines come to rest (95 % "
-        "confidence)."
+        f"{label(result)}: in position in {with_unit(result.settling.value, 's')} "
+        f"(median){_still(result, comparison)}; at least {percentage(result.settled.low)} % of such machines come to "
+        "rest (95 % confidence)."
         for result in resting
     ]
     longer = f"Of {some} machines followed {LONGER} times as long, {100 * ENOUGH:g} % or more stay at rest with "
@@ -255,9 +246,9 @@ def _still(result: Result, comparison: Comparison) -> str:
 def _failing(comparison: Comparison) -> list[str]:
     """What the machines do at the end with the other options."""
     return [
-        f"{label(result)}: not enough. {percent(result.swinging)} of the machines swing at the end and "
-        f"{percent(result.settled)} are in position; {percent(result.stays)} stay in position throughout the last half "
-        f"of a run {LONGER} times as long."
+        f"{label(result)}: not enough. {share_with_interval(result.swinging)} of the machines swing at the end and "
+        f"{share_with_interval(result.settled)} are in position; {share_with_interval(result.stays)} stay in position "
+        f"throughout the last half of a run {LONGER} times as long."
         for result in comparison.results
         if not result.rests
     ]

@@ -10,14 +10,13 @@ from friso.views.design.window import CrossoverBound, comfortable, lower, upper
 from friso.views.design.words import (
     DesignStep,
     hertz,
-    percent,
     plain,
     probability,
     restless,
     seconds,
     settling,
 )
-from friso.views.drawing.prefixes import listed
+from friso.views.drawing.prefixes import listed, percent
 
 ROUNDED = 0.01
 """Share by which a crossover may stay below its bound without a word: it has three digits."""

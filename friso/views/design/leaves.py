@@ -9,8 +9,8 @@ import numpy as np
 
 from friso.design.method import Design
 from friso.design.requirements import Requirement, Way
-from friso.views.design.words import DesignStep, hertz, leaves, percent, plain, size
-from friso.views.drawing.prefixes import listed
+from friso.views.design.words import DesignStep, hertz, leaves, plain, size
+from friso.views.drawing.prefixes import listed, percent
 from friso.views.flexure.table import megapascals, newtons_per
 from friso.views.flexure.words import assumptions
 

@@ -16,8 +16,8 @@ from friso.design.relax import Relaxation
 from friso.design.verification import MachineOutcomes
 from friso.stage.stage import numeric_keys
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
-from friso.views.drawing.prefixes import choose, pretty, with_unit
-from friso.views.map.words import quantity
+from friso.views.drawing.prefixes import choose, percent, pretty, with_unit
+from friso.views.map.words import in_sentence
 
 SHOWN = 5
 """Number of relaxations listed in a message."""
@@ -137,13 +137,7 @@ def corner(corners: Corners, flat: Mapping[str, Any]) -> str:
     keys = corners.population.of(corners.worst)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
-    return ", ".join(f"{_name(key)} {plain(keys[key], units[key])}" for key in order)
-
-
-def _name(key: str) -> str:
-    """A key inside a sentence: names of people stay as they are."""
-    name = quantity(key)
-    return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
+    return ", ".join(f"{in_sentence(key)} {plain(keys[key], units[key])}" for key in order)
 
 
 def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
@@ -209,7 +203,3 @@ def hertz(frequency: float) -> str:
 def seconds(time: float) -> str:
     """A settling time."""
     return with_unit(time, "s") if math.isfinite(time) else "never"
-
-
-def percent(share: float) -> str:
-    return f"{100 * share:.2g} %"

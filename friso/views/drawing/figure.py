@@ -45,6 +45,11 @@ class Axis:
         """What is written at the axis, e.g. "Time [s]"."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
+    @classmethod
+    def of_frequency(cls, hertz: Array) -> Axis:
+        """A logarithmic axis over increasing frequencies [Hz], from the first to the last."""
+        return cls("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
+
 
 @dataclass(frozen=True)
 class Series:
@@ -147,6 +152,11 @@ class Coloured:
     def label(self) -> str:
         """What is written at the colour bar."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+    @classmethod
+    def of_frequency(cls, hertz: Array) -> Axis:
+        """A logarithmic axis over increasing frequencies [Hz], from the first to the last."""
+        return cls("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
 
     @property
     def has_numbers(self) -> bool:

@@ -1,14 +1,18 @@
-"""The SI prefix that makes the numbers at an axis readable."""
+"""Numbers as they are read: the SI prefix that suits them, ranges, shares in percent."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.axis import unit_shown
 from friso.views.drawing.figure import Array
+
+if TYPE_CHECKING:
+    from friso.studies.shares import Share
 
 NOTHING = "–"
 """Stands where there is nothing to say."""
@@ -96,6 +100,22 @@ def plus_minus(half: float, unit: str, digits: int = 3) -> str:
     """Half a range [unit] with the prefix that suits the whole of it, e.g. "±0.52 mm"."""
     factor, text = choose(np.array([2 * half]), unit)
     return f"±{half * factor:.{digits}g} {text}"
+
+
+def percent(share: float, digits: int = 2) -> str:
+    """A share in percent; a dash where there is none."""
+    return f"{100 * share:.{digits}g} %" if math.isfinite(share) else NOTHING
+
+
+def share_with_interval(share: Share) -> str:
+    """A share and its interval in percent; what is not 0 or 100 % does not look like that."""
+    middle = f"{percentage(share.probability)} %" if math.isfinite(share.probability) else "unknown"
+    return f"{middle} ({percentage(share.low)} to {percentage(share.high)} %)"
+
+
+def percentage(part: float) -> str:
+    """A part of one in percent, without the sign, to a tenth; to a hundredth next to 0 and 100."""
+    return f"{100 * part:.{1 if part in (0, 1) or 0.001 <= part <= 0.999 else 2}f}"
 
 
 def listed(parts: Sequence[str], word: str) -> str:

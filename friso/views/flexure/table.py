@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from friso.flexure.both_models import BothModels
 from friso.flexure.evaluation import Evaluation, Mode
-from friso.views.drawing.prefixes import NOTHING, with_unit
+from friso.views.drawing.prefixes import NOTHING, percent, with_unit
 
 INTERFERES = "interferes"
 """Marks a mode that disturbs control: actuator and sensor both see it."""
@@ -39,10 +39,6 @@ def megapascals(value: float) -> str:
 def factor(value: float) -> str:
     """A margin as a factor."""
     return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
-
-
-def percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
 
 
 def _plain(value: float) -> str:

@@ -9,8 +9,8 @@ from friso.flexure.both_models import BothModels
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import AXES, GRAVITY
 from friso.stage import Stage
-from friso.views.drawing.prefixes import listed, with_unit
-from friso.views.flexure.table import megapascals, newtons_per, percent
+from friso.views.drawing.prefixes import listed, percent, with_unit
+from friso.views.flexure.table import megapascals, newtons_per
 
 RULE = 0.1
 """Highest crossover over the first interfering frequency (thesis, Section 5: parasitic modes ten times higher)."""

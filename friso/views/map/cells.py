@@ -112,7 +112,7 @@ def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
         keys = [key for key in runs.coords if runs[key].dims == (SAMPLE,) and key != SAMPLE]
         keys.sort(key=lambda key: order.index(key) if key in order else len(order))
         return tuple(_sampled(runs, key) for key in keys)
-    dims = _dims(runs)
+    dims = dims_of(runs)
     if not dims:
         raise ValueError("map: got runs without any dimension, expected those of a sweep, e.g. friso.sweep(...)")
     return tuple(_gridded(runs, key) for key in dims)
@@ -121,10 +121,10 @@ def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
 def cuts(runs: xr.Dataset) -> list[str]:
     """The values at which a larger map was cut, e.g. "Crossover 8 Hz"."""
     fixed = runs.coords.to_dataset()
-    return [_gridded(fixed.expand_dims(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
+    return [_gridded(fixed.expanddims_of(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
 
 
-def _dims(runs: xr.Dataset) -> tuple[Hashable, ...]:
+def dims_of(runs: xr.Dataset) -> tuple[Hashable, ...]:
     """The dimensions in the order of the variables; that of a dataset's own list may differ."""
     return max((variable.dims for variable in runs.data_vars.values()), key=len, default=())
 

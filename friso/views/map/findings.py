@@ -11,7 +11,7 @@ from friso.axis import axis_shown
 from friso.hunting.criteria.run_outcome import BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
 from friso.views.drawing.prefixes import listed
-from friso.views.map.cells import SAMPLE, CellAxis, axes_of
+from friso.views.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.views.map.words import (
     AT_ONCE,
     INVALID,
@@ -101,7 +101,7 @@ def _answer(runs: xr.Dataset, question: Question) -> str:
     axes, inside = axes_of(runs), completed.copy()
     where = []
     for k, axis in enumerate(axes):
-        dim = _dims(runs).index(SAMPLE) if SAMPLE in runs.dims else k
+        dim = dims_of(runs).index(SAMPLE) if SAMPLE in runs.dims else k
         line = np.asarray(holds.any(axis=tuple(other for other in range(holds.ndim) if other != dim)))
         box = _box(axis, line[axis.places])
         where += [_range(axis, box)] if not box.all() else []
@@ -128,10 +128,6 @@ def _flags(runs: xr.Dataset, question: Question) -> tuple[np.ndarray, np.ndarray
         completed[first : first + rows] = ran
         holds[first : first + rows] = ran & question.holds(part)
     return holds, completed
-
-
-def _dims(runs: xr.Dataset) -> list[str]:
-    return [str(dim) for dim in max((array.dims for array in runs.data_vars.values()), key=len)]
 
 
 def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:

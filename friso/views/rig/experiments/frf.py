@@ -100,8 +100,8 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
     below.append(Series(hertz, phases([average])[0], "", BLUE))
     gain = Axis("Magnitude", "m/N", log=True, prefixed=False)
     panels = (
-        Panel("position over commanded force", _frequency(hertz), gain, tuple(lines)),
-        Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), tuple(below)),
+        Panel("position over commanded force", Axis.of_frequency(hertz), gain, tuple(lines)),
+        Panel("", Axis.of_frequency(hertz), Axis("Phase", "°", step=90.0), tuple(below)),
     )
     caption = f"Mass line {_mass(plant.mass)}, read from {plant.band[0]:.3g} to {plant.band[1]:.3g} Hz."
     return Figure(f"rig_frf_{name}", title, caption, panels, subject=subject)
@@ -128,12 +128,12 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
     panels = (
         Panel(
             "open loop",
-            _frequency(hertz),
+            Axis.of_frequency(hertz),
             Axis("Magnitude", "", log=True, prefixed=False),
             gains,
             limits=(Limit((1.0,), "0 dB", INK),),
         ),
-        Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), angles, limits=(Limit((-180.0,), "", INK),)),
+        Panel("", Axis.of_frequency(hertz), Axis("Phase", "°", step=90.0), angles, limits=(Limit((-180.0,), "", INK),)),
     )
     crossings = "; ".join(f"{loop.tuned:.3g} Hz: {_crossings(loop)}" for loop in loops)
     return Figure(f"rig_frf_{name}", title, f"Tuned to, and crossing 0 dB at: {crossings}.", panels, subject=subject)
@@ -146,10 +146,6 @@ def _crossings(loop: MeasuredLoop) -> str:
         ", ".join(f"{crossing.value:.3g} ({crossing.low:.3g} to {crossing.high:.3g})" for crossing in loop.crossings)
         or "nowhere"
     )
-
-
-def _frequency(hertz: Array) -> Axis:
-    return Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
 
 
 def _mass(mass: Estimate) -> str:
