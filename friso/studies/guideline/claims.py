@@ -20,7 +20,19 @@ FREE_EDGE, LOCKED_EDGES = (5.0, 5.5), (15.0, 14.3)
 """Crossovers [Hz] above which the thesis's rig no longer hunts, free and locked."""
 
 NEAR = 1.1
-"""Factor within which the free edge may be off the range, either way."""
+"""Factor within which the free edge may be off the range, either way, and that of a short stroke above a long one's."""
+
+GAP = (0.5, 2.0)
+"""Gaps [N] that are "about 1 N"."""
+
+STIFFNESSES = (1000, 2400)
+"""Stiffnesses of the softer and of the stiffer joint [N/m]."""
+
+STROKES = (0.3, 1.0, 2.0)
+"""The stroke that is claimed to be enough, a long one and the longest [mm]."""
+
+SAME = 0.02
+"""Share by which the edge differs at most where it "no longer changes"."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +62,8 @@ def _gap(worked: Worked) -> GuidelineClaim:
         "hunting needs a friction gap of about 1 N",
         f"locked, at {CLAIMED_AT:g} Hz a cycle attracts from a gap of {words}; by the law this gap grows with the "
         "force and the crossover",
-        "0.5 to 2 N at each static friction",
-        _judged([gap.within(0.5, 2.0) for gap in gaps]),
+        f"{GAP[0]:g} to {GAP[1]:g} N at each static friction",
+        _judged([gap.within(*GAP) for gap in gaps]),
     )
 
 
@@ -86,26 +98,27 @@ def _mass(worked: Worked) -> GuidelineClaim:
 
 def _stiffness(worked: Worked) -> GuidelineClaim:
     cases = {round(STUDIED["stiffness"](case.changes)): case for case in worked.studies["stiffness"]}
-    soft, stiff = cases[1000], cases[2400]
+    soft, stiff = (cases[stiffness] for stiffness in STIFFNESSES)
     lower = _verdict(soft.ranked < stiff.ranked, soft.ranked, stiff.ranked)
-    text = f"edge {_edge(soft)} at 1 N/mm, {_edge(stiff)} at 2.4 N/mm"
+    text = f"edge {_edge(soft)} at {STIFFNESSES[0] / 1e3:g} N/mm, {_edge(stiff)} at {STIFFNESSES[1] / 1e3:g} N/mm"
     return GuidelineClaim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judged([lower]))
 
 
 def _stroke(worked: Worked) -> GuidelineClaim:
     cases = {round(1e3 * STUDIED["stroke"](case.changes), 6): case for case in worked.studies["stroke"]}
     words = ", ".join(f"{_edge(case)} at {stroke:g} mm" for stroke, case in cases.items())
-    short, long, longest = (cases[stroke].ranked for stroke in (0.3, 1.0, 2.0))
-    same = abs(long - longest) < 0.02 * longest
+    short, long, longest = (cases[stroke].ranked for stroke in STROKES)
+    same = abs(long - longest) < SAME * longest
     return GuidelineClaim(
         "Sec. 4.1, 4.3.3",
         "a stroke of 0.3 mm is enough; above some stroke the limit no longer changes",
         f"edge {words}",
-        f"at 0.3 mm below {CLAIMED_AT:g} Hz and within 10 % of that at 2 mm; at 1 mm within 2 % of it",
+        f"at {STROKES[0]:g} mm below {CLAIMED_AT:g} Hz and within {NEAR - 1:.0%} of that at {STROKES[2]:g} mm; at "
+        f"{STROKES[1]:g} mm within {SAME:.0%} of it",
         _judged(
             [
                 _verdict(short < CLAIMED_AT, short),
-                _verdict(short < 1.1 * longest, short, longest),
+                _verdict(short < NEAR * longest, short, longest),
                 _verdict(same, long, longest),
             ]
         ),
@@ -126,7 +139,8 @@ def _edges(worked: Worked) -> GuidelineClaim:
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
-        f"free within 10 % of the range, the highest locked edge within a factor of {ABOUT:g} of both numbers",
+        f"free within {NEAR - 1:.0%} of the range, the highest locked edge within a factor of {ABOUT:g} of both "
+        "numbers",
         _judged(near),
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import ends, share_text, table
+from friso.studies.thesis.studies import SOFT, thesis_rig
 
 _AXES = (CROSSOVER, "joint.stroke")
 
@@ -54,8 +55,9 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                "over the strokes of the upper half of the range, the mean limit at 1e3 N/m is lower than at 2.4e3 N/m "
-                f"by at least one cell of the crossover grid ({cell:.3g} Hz)",
+                f"over the strokes of the upper half of the range, the mean limit at {SOFT['joint.stiffness']} is "
+                f"lower than at {thesis_rig().flat()['joint.stiffness']:g} N/m by at least one cell of the crossover "
+                f"grid ({cell:.3g} Hz)",
                 bool(drop.mean() >= cell),
                 f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: a drop of {drop.mean():.3g} Hz; lower "
                 f"at {(drop > 0).sum()} of {drop.size} strokes, higher at {(drop < 0).sum()}",

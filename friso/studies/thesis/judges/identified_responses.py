@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
-from friso.studies.thesis.experiments import BUILT, FORCE, FREQUENCIES, LINE, RANGE, LockedLine
+from friso.studies.thesis.experiments import BUILT, COULOMB, FORCE, FREQUENCIES, LINE, RANGE, LockedLine
 from friso.studies.thesis.judges.rig_loops import on_the_rig, weaker_motor
 from friso.studies.thesis.linear import PLANT
 
@@ -68,8 +68,8 @@ def judged_line(line: LockedLine) -> Finding:
                 bool(_NOISY[0] <= worst <= _NOISY[1] and np.nanmax(scatter) > ABOUT * above),
                 f"the phase scatters most at {worst:.3g} Hz, by {np.degrees(np.nanmax(scatter)):.2g} degrees, and by "
                 f"{np.degrees(above):.2g} above. Assumed, as the thesis states neither: sines of {FORCE:g} N; places "
-                f"with static friction spread evenly over the {RANGE[0]:g} to {RANGE[1]:g} N of Fig. 20, a third of it "
-                "as Coulomb friction",
+                f"with static friction spread evenly over the {RANGE[0]:g} to {RANGE[1]:g} N of Fig. 20, "
+                f"{COULOMB:.0%} of it as Coulomb friction",
             ),
         )
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cache
 from itertools import product
 
@@ -94,8 +95,8 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
     frequencies = np.array([mode.frequency for mode in modes])
     names = sorted({mode.name for mode in modes})
     return Part(
-        f"the first parasitic mode is about {_PARASITIC:g} Hz (within a factor of {ABOUT:g}), whatever spacing of 30 "
-        "to 90 mm and height of the centre of mass of 0 to 60 mm above the leaf ends",
+        f"the first parasitic mode is about {_PARASITIC:g} Hz (within a factor of {ABOUT:g}), whatever spacing of "
+        f"{_millimetres(_SPACINGS)} and height of the centre of mass of {_millimetres(_HEIGHTS)} above the leaf ends",
         bool(np.all((frequencies >= _PARASITIC / ABOUT) & (frequencies <= _PARASITIC * ABOUT))),
         f"{_range(frequencies)} Hz: {' or '.join(names)}; the first that actuator and sensor, underneath the leaves, "
         f"see: {_range(visible)} Hz",
@@ -115,3 +116,8 @@ def _met(ratio: np.ndarray) -> bool:
 
 def _range(values: np.ndarray) -> str:
     return f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g}"
+
+
+def _millimetres(lengths: Sequence[float]) -> str:
+    """The range of lengths [m]."""
+    return f"{1e3 * min(lengths):g} to {1e3 * max(lengths):g} mm"

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import HIGHEST, WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
 from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges, number_text
 from friso.studies.thesis.experiments import BUILT
 from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig
 from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
+from friso.studies.thesis.linear.loops import SAMPLED
+from friso.studies.thesis.linear.trials import IDENTIFIED, LITTLE
 
 _SIMULATED, _MEASURED = 60.0, 48.0
 """The highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
@@ -56,7 +58,7 @@ def _stable_at_speeds(speeds: Speeds) -> Part:
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
     why = "idealisation: there friction falls as the speed rises (Stribeck effect)"
     if speeds.incurable:
-        why += ", and in the middle of that range no faster controller up to 10 kHz is stable"
+        why += f", and in the middle of that range no faster controller up to {HIGHEST / 1e3:g} kHz is stable"
     if not speeds.undeflected:
         why += (
             "; linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves this out, "
@@ -116,8 +118,8 @@ def _why_elsewhere(contact: Contact) -> str:
     return (
         "no mode of the locked model lies there. The contact of cart and stage would with k_l of "
         f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
-        f"{_listed(soft)} with the limiter damping of the rig, {_listed(undamped)} with 1 N s/m. Or it is the frame of "
-        "the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model"
+        f"{_listed(soft)} with the limiter damping of the rig, {_listed(undamped)} with {LITTLE}. Or it is the frame "
+        "of the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model"
     )
 
 
@@ -150,10 +152,10 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"tuned to 8 Hz for the whole mass, the free joint's loop crosses 0 dB about {_CROSSES:g} Hz (from "
-                f"{_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
+                f"tuned to {min(analysis.free.margins):g} Hz for the whole mass, the free joint's loop crosses 0 dB "
+                f"about {_CROSSES:g} Hz (from {_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
                 all(about(f, _CROSSES) for f in crossing.values()),
-                f"{crossed}; with the masses identified (0.75 kg, tuned for 2.5 kg) "
+                f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
                 f"{nearest(analysis.identified, _CROSSES):.3g} Hz",
             ),
             Part(
@@ -184,7 +186,7 @@ def _listed(frequencies: tuple[float, ...]) -> str:
 
 
 def _hertz(crossover: float | None) -> str:
-    return "10 kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
+    return f"{HIGHEST / 1e3:g} kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
 
 
 def _sampled(analysis: Linear) -> str:
@@ -193,7 +195,7 @@ def _sampled(analysis: Linear) -> str:
         f"{_hertz(free)} and {_hertz(analysis.locked.sampled[delay])} with {_micro(delay)}"
         for delay, free in analysis.free.sampled.items()
     )
-    return f"sampled at 50 us, by delay, free and locked: {by_delay}"
+    return f"sampled at {SAMPLED}, by delay, free and locked: {by_delay}"
 
 
 def _edges(analysis: Linear, setting: float) -> str:
@@ -202,7 +204,7 @@ def _edges(analysis: Linear, setting: float) -> str:
     parts = [
         f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()
     ]
-    return f"sampled at 50 us, {setting:g} Hz is at the edge of stability: {', '.join(parts)}"
+    return f"sampled at {SAMPLED}, {setting:g} Hz is at the edge of stability: {', '.join(parts)}"
 
 
 def _micro(seconds: float) -> str:

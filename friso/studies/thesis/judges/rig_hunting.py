@@ -16,11 +16,17 @@ from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 
 _ASSUMED = (
     f"Assumed: friction that varies by {AS_BUILT['rail.static_deviation']:.0%} over "
-    f"{AS_BUILT['rail.correlation_length']} along the rail, one sample of delay"
+    f"{AS_BUILT['rail.correlation_length']} along the rail, {AS_BUILT['drive.delay']} of delay"
 )
 
 _DEVIATIONS = 0.1e-6, 1e-6
 """Peaks by Fig. 28 with the joint locked and free [m]."""
+
+_LOPSIDED = 1.1
+"""Larger side of a cycle over the other from which its sides differ."""
+
+_IRREGULAR = 0.05
+"""Scatter of the period over its mean from which a cycle is less regular."""
 
 _RECOVERED = 0.5
 """Share of a difference from which a thing is taken for its cause."""
@@ -157,16 +163,17 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
                 f"it before it is twice as slow. {_weak_motor(cycles)}",
             ),
             Part(
-                "there its two sides differ (by more than a tenth, on at least half of those that swing on)",
-                bool(len(lopsided) and np.median(lopsided) > np.log(1.1)),
+                f"there its two sides differ (by a factor of more than {_LOPSIDED:g}, on at least half of those that "
+                "swing on)",
+                bool(len(lopsided) and np.median(lopsided) > np.log(_LOPSIDED)),
                 f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
                 if len(lopsided)
                 else "nothing swings on",
                 why="too few keep swinging",
             ),
             Part(
-                "there it is less regular from cycle to cycle (period scatters by more than a twentieth)",
-                scatter > 0.05,
+                f"there it is less regular from cycle to cycle (period scatters by more than {_IRREGULAR:.0%})",
+                scatter > _IRREGULAR,
                 f"median scatter of the period {number_text(scatter, '.2%')}",
                 why="friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
                 "the model",

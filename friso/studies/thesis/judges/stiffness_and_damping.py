@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 _NEEDED = 1e-4
 """Stroke that the isolator needs with large damping of its limiter [m] (Sec. 4.1)."""
 
+_SMALL_DAMPING = 1.0
+"""Limiter damping below which the stroke is reported for comparison [N s/m]."""
+
 _LARGE_DAMPING = 1e2
 """Limiter damping from which it is called large [N s/m]: the upper two of the six decades studied."""
 
@@ -81,7 +84,7 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     """The stroke from which runs come to rest where the limiter is damped much, and the amplitude."""
     damping, stroke, moving, _ = table(evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke")
     needed = np.exp(ends(np.log(stroke), moving.T))
-    large, small = needed[damping >= _LARGE_DAMPING], needed[damping < 1]
+    large, small = needed[damping >= _LARGE_DAMPING], needed[damping < _SMALL_DAMPING]
     at_large = float(np.median(large))
     locked = evidence.responses["locked"].cell
     amplitude = float(locked["peak_to_peak"]) / 2
@@ -93,7 +96,8 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
                 f"comes to rest is "
                 f"about {_NEEDED * 1e3:g} mm (from {_NEEDED / ABOUT * 1e3:.2g} to {_NEEDED * ABOUT * 1e3:.2g} mm)",
                 bool(_NEEDED / ABOUT <= at_large <= _NEEDED * ABOUT),
-                f"stroke needed {at_large * 1e3:.2g} mm; with damping below 1 N s/m {np.median(small) * 1e3:.2g} mm",
+                f"stroke needed {at_large * 1e3:.2g} mm; with damping below {_SMALL_DAMPING:g} N s/m "
+                f"{np.median(small) * 1e3:.2g} mm",
             ),
             Part(
                 f"that stroke is far below the amplitude of the locked rig's cycle (at most {1 / ORDER:.2g} of it)",
