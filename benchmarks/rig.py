@@ -18,7 +18,7 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.rig.run import RTOL, run
 from friso.stage import Stage, load
-from friso.studies.rig.hunted import INTERVAL, move, with_joint
+from friso.studies.rig.moves_on_rails import INTERVAL, move, with_joint
 
 FILE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 RUNS = 32

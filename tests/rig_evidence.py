@@ -9,14 +9,14 @@ from friso.identify.response.response import FrequencyResponse
 from friso.studies.rig.experiments.frf import MeasuredLoop
 from friso.studies.rig.experiments.in_position import InPosition, Standstill
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
-from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.thesis.as_built import CyclesOnRails, MovesOnRails, RigLoops
 
 HUNTS, FAILED = 7, -1
 """Peaks of a run that hunts; of one that failed, which says nothing."""
 
 
-def hunted(peaks: Any, **given: Any) -> Hunted:
+def rail_runs(peaks: Any, **given: Any) -> RailRuns:
     """Runs of so many peaks, which swing by 1 mm in 0.5 s to the end, evenly, unless `given` otherwise."""
     counts = np.array(peaks)
     every = {"swing": 1e-3, "period": 0.5, "above": 5e-4, "below": 5e-4, "rising": 0.5}
@@ -24,14 +24,14 @@ def hunted(peaks: Any, **given: Any) -> Hunted:
     swings = np.broadcast_to(np.array(every.pop("swings", True)), counts.shape)
     words = np.where(counts == FAILED, "failed", np.where(swings, "swings", "rests"))
     whole = {name: np.broadcast_to(np.array(value, float), counts.shape) for name, value in every.items()}
-    return Hunted(np.maximum(counts, 0), words, **whole)
+    return RailRuns(np.maximum(counts, 0), words, **whole)
 
 
 def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
           released: Any = (0, 0, 0, 0), **cycle: Any) -> MovesOnRails:  # fmt: skip
     """On four rails; releases to one side start nothing, those to the other a `cycle`."""
-    let_go = hunted([(0, 0, 0, 0), released], **cycle)
-    return MovesOnRails(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), let_go)
+    let_go = rail_runs([(0, 0, 0, 0), released], **cycle)
+    return MovesOnRails(np.array([8.0, 9.5, 14.3]), rail_runs([first, middle, high]), rail_runs(free), let_go)
 
 
 def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
@@ -39,7 +39,7 @@ def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
     crossovers = np.array([4.0, 6.0, 8.0])
     hunts = np.arange(3) <= np.array(highest)[:, None] if runs is None else np.array([])
     peaks = np.repeat(HUNTS * hunts[..., None], 2, axis=2) if runs is None else np.array(runs)
-    return StrokeCrossover(np.array([2e-5, 3e-4, 1e-3]), crossovers, np.array([1.0, 2.0]), 8.0, hunted(peaks))
+    return StrokeCrossover(np.array([2e-5, 3e-4, 1e-3]), crossovers, np.array([1.0, 2.0]), 8.0, rail_runs(peaks))
 
 
 SLOW = {"period": 1.0, "swing": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_scatter": 0.1}
@@ -47,8 +47,8 @@ SLOW = {"period": 1.0, "swing": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_sc
 
 
 def cycles(even: dict[str, Any] | None = None, **rails: Any) -> CyclesOnRails:
-    return CyclesOnRails(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4),
-                  hunted([HUNTS], **SLOW))  # fmt: skip
+    return CyclesOnRails(rail_runs([HUNTS], **(even or {})), rail_runs([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4),
+                  rail_runs([HUNTS], **SLOW))  # fmt: skip
 
 
 def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, tenfold: float = 0.6) -> InPosition:

@@ -37,7 +37,7 @@ from friso.hunting.measures import measure, measured_run, options
 from friso.hunting.turns import scan
 from friso.hunting.verdict import judge, judge_many
 from friso.stage import Stage
-from friso.studies.rig.hunted import turning_points
+from friso.studies.rig.moves_on_rails import turning_points
 
 STEP, DURATION = 1 / 128, 20.0
 TIME = np.arange(0, DURATION + STEP / 2, STEP)

@@ -298,10 +298,12 @@ def studied(edge: Any, kind: str = FLIP) -> worked.Worked:
     """Worked steps of invented computed edges: `edge` gives that of the flat keys of the rig."""
     flat = plain("joint")
     studies = {
-        name: tuple(worked.RigCase(each, 9.0, edge(name, flat | dict(each)), kind) for each in changes)
+        name: tuple(worked.ThesisCase(each, 9.0, edge(name, flat | dict(each)), kind) for each in changes)
         for name, (changes, _) in worked._studies().items()  # pyright: ignore[reportPrivateUsage]
     }
-    friction = tuple(worked.RigCase(each, 9.0, edge("friction", flat | each), kind) for each in worked.friction_range())
+    friction = tuple(
+        worked.ThesisCase(each, 9.0, edge("friction", flat | each), kind) for each in worked.friction_range()
+    )
     machines = tuple(worked.WorkedMachine(name, 9.0, value) for name, value in (("", 9.8), ("", 9.7), ("", 5.4)))
     return worked.Worked({}, machines, friction, 13.0, 1.1, (), (), studies)
 
@@ -332,10 +334,10 @@ def test_claims_hold_differ_or_are_unknown() -> None:
 
 def test_edges_below_the_grid_are_good_ones() -> None:
     """They are neither unknown nor the worst."""
-    below = worked.RigCase({}, 2.0, np.nan, BELOW)
-    design = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.RigCase({}, 2.0, 3.0)), 0.5)
+    below = worked.ThesisCase({}, 2.0, np.nan, BELOW)
+    design = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.ThesisCase({}, 2.0, 3.0)), 0.5)
     assert (design.worst, design.does) == (3.0, True)
-    lost = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.RigCase({}, 2.0, np.nan, UNKNOWN)), 0.5)
+    lost = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.ThesisCase({}, 2.0, np.nan, UNKNOWN)), 0.5)
     assert (lost.worst, lost.unknown) == (1.0, 1)
     assert not lost.does
     share = claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
@@ -347,7 +349,7 @@ def test_edges_below_the_grid_are_good_ones() -> None:
 def test_least_gap_that_hunts(static: float, low: float, high: float) -> None:
     """Found, above all that were tried, and below all."""
     gaps = static * np.linspace(0.1, 0.85, 11)
-    cases = [worked.RigCase({"friction.static": static, "friction.coulomb": static - g}, 9.0, 8 * g) for g in gaps]
+    cases = [worked.ThesisCase({"friction.static": static, "friction.coulomb": static - g}, 9.0, 8 * g) for g in gaps]
     found = least_gap(cases, static)
     assert (found.low, found.high) == pytest.approx((low, high), rel=1e-6)
 
@@ -392,10 +394,10 @@ def shown(laws: Any, safe_locked: float, safe_free: float) -> worked.Worked:
     """The worked steps, edges by the laws standing for computed ones."""
     patch = pytest.MonkeyPatch()
 
-    def by_law(laws: Any, changes: Any, free: bool) -> list[worked.RigCase]:
+    def by_law(laws: Any, changes: Any, free: bool) -> list[worked.ThesisCase]:
         own = [plain("joint") | {k: v for k, v in each.items() if not k.startswith("parasitic")} for each in changes]
         edges = [float((laws.free_edge if free else laws.locked_edge)(flat)[0]) for flat in own]
-        return [worked.RigCase(each, edge, edge) for each, edge in zip(changes, edges, strict=True)]
+        return [worked.ThesisCase(each, edge, edge) for each, edge in zip(changes, edges, strict=True)]
 
     patch.setattr(worked, "cases", by_law)
     patch.setattr(worked, "direct", lambda stage: 9.77)

@@ -26,7 +26,7 @@ from friso.stage import Stage, save
 from friso.studies.compare import study
 from friso.studies.compare.study import compare
 from friso.studies.rig.experiments import hunting
-from friso.studies.rig.hunted import rails
+from friso.studies.rig.moves_on_rails import rails
 from friso.views.compare.words import sentences as comparison_sentences
 from friso.views.rig.page import sentences
 

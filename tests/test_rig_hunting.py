@@ -14,14 +14,14 @@ from friso.progress import silent
 from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig.experiments import hunting, in_position, measured_cycles, stroke_crossover
-from friso.studies.rig.hunted import (
-    Hunted,
+from friso.studies.rig.moves_on_rails import (
+    RailRuns,
     distance,
     follow,
-    hunted,
     move,
     numbers_of,
     on_rails,
+    rail_runs,
     rails,
     released,
     turning_points,
@@ -46,7 +46,7 @@ def test_a_cycle_of_known_shape() -> None:
     time = np.arange(0, 20, 1e-3)
     phase = time % 1.6
     deviation = np.where(phase < 0.4, -0.2 + 2 * phase, 0.6 - (phase - 0.4) * 2 / 3) * 1e-3
-    found = hunted(recorded(deviation))
+    found = rail_runs(recorded(deviation))
     assert found.swings[0]
     assert found.swing[0] == pytest.approx(0.8e-3, rel=1e-2)
     assert found.period[0] == pytest.approx(1.6, rel=1e-3)
@@ -59,7 +59,7 @@ def test_a_cycle_of_known_shape() -> None:
 def test_swings_that_die_out_count_but_do_not_last() -> None:
     time = np.arange(0, 20, 1e-3)
     dying = np.where(time < 16.5, 5e-4 * np.sin(2 * np.pi * time), 0.0)
-    found = hunted(recorded(dying))
+    found = rail_runs(recorded(dying))
     assert found.peaks[0] == 7  # maxima at 10.25, 11.25, ..., 16.25 s
     assert not found.swings[0]
 
@@ -67,7 +67,7 @@ def test_swings_that_die_out_count_but_do_not_last() -> None:
 def test_runs_that_failed_neither_hunt_nor_settle() -> None:
     time = np.arange(0, 20, 1e-3)
     cycle = 5e-4 * np.sin(2 * np.pi * time)
-    found = hunted(recorded(cycle, np.where(time < 15, cycle, np.nan), np.zeros_like(time)))
+    found = rail_runs(recorded(cycle, np.where(time < 15, cycle, np.nan), np.zeros_like(time)))
     assert found.failed.tolist() == [False, True, False]
     assert np.isnan(found.swing[1])
     share = found.share()
@@ -104,14 +104,14 @@ def test_what_has_no_joint_or_goes_nowhere(refused: Refused) -> None:
 
 
 @pytest.fixture(scope="module")
-def moved() -> Hunted:
+def moved() -> RailRuns:
     """The rig with its joint locked at 8 and 14.3 Hz, on eight rails: shape (2, 8)."""
     locked, seeds = with_joint(RIG, locked=True), rails(RIG)[:8]
     changes = on_rails(RIG, {"controller.crossover": np.array([8.0, 14.3])}, seeds)
     return follow(locked, move(RIG), numbers_of(1, 2, 8), changes).shaped(2, 8)
 
 
-def test_hunting_ends_at_more_crossover(moved: Hunted) -> None:
+def test_hunting_ends_at_more_crossover(moved: RailRuns) -> None:
     """Fig. 25: it hunts at 8 Hz, here on some rails, and no more at 14.3 Hz."""
     assert 2 <= (moved.peaks[0] > 0).sum() < 8
     assert not moved.peaks[1].any()

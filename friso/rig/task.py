@@ -52,9 +52,10 @@ def standing(place: float, duration: float) -> MoveTask:
     return MoveTask(np.array([[0.0, place, 0.0, 0.0]]), duration)
 
 
-def staircase(steps: Sequence[float], stands: float, start: float = 0.0) -> MoveTask:
-    """Steps of the reference [m], one after the other, before and after each of which it stands for a time [s]."""
-    places = start + np.cumsum([0.0, *steps])
+def staircase(steps: Sequence[float], stands: float) -> MoveTask:
+    """Steps of the reference [m] from 0 on, one after the other, before and after each of which it stands for a time
+    [s]."""
+    places = np.cumsum([0.0, *steps])
     rows = [[number * stands, place, 0.0, 0.0] for number, place in enumerate(places)]
     return MoveTask(np.array(rows), stands * len(places))
 

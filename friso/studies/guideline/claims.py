@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.edges import ABOVE, BELOW, KINDS
 from friso.hunting.edges import UNKNOWN as NOT_TOLD
-from friso.studies.guideline.thesis_rig import RigCase
+from friso.studies.guideline.thesis_rig import ThesisCase
 from friso.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
 from friso.studies.thesis.claims import ABOUT, about
 
@@ -156,11 +156,11 @@ def _judged(parts: Sequence[bool | None]) -> str:
     return HOLDS if all(parts) else IN_PART if any(parts) else DIFFERS
 
 
-def _computed(cases: Sequence[RigCase]) -> np.ndarray:
+def _computed(cases: Sequence[ThesisCase]) -> np.ndarray:
     return np.array([case.ranked for case in cases])
 
 
-def _edge(case: RigCase) -> str:
+def _edge(case: ThesisCase) -> str:
     """A computed edge in words, or why there is none."""
     if np.isfinite(case.computed):
         return _hertz(case.computed)
@@ -193,12 +193,12 @@ class LeastGap:
         return True if least <= self.low and self.high <= most else None
 
 
-def least_gap(cases: Sequence[RigCase], static: float, crossover: float = CLAIMED_AT) -> LeastGap:
-    """The friction gap F_s - F_c from which on the rig of a static friction [N] hunts at a crossover [Hz], straight
+def least_gap(cases: Sequence[ThesisCase], static: float) -> LeastGap:
+    """The friction gap F_s - F_c from which on the rig of a static friction [N] hunts at `CLAIMED_AT`, straight
     between the points of its edge in logarithms."""
     at_force = [case for case in cases if case.changes["friction.static"] == static]
     x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)
-    above = np.flatnonzero(y >= crossover)
+    above = np.flatnonzero(y >= CLAIMED_AT)
     if np.isnan(y).any():
         return LeastGap(np.nan, np.nan)
     if not above.size:
@@ -208,5 +208,5 @@ def least_gap(cases: Sequence[RigCase], static: float, crossover: float = CLAIME
         return LeastGap(0.0, float(x[0]))
     if y[k - 1] == 0 or np.isinf(y[k]):
         return LeastGap(float(x[k - 1]), float(x[k]))
-    at = float(np.exp(np.interp(np.log(crossover), np.log([y[k - 1], y[k]]), np.log([x[k - 1], x[k]]))))
+    at = float(np.exp(np.interp(np.log(CLAIMED_AT), np.log([y[k - 1], y[k]]), np.log([x[k - 1], x[k]]))))
     return LeastGap(at, at)

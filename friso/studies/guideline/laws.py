@@ -148,13 +148,11 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
 
 
-def fitted(
-    law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray | None = None, seed: int = 0
-) -> FittedLaw:
+def fitted(law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
     """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
-    folds = np.random.default_rng(seed).permutation(len(edges)) % FOLDS
+    folds = np.random.default_rng(0).permutation(len(edges)) % FOLDS
     chosen: tuple[Exponent, ...] = ()
     path = [_validated(law, chosen, values, target, offset, folds)]
     while len(chosen) < MOST:

@@ -26,7 +26,7 @@ Changes = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class RigCase:
+class ThesisCase:
     """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
     its `kind`, one of `KINDS`, which says why there is none."""
 
@@ -83,7 +83,7 @@ def plain(part: str = "") -> dict[str, Any]:
     return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
 
 
-def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[RigCase]:
+def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[ThesisCase]:
     """The rig with each of these changes, rigid or with its joint free."""
     mode = any("parasitic.frequency" in change for change in changes)
     base = thesis_rig().flat() if mode else plain("joint" if free else "")
@@ -99,7 +99,7 @@ def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[RigCase]:
     with_joint = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
     law = np.broadcast_to(laws.free_edge(with_joint) if free else laws.locked_edge(with_joint), edges.kind.shape)
     columns = law.tolist(), edges.crossover.tolist(), edges.kind.astype(str).tolist()
-    return [RigCase(*row) for row in zip(changes, *columns, strict=True)]
+    return [ThesisCase(*row) for row in zip(changes, *columns, strict=True)]
 
 
 def direct(stage: Stage) -> float:

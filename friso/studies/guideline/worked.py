@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.studies.guideline.parasitic import settled_margin
 from friso.studies.guideline.sweeps import LOCKED_BOX
-from friso.studies.guideline.thesis_rig import FREE_GRID, Laws, RigCase, cases, direct, plain
+from friso.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCase, cases, direct, plain
 from friso.studies.thesis.studies import thesis_rig
 
 STATIC = (1.0, 1.5, 2.0, 2.5)
@@ -63,7 +63,7 @@ class WorkedDesign:
     aim: float
     stiffness: float
     stroke: float
-    cases: tuple[RigCase, ...]
+    cases: tuple[ThesisCase, ...]
     margin: float
 
     @property
@@ -109,15 +109,15 @@ class Worked:
 
     rates: Mapping[str, float]
     machines: tuple[WorkedMachine, ...]
-    friction: tuple[RigCase, ...]
+    friction: tuple[ThesisCase, ...]
     bound: float
     safe: float
     needs: tuple[IsolatorNeed, ...]
     designs: tuple[tuple[WorkedDesign, ...], ...]
-    studies: Mapping[str, tuple[RigCase, ...]]
+    studies: Mapping[str, tuple[ThesisCase, ...]]
 
     @property
-    def worst(self) -> RigCase:
+    def worst(self) -> ThesisCase:
         """The case of the friction range with the highest computed edge, or one of which it is not known."""
         return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
 

@@ -26,8 +26,8 @@ from friso.studies.rig.experiments.frf import (
 from friso.studies.rig.experiments.in_position import InPosition, in_position
 from friso.studies.rig.experiments.measured_cycles import MOTORS, on_rail, started, varied
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover, stroke_crossover
-from friso.studies.rig.hunted import (
-    Hunted,
+from friso.studies.rig.moves_on_rails import (
+    RailRuns,
     crossover,
     distance,
     follow,
@@ -85,9 +85,9 @@ class MovesOnRails:
     (rails,); releases with it locked at the second, shape (displacements, rails). Crossovers [Hz]."""
 
     crossovers: np.ndarray
-    locked: Hunted
-    free: Hunted
-    released: Hunted
+    locked: RailRuns
+    free: RailRuns
+    released: RailRuns
 
 
 @dataclass(frozen=True)
@@ -96,10 +96,10 @@ class CyclesOnRails:
     their friction about the target; `weak` is the even rail again, one run, with a motor so weak that the mass line
     shows the mass measured (`MOTORS`) and `COULOMB_LEVEL` times the Coulomb friction."""
 
-    even: Hunted
-    rails: Hunted
+    even: RailRuns
+    rails: RailRuns
     asymmetry: np.ndarray
-    weak: Hunted
+    weak: RailRuns
 
 
 def as_built(stage: Stage) -> Stage:

@@ -14,6 +14,9 @@ TEXT = 3.0
 ARROW = 2.4
 """Length of an arrowhead [mm]."""
 
+REACH = 2.0
+"""Length of the level part of the line of a note [mm]."""
+
 OVER = 1.5
 """How far an extension line goes beyond the dimension line [mm]."""
 
@@ -126,9 +129,9 @@ def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]
     return [*parts, words((x - 0.9, y1 - ARROW - 2), text, upright=True)]
 
 
-def leader(tip: Point, knee: Point, lines: list[str], reach: float = 2.0) -> list[str]:
+def leader(tip: Point, knee: Point, lines: list[str]) -> list[str]:
     """A note with a line that ends in an arrow at `tip`: from the knee it goes on level, to the right."""
-    end = (knee[0] + reach, knee[1])
+    end = (knee[0] + REACH, knee[1])
     parts = [path([tip, knee, end], "thin"), arrow(tip, (tip[0] - knee[0], tip[1] - knee[1]))]
     return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
 

@@ -9,7 +9,7 @@ from friso.hunting.edges import OF
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.claims import claims
 from friso.studies.guideline.laws import FittedLaw
-from friso.studies.guideline.thesis_rig import RigCase
+from friso.studies.guideline.thesis_rig import ThesisCase
 from friso.studies.guideline.worked import WorkedDesign
 from friso.version import VERSION
 from friso.views.documents import plain_json
@@ -31,7 +31,7 @@ def guideline_document(guideline: Guideline) -> dict[str, Any]:
             "groups": {name: asdict(count) | {"groups": count.groups} for name, count in guideline.counts.items()},
             "ranges": {row["written"]: row["range"] for row in group_rows(guideline) if row["range"]},
             "laws": {"locked": _law(guideline.locked), "free": _law(guideline.free)},
-            "rig": {
+            "thesis_rig": {
                 "rates_hz": dict(steps.rates),
                 "machines": [asdict(machine) for machine in steps.machines],
                 "friction": [_case(case) for case in steps.friction],
@@ -58,7 +58,7 @@ def _designed(design: WorkedDesign) -> dict[str, Any]:
     }
 
 
-def _case(case: RigCase) -> dict[str, Any]:
+def _case(case: ThesisCase) -> dict[str, Any]:
     return {"changes": dict(case.changes), "law_hz": case.law, "computed_hz": case.computed, "kind": case.kind}
 
 

@@ -10,7 +10,7 @@ from friso.hunting.edges import FLIP, FOLD, JUMP, LOST
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.sweeps import Sweep
 from friso.studies.guideline.thesis_rig import Laws, plain
-from friso.studies.guideline.worked import STUDIED, RigCase
+from friso.studies.guideline.worked import STUDIED, ThesisCase
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,
@@ -49,7 +49,7 @@ FINER = 10
 
 def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
     """All charts, in the order of the page."""
-    return _locked(guideline), _free(guideline), _stroke(guideline), _against(guideline), _rig(guideline)
+    return _locked(guideline), _free(guideline), _stroke(guideline), _against(guideline), _thesis_rig(guideline)
 
 
 def _locked(guideline: Guideline) -> Figure:
@@ -146,7 +146,7 @@ def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Pan
     )
 
 
-def _rig(guideline: Guideline) -> Figure:
+def _thesis_rig(guideline: Guideline) -> Figure:
     """The thesis rig with one thing changed at a time."""
     laws = Laws(guideline.locked.law, guideline.free.law)
     panels = tuple(_studied(title, x, guideline.worked.studies[name], laws) for name, (title, x) in PANELS.items())
@@ -157,7 +157,7 @@ def _rig(guideline: Guideline) -> Figure:
         flat["joint.stroke"] * 1e3,
     )
     caption = f"Lines: the laws. Points: computed edges. The rig has {mass:g} kg, {stiffness:g} N/mm, {stroke:g} mm."
-    return Figure("guideline_rig", "The thesis rig", caption, panels, 2)
+    return Figure("guideline_thesis_rig", "The thesis rig", caption, panels, 2)
 
 
 PANELS: Mapping[str, tuple[str, Axis]] = {
@@ -168,7 +168,7 @@ PANELS: Mapping[str, tuple[str, Axis]] = {
 }
 
 
-def _studied(title: str, x: Axis, cases: Sequence[RigCase], laws: Laws) -> Panel:
+def _studied(title: str, x: Axis, cases: Sequence[ThesisCase], laws: Laws) -> Panel:
     name = next(name for name, (heading, _) in PANELS.items() if heading == title)
     at, computed = np.array([(STUDIED[name](case.changes), case.computed) for case in cases]).T
     places = np.linspace(0, len(cases) - 1, FINER * (len(cases) - 1) + 1)

@@ -20,7 +20,7 @@ from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors
 from friso.studies.guideline.parasitic import DRIVE
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
-from friso.studies.guideline.thesis_rig import RigCase, plain
+from friso.studies.guideline.thesis_rig import ThesisCase, plain
 from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
 from friso.version import VERSION
 from friso.views.files import Content, pictures
@@ -142,13 +142,14 @@ def _between(low: float, high: float) -> str:
 
 
 def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
-    """One row per group: how it is written, what it means, its range in the sweeps, and its value for the rig."""
+    """One row per group: how it is written, what it means, its range in the sweeps, and its value for the thesis's
+    rig."""
     ranges = dict(LOCKED_BOX) | {name: ends for name, ends in JOINT_BOX.items() if name in GROUPS}
     used = guideline.free.sweep.usable
     ranges["joint"] = _span(used.values["joint"])
     edges = (guideline.locked.sweep.usable.edge, used.edge)
     ranges["crossover"] = _span(np.concatenate(edges))
-    rig_values = values_of(plain("joint"))
+    thesis_values = values_of(plain("joint"))
     return [
         {
             "name": name,
@@ -156,7 +157,7 @@ def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
             "meaning": group.meaning,
             "part": group.part,
             "range": ranges.get(name),
-            "rig": rig_values.get(name),
+            "thesis": thesis_values.get(name),
         }
         for name, group in GROUPS.items()
     ]
@@ -172,7 +173,7 @@ def _span_text(ends: tuple[float, float]) -> str:
     return low if low == high else f"{low} to {high}"
 
 
-def _rows(name: str, cases: tuple[RigCase, ...]) -> list[tuple[float, float, float]]:
+def _rows(name: str, cases: tuple[ThesisCase, ...]) -> list[tuple[float, float, float]]:
     """What a study varies, the edge by the law, and that computed."""
     return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
 

@@ -9,7 +9,7 @@ from friso.studies.guideline import Guideline
 from friso.studies.guideline.groups import GROUPS
 from friso.studies.guideline.laws import REFERENCE, FittedLaw
 from friso.studies.guideline.parasitic import ParasiticLimits
-from friso.studies.guideline.thesis_rig import RigCase
+from friso.studies.guideline.thesis_rig import ThesisCase
 from friso.views.drawing.prefixes import listed
 
 BASES = {
@@ -81,7 +81,7 @@ def accuracy(guideline: Guideline) -> list[str]:
     ]
 
 
-def parasitic_edges(cases: Sequence[RigCase]) -> str:
+def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
     """How far the parasitic mode moves the edge of hunting."""
     edges = [case.computed for case in cases if math.isfinite(case.computed)]
     if not edges:

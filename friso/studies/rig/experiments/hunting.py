@@ -14,8 +14,8 @@ import numpy as np
 from friso.progress import Progress
 from friso.rig.run import Recorded
 from friso.stage import Stage
-from friso.studies.rig.hunted import (
-    Hunted,
+from friso.studies.rig.moves_on_rails import (
+    RailRuns,
     at_crossovers,
     distance,
     follow,
@@ -79,9 +79,9 @@ class HuntingResult:
     distance: float
     crossovers: np.ndarray
     rails: np.ndarray
-    cases: Mapping[str, Hunted]
+    cases: Mapping[str, RailRuns]
     displacements: np.ndarray
-    started: Hunted
+    started: RailRuns
     plotted: tuple[int, ...]
     rail: int
     traces: Mapping[tuple[str, int], Trace]
@@ -140,7 +140,7 @@ def machine_file(stage: Stage, rail: float) -> Stage:
     return stage if stage.rail is None else stage.replace({"rail.seed": rail})
 
 
-def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, progress: Progress) -> Hunted:
+def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, progress: Progress) -> RailRuns:
     """Releases at crossovers [Hz] on all rails, shape (displacements, crossovers, rails)."""
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     numbers = numbers_of(seed, len(frequencies), len(seeds))
@@ -150,7 +150,7 @@ def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarra
 
 
 def _startable(
-    stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, moved: Hunted, started: Hunted
+    stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, moved: RailRuns, started: RailRuns
 ) -> Startable | None:
     """Among the rails on which no peaks are counted after the move, those which swing at the end after a release, one
     at the lowest crossover."""

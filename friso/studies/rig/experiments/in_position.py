@@ -17,7 +17,7 @@ from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import MoveTask, standing
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.studies.rig.hunted import crossover, crossover_key, move, with_joint
+from friso.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import interval
 

@@ -21,8 +21,8 @@ from friso.rig.rail import friction_factors
 from friso.rig.task import MoveTask
 from friso.stage import Stage
 from friso.studies.rig.experiments.hunting import Trace
-from friso.studies.rig.hunted import (
-    Hunted,
+from friso.studies.rig.moves_on_rails import (
+    RailRuns,
     crossover,
     distance,
     follow,
@@ -85,29 +85,29 @@ class CycleComparison:
     with its deviation, length [m] and seed.
     """
 
-    even: Hunted
+    even: RailRuns
     deviations: np.ndarray
     lengths: np.ndarray
-    field: Hunted
+    field: RailRuns
     asymmetry: np.ndarray
     harmonics: np.ndarray
     pitch: float
-    rolling: Hunted
+    rolling: RailRuns
     rolling_asymmetry: np.ndarray
-    levels: Hunted
-    others: Mapping[str, Hunted]
+    levels: RailRuns
+    others: Mapping[str, RailRuns]
     traces: tuple[Trace, Trace | None]
     slowest: tuple[float, float, float] | None
 
-    def slower(self, runs: Hunted) -> np.ndarray:
+    def slower(self, runs: RailRuns) -> np.ndarray:
         """Periods over that of the even rail, NaN of runs that do not swing at their end."""
         return np.where(runs.swings, runs.period, np.nan) / self.even.period[0]
 
-    def larger(self, runs: Hunted) -> np.ndarray:
+    def larger(self, runs: RailRuns) -> np.ndarray:
         """Swings over that of the even rail, NaN of runs that do not swing at their end."""
         return np.where(runs.swings, runs.swing, np.nan) / self.even.swing[0]
 
-    def as_measured(self, runs: Hunted) -> np.ndarray:
+    def as_measured(self, runs: RailRuns) -> np.ndarray:
         """Which runs have nearly twice the period of the even rail at a similar swing."""
         swing = self.larger(runs)
         return (self.slower(runs) >= AS_SLOW) & (swing <= SIMILAR) & (swing >= 1 / SIMILAR)
@@ -182,13 +182,13 @@ def _longer(task: MoveTask) -> MoveTask:
     return replace(task, duration=LONGER * task.duration)
 
 
-def started(stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, what: str) -> Hunted:
+def started(stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, what: str) -> RailRuns:
     """What became of machines, shape (count,), at the first start after which each swings on; else after the move."""
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [follow(stage, _longer(task), [seed] * count, changes, progress, what) for task in tasks]
     every = joined(runs).shaped(len(tasks), count)
     first = np.argmax(every.swings, axis=0)
-    return Hunted(**{entry.name: getattr(every, entry.name)[first, np.arange(count)] for entry in fields(Hunted)})
+    return RailRuns(**{entry.name: getattr(every, entry.name)[first, np.arange(count)] for entry in fields(RailRuns)})
 
 
 def varied(
@@ -199,7 +199,7 @@ def varied(
     swing: float,
     progress: Progress,
     what: str,
-) -> tuple[Hunted, np.ndarray]:
+) -> tuple[RailRuns, np.ndarray]:
     """Moves on all rails of all cases, shape (cases * rails,), and the asymmetry of friction about their targets."""
     count = len(next(iter(cases.values())))
     changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
@@ -211,7 +211,7 @@ def varied(
     return followed, np.diff(np.log(at), axis=1)[:, 0]
 
 
-def levels(stage: Stage, seed: int, progress: Progress) -> Hunted:
+def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
     """Cycles with other motors and friction levels, shape (motors, static, coulomb); static friction is at least as
     large as Coulomb friction."""
     flat = stage.flat()
@@ -223,7 +223,7 @@ def levels(stage: Stage, seed: int, progress: Progress) -> Hunted:
     return cycles.shaped(len(MOTORS), len(STATIC), len(COULOMB))
 
 
-def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
+def others(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
     """Cycles with one thing changed, by its name."""
     flat = stage.flat()
     mass = flat[TUNED_MASS]
@@ -248,7 +248,7 @@ def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
     lanes = {key: np.array([changes.get(key, ideal[key]) for changes in changed.values()]) for key in keys}
     cycles = started(stage, seed, lanes, len(changed), progress, "other drives")
     return {
-        name: Hunted(**{entry.name: getattr(cycles, entry.name)[[row]] for entry in fields(Hunted)})
+        name: RailRuns(**{entry.name: getattr(cycles, entry.name)[[row]] for entry in fields(RailRuns)})
         for row, name in enumerate(changed)
     }
 

@@ -11,8 +11,8 @@ import numpy as np
 
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.studies.rig.hunted import (
-    Hunted,
+from friso.studies.rig.moves_on_rails import (
+    RailRuns,
     crossover,
     crossover_key,
     follow,
@@ -41,7 +41,7 @@ class StrokeCrossover:
     crossovers: np.ndarray
     rails: np.ndarray
     frequency: float
-    runs: Hunted
+    runs: RailRuns
 
     @property
     def share(self) -> np.ndarray:

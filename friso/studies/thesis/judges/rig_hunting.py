@@ -9,7 +9,7 @@ import numpy as np
 from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
-from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
 from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges, number_text
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
@@ -32,7 +32,7 @@ _RECOVERED = 0.5
 """Share of a difference from which a thing is taken for its cause."""
 
 
-def _counted(runs: Hunted, which: Any = ...) -> tuple[int, int]:
+def _counted(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
     """On how many runs peaks are counted, of how many."""
     done = ~runs.failed[which]
     return int((runs.counted[which] & done).sum()), int(done.sum())

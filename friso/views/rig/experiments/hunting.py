@@ -10,7 +10,7 @@ from friso.axis import axis_shown
 from friso.hunting.criteria.peak_count import COUNTED_ABOVE, CRITERION, DISTINCT_CRITERION
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
-from friso.studies.rig.hunted import BAND, Hunted
+from friso.studies.rig.moves_on_rails import BAND, RailRuns
 from friso.studies.rig.outcome import Outcome
 from friso.studies.shares import Share
 from friso.views.drawing.figure import (
@@ -212,7 +212,7 @@ def _startable(moves: HuntingResult) -> Figure:
 CRITERIA = {"outcome": OUTCOME, "band_m": BAND, "distinct_peaks": DISTINCT_CRITERION}
 
 
-def runs_document(runs: Hunted) -> dict[str, Any]:
+def runs_document(runs: RailRuns) -> dict[str, Any]:
     """What became of runs, as a document: arrays of the shape of the runs."""
     return {
         "distinct_peaks": runs.peaks.tolist(),

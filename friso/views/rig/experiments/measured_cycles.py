@@ -15,7 +15,7 @@ from friso.studies.rig.experiments.measured_cycles import (
     STATIC,
     CycleComparison,
 )
-from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
 from friso.views.drawing.prefixes import with_unit
@@ -274,7 +274,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     }
 
 
-def _cycle_document(runs: Hunted) -> dict[str, Any]:
+def _cycle_document(runs: RailRuns) -> dict[str, Any]:
     sides = {"above_m": runs.above, "below_m": runs.below, "rising_share": runs.rising}
     scatter = {"period_scatter": runs.period_scatter, "height_scatter": runs.height_scatter}
     return runs_document(runs) | sides | scatter

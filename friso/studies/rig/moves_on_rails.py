@@ -117,7 +117,7 @@ def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
 
 
 @dataclass(frozen=True)
-class Hunted:
+class RailRuns:
     """What became of runs, each of shape (runs,).
 
     The number of distinct `peaks` (see `friso.hunting.criteria.peak_count`); what it did at its end (`outcome`, words
@@ -153,9 +153,9 @@ class Hunted:
         """Which runs have a peak that counts."""
         return self.peaks > 0
 
-    def shaped(self, *shape: int) -> Hunted:
+    def shaped(self, *shape: int) -> RailRuns:
         """With arrays of another shape."""
-        return Hunted(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
+        return RailRuns(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
 
     def share(self, which: Any = ...) -> Share:
         """The share of some runs that have a peak that counts, with its 95 % interval."""
@@ -168,10 +168,10 @@ def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[st
     return recorded
 
 
-def joined(parts: list[Hunted]) -> Hunted:
+def joined(parts: list[RailRuns]) -> RailRuns:
     """What became of several lots of runs, one after the other."""
-    return Hunted(
-        **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Hunted)}
+    return RailRuns(
+        **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(RailRuns)}
     )
 
 
@@ -182,17 +182,17 @@ def follow(
     changes: Mapping[str, Any],
     progress: Progress = silent,
     what: str = "",
-) -> Hunted:
+) -> RailRuns:
     """Runs of a task and what became of them; the samples are forgotten chunk by chunk."""
-    parts: list[Hunted] = []
+    parts: list[RailRuns] = []
     progress(0, len(seeds), what)
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
-        parts.append(hunted(chunk))
+        parts.append(rail_runs(chunk))
         progress(int(chunk.numbers[-1]) + 1, len(seeds), what)
     return joined(parts)
 
 
-def hunted(recorded: Recorded) -> Hunted:
+def rail_runs(recorded: Recorded) -> RailRuns:
     """What became of the runs of a chunk, by the position as the drive logs it."""
     time, failed = recorded.time, recorded.statuses != Status.DONE
     deviation = recorded.logged["position"] - recorded.logged["reference"]
@@ -211,7 +211,7 @@ def hunted(recorded: Recorded) -> Hunted:
     above, below, rising, periods, heights = np.array(shapes).T * valid
     counted = np.where(failed, 0, peaks_in_traces(time, deviation))
     words = outcomes(end, BAND)
-    return Hunted(counted, words, swing * valid, ending.period * valid, above, below, rising, periods, heights)
+    return RailRuns(counted, words, swing * valid, ending.period * valid, above, below, rising, periods, heights)
 
 
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -224,7 +224,7 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
     """The swings in the last half of a run, from its turning points, times [s] and values [m]: above, below,
-    rising, scatter of period and of height, as in `Hunted`."""
+    rising, scatter of period and of height, as in `RailRuns`."""
     nothing = (np.nan,) * 5
     if not swing > max(DISTINCT, 2 * BAND):
         return nothing
