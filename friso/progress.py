@@ -8,18 +8,18 @@ from typing import Protocol
 class Progress(Protocol):
     """Called with the steps done, the total number of steps (0: unknown), and what is being done now."""
 
-    def __call__(self, done: int, total: int, what: str, /) -> None: ...
+    def __call__(self, done: int, total: int, label: str, /) -> None: ...
 
 
-def silent(done: int, total: int, what: str) -> None:
+def silent(done: int, total: int, label: str) -> None:
     """Progress that is not shown."""
 
 
 def share_of(progress: Progress, number: int, count: int) -> Progress:
     """The progress of one of `count` equal pieces of work, the one with this number from 0 on, within that of all."""
 
-    def report(done: int, total: int, what: str, /) -> None:
-        progress(PERCENT * number + (PERCENT * done // total if total else 0), PERCENT * count, what)
+    def report(done: int, total: int, label: str, /) -> None:
+        progress(PERCENT * number + (PERCENT * done // total if total else 0), PERCENT * count, label)
 
     return report
 
@@ -34,7 +34,7 @@ class Tally:
     def __init__(self, progress: Progress, total: int) -> None:
         self.progress, self.total, self.done = progress, total, 0
 
-    def add(self, steps: int, what: str) -> None:
-        """So many more steps are done; `what` is being done now."""
+    def add(self, steps: int, label: str) -> None:
+        """So many more steps are done; `label` says what is being done now."""
         self.done += steps
-        self.progress(self.done, self.total, what)
+        self.progress(self.done, self.total, label)

@@ -117,12 +117,12 @@ def test_a_drive_without_a_clock_gets_one(built: Stage) -> None:
 
 
 def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
-    stages = {each.letter: each.stage.flat() for each in every.every}
+    stages = {each.letter: each.stage.flat() for each in every.options}
     assert "".join(stages) == "abcdefg"
     assert [letter for letter, flat in stages.items() if not flat["joint.locked"]] == ["c", "g"]
     assert stages["d"]["drive.integrator_deadband"] == pytest.approx(DEADBAND * 1e-6)
     assert [letter for letter, flat in stages.items() if flat["drive.integrator_reset"]] == ["e"]
-    ahead = every.every[5].changes
+    ahead = every.options[5].changes
     assert {*ahead} == {"drive.feedforward_coulomb", "drive.feedforward_viscous"}
     for key in ("coulomb", "viscous"):
         off = ahead[f"drive.feedforward_{key}"] / machines.keys[f"friction.{key}"]
@@ -131,7 +131,7 @@ def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
 
 @pytest.mark.parametrize("letter", ["b", "g"])
 def test_faster_up_to_the_margin(every: CompareOptions, letter: str) -> None:
-    option = next(each for each in every.every if each.letter == letter)
+    option = next(each for each in every.options if each.letter == letter)
     assert option.factor > 1.2
     assert option.stage.flat()["controller.crossover"] == pytest.approx(8 * option.factor)
     own = linear_flat(option.stage, option.stage.flat())
@@ -142,7 +142,7 @@ def test_faster_up_to_the_margin(every: CompareOptions, letter: str) -> None:
 
 
 def test_margins_of_many_are_those_of_each(every: CompareOptions, machines: Machines) -> None:
-    option = every.every[2]
+    option = every.options[2]
     loops = linear_loops(option.stage, linear_flat(option.stage, machines.flat(option.stage, {})), machines.count)
     for number in (0, int(np.where(loops.stable, loops.margin, np.inf).argmin())):
         own = {key: float(values[number]) for key, values in machines.keys.items()}
@@ -176,11 +176,11 @@ def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, str] 
 def test_a_weak_motor_leaves_room_for_bandwidth(built: Stage) -> None:
     weak = built.replace(RIGID | {"drive.motor_constant_ratio": 0.8})
     known, other = (options(draw_machines(each, Correlations(), 20, 1), 1e-6) for each in (built.replace(RIGID), weak))
-    assert other.every[1].factor > 1.02 * known.every[1].factor
+    assert other.options[1].factor > 1.02 * known.options[1].factor
 
 
 def test_unstable_loops_are_told(machines: Machines, every: CompareOptions) -> None:
-    fast = every.every[0].stage.replace({"controller.crossover": "390 Hz"})
+    fast = every.options[0].stage.replace({"controller.crossover": "390 Hz"})
     loops = linear_loops(fast, linear_flat(fast, machines.flat(fast, {})), machines.count)
     assert not loops.stable.any()
     assert not loops.margin.any()
@@ -189,7 +189,7 @@ def test_unstable_loops_are_told(machines: Machines, every: CompareOptions) -> N
 
 def test_without_a_joint_it_is_said(built: Stage, snapshots: Snapshots) -> None:
     found = options(draw_machines(built.replace(RIGID), Correlations(), 20, 1), 1e-6)
-    assert [each.letter for each in found.every] == ["a", "b", "d", "e", "f"]
+    assert [each.letter for each in found.options] == ["a", "b", "d", "e", "f"]
     assert {*found.left_out} == {*"cg"}
     snapshots.check("compare", "no joint", found.left_out["c"])
 
@@ -199,7 +199,7 @@ def test_gains_instead_of_rules(built: Stage, snapshots: Snapshots) -> None:
     found = options(draw_machines(built.replace(RIGID | {"controller": gains}), Correlations(), 20, 1), 1e-6)
     assert {*"de"} <= {*found.left_out}
     snapshots.check("compare", "no integral action", "\n".join(found.left_out[letter] for letter in "de"))
-    faster = found.every[1]
+    faster = found.options[1]
     assert faster.stage.flat()["controller.kp"] == pytest.approx(2000 * faster.factor**2)
 
 
@@ -384,7 +384,7 @@ def made_up(every: CompareOptions, machines: Machines) -> Comparison:
     rms = {"a": np.full(count, 2e-9), "c": np.full(count, 1e-9)}
     results = tuple(
         Result(
-            every.every["abc".index(letter)],
+            every.options["abc".index(letter)],
             measures.MachineMeasures(
                 np.full(count, "rests"), np.zeros(count, int), settling[letter], rms[letter], np.ones(count)
             ),

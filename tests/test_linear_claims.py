@@ -14,7 +14,12 @@ from friso.frequency.family import spectral_abscissa
 from friso.frequency.members import Members, joined, limit_cases
 from friso.studies.thesis import Evidence, Finding, thesis_rig
 from friso.studies.thesis.claims import registered
-from friso.studies.thesis.judges.series_stiffness import PRINTED_SENSITIVITY, PRINTED_STIFFNESS, compare, in_the_plant
+from friso.studies.thesis.judges.series_stiffness import (
+    PRINTED_SENSITIVITY,
+    PRINTED_STIFFNESS,
+    in_the_plant,
+    judged_formulas,
+)
 from friso.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, Springs, analysed
 from friso.studies.thesis.linear.speeds import abscissa_with_bristles
 from friso.studies.thesis.open_parameters import METHOD, OPEN
@@ -109,9 +114,17 @@ def test_every_linear_claim_is_tried_both_ways() -> None:
 
 
 def test_printed_formulas() -> None:
-    assert all(part.holds for part in compare(PRINTED_STIFFNESS, PRINTED_SENSITIVITY))
-    assert [part.holds for part in compare(PRINTED_STIFFNESS, sp.sqrt(PRINTED_SENSITIVITY))] == [True, False, True]
-    assert [part.holds for part in compare(2 * PRINTED_STIFFNESS, 1 + PRINTED_SENSITIVITY)] == [False, False, False]
+    assert all(part.holds for part in judged_formulas(PRINTED_STIFFNESS, PRINTED_SENSITIVITY))
+    assert [part.holds for part in judged_formulas(PRINTED_STIFFNESS, sp.sqrt(PRINTED_SENSITIVITY))] == [
+        True,
+        False,
+        True,
+    ]
+    assert [part.holds for part in judged_formulas(2 * PRINTED_STIFFNESS, 1 + PRINTED_SENSITIVITY)] == [
+        False,
+        False,
+        False,
+    ]
 
 
 def test_the_plant_against_eq_1(linear: Linear) -> None:

@@ -115,9 +115,9 @@ def read_stage(
     keys = [] if uncertain_too else [*stage.uncertain()]
     if keys:
         several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
-        some = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
+        named = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
         centres = "their centres are" if len(keys) > 1 else "its centre is"
-        say(f"{several} uncertain ({some}): {centres} used; friso check --draws 1000 samples the whole range")
+        say(f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range")
     left = [name for name in leaves_out if getattr(stage, name)]
     if left:
         tables = ", ".join(f"[{name}]" for name in left)

@@ -59,11 +59,11 @@ def edges_over(
     high: float,
     steps: int,
     progress: Progress = silent,
-    what: str = "",
+    label: str = "",
 ) -> Corners:
     """The edges of the stage `flat` in all corners, tuned by van Dijk's rules: on a grid of so many `steps` from `high`
     down to `low` [Hz], as far as to the first point at which anything attracts, and between that and the one above.
-    `what` names the search to the progress."""
+    `label` names the search to the progress."""
     ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
     inside, outside, undecided = np.full(count, -np.inf), np.full(count, np.inf), np.zeros(count, bool)
@@ -74,12 +74,12 @@ def edges_over(
         inside[which[attract]], undecided[which[attract]] = crossover[attract], ~decided[attract]
 
     for k, point in enumerate(grid[::-1]):
-        progress(k, steps + ROUNDS, what)
+        progress(k, steps + ROUNDS, label)
         if (left := np.flatnonzero(np.isneginf(inside))).size:
             survey(left, np.full(left.size, point))
     between = np.flatnonzero(np.isfinite(inside) & np.isfinite(outside))
     for k in range(ROUNDS if between.size else 0):
-        progress(steps + k, steps + ROUNDS, what)
+        progress(steps + k, steps + ROUNDS, label)
         survey(between, (inside[between] + outside[between]) / 2)
     edges = np.where(np.isneginf(inside), 0.0, np.exp((inside + outside) / 2))
     return Corners(population, edges, (low, high), int(undecided.sum()))
@@ -89,8 +89,8 @@ def edges_over(
 def _attract(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
     whether they decided that."""
-    some = ensemble.take(which)
-    survey = attractors(Ensemble.held({**some.flat, CROSSOVER: np.exp(crossover)}, len(which)), rtol=RTOL)
+    chosen = ensemble.take(which)
+    survey = attractors(Ensemble.held({**chosen.flat, CROSSOVER: np.exp(crossover)}, len(which)), rtol=RTOL)
     return survey.attracts | ~survey.decided, survey.decided
 
 

@@ -86,5 +86,5 @@ def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming
     ends = [grid(faster(flat, np.array(end / bandwidth(flat))), DENSITY) for end in searched(flat)]
     zeta = float(leaves.mechanism.damping_ratio)
     about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
-    every = np.unique(np.concatenate([*ends, *about]))
-    return every[(every > 0) & (every < drive.highest)]
+    frequencies = np.unique(np.concatenate([*ends, *about]))
+    return frequencies[(frequencies > 0) & (frequencies < drive.highest)]

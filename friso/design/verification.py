@@ -135,16 +135,16 @@ def tried(
     count: int,
     window: float,
     progress: Progress = silent,
-    what: str = "moves",
+    label: str = "moves",
     patient: bool = True,
 ) -> MachineOutcomes:
     """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
     again, for longer."""
-    first = _followed(flat, count, window, FOLLOWED, progress, what)
+    first = _followed(flat, count, window, FOLLOWED, progress, label)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
-        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, silent, what)
+        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, silent, label)
         better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
         for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
@@ -152,7 +152,7 @@ def tried(
 
 
 def _followed(
-    flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, what: str
+    flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
 ) -> MachineOutcomes:
     """The moves, each followed for a time [s] after its last corner."""
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
@@ -169,7 +169,7 @@ def _followed(
         outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)
         outcome.swing[numbers] = end.swing
         done += len(numbers)
-        progress(done, count, what)
+        progress(done, count, label)
     return outcome
 
 

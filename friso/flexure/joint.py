@@ -66,8 +66,8 @@ class VisibleModes:
             np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
             for quantity in (self.frequency, self.residue)
         ]
-        some = self.visible.any(axis=-1)
-        return np.where(some, picked[0], np.inf)[()], np.where(some, picked[1], 0.0)[()]
+        visible = self.visible.any(axis=-1)
+        return np.where(visible, picked[0], np.inf)[()], np.where(visible, picked[1], 0.0)[()]
 
 
 def first_interfering(mechanism: Mechanism) -> Any:

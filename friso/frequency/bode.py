@@ -105,9 +105,9 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     together = joined([*limit_cases(flat).values()])
     resonant = [closed(flat, together), modes(flat, together)]
     omega = with_resonances(np.geomspace(low, high, POINTS) * 2 * np.pi, resonant)
-    every = scan(flat, family(flat))
-    worst = every.members[every.worst()]
-    settled = every.members[every.worst(every.members.settled)]
+    scanned = scan(flat, family(flat))
+    worst = scanned.members[scanned.worst()]
+    settled = scanned.members[scanned.worst(scanned.members.settled)]
     variants = stage.variants()
     return Bode(
         stage=stage,
@@ -121,11 +121,11 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
             )
             for name, (keys, member) in states.items()
         },
-        scan=every,
-        loops=loops(flat, every.members, omega),
+        scan=scanned,
+        loops=loops(flat, scanned.members, omega),
         worst=(worst, margins(flat, worst)),
         settled=(settled, margins(flat, settled)),
-        unstable=_unstable(flat, every.members),
+        unstable=_unstable(flat, scanned.members),
         prescribed=_prescribed(flat, omega),
         limits={
             name: limits(member.flat()) for name, member in variants.items() if name != "given" or len(variants) == 1
@@ -161,16 +161,16 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
     states = joined([member(speed, touched=touched) for speed in PRESCRIBED])
-    every = zip(PRESCRIBED, spectral_abscissa(flat, states) < 0, strict=True)
+    stable = spectral_abscissa(flat, states) < 0
     return tuple(
-        Prescribed(speed, response(flat, states[k], DriveTiming.of(flat))(omega), bool(stable))
-        for k, (speed, stable) in enumerate(every)
+        Prescribed(speed, response(flat, states[k], DriveTiming.of(flat))(omega), bool(stable[k]))
+        for k, speed in enumerate(PRESCRIBED)
     )
 
 
-def _unstable(flat: Mapping[str, Any], every: Members) -> tuple[Unstable, ...]:
+def _unstable(flat: Mapping[str, Any], members: Members) -> tuple[Unstable, ...]:
     """The ranges of speed at which the stage is not stable, for each state of the limiter and direction."""
-    sliding = every[~every.stuck]
+    sliding = members[~members.stuck]
     ranges = []
     for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):
         alike = sliding[(sliding.touched == touched) & (sliding.forward != backward)]

@@ -110,8 +110,8 @@ def settled_margin(flat: Mapping[str, Any]) -> float:
 def settled_members(flat: Mapping[str, Any]) -> Members:
     """Limit cases, and those that are stuck under a bias force: what a stage is in unless it creeps or just broke away,
     when its friction falls with the speed."""
-    every = family(flat, BIASES, 2)
-    return joined([*limit_cases(flat).values(), every[every.stuck]])
+    members = family(flat, BIASES, 2)
+    return joined([*limit_cases(flat).values(), members[members.stuck]])
 
 
 def _stated(flat: Mapping[str, Any]) -> float:

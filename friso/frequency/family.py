@@ -127,8 +127,8 @@ def grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
 def closed(flat: Mapping[str, Any], members: Members) -> Complex:
     """Finite closed-loop poles [rad/s] of members."""
     drive = DriveTiming.of(flat)
-    every = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
-    return every[np.isfinite(every)]
+    roots = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
+    return roots[np.isfinite(roots)]
 
 
 def modes(flat: Mapping[str, Any], members: Members) -> Complex:

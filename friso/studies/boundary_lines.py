@@ -143,11 +143,11 @@ class Change(NamedTuple):
 def changes_of(result: Diagram) -> list[Change]:
     """Where hunting begins and ends over the range, in order."""
     values = _values(result.space, result.places[:, None])[:, 0]
-    sure = [(value, word) for value, word in zip(values.tolist(), place_verdicts(result), strict=True)]
-    sure = [(value, word == ATTRACTS) for value, word in sure if word in (ATTRACTS, REPELS)]
+    decided = [(value, word) for value, word in zip(values.tolist(), place_verdicts(result), strict=True)]
+    decided = [(value, word == ATTRACTS) for value, word in decided if word in (ATTRACTS, REPELS)]
     turns = turns_of(result)
     changes = []
-    for (low, before), (high, after) in pairwise(sure):
+    for (low, before), (high, after) in pairwise(decided):
         if before != after:
             inside = [value for value, begins in turns if begins == after and low <= value <= high]
             at = (min(inside) if after else max(inside)) if inside else None

@@ -97,8 +97,8 @@ def different(stage: Stage) -> dict[str, Stage]:
 def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
     words = np.full(sample.count, "failed", dtype=object)
     for first in range(0, sample.count, CHUNK):
-        some = slice(first, min(first + CHUNK, sample.count))
-        keys = {key: values[some] for key, values in sample.keys.items()}
-        words[some] = judge_many(laid_over(stage, keys), some.stop - first, rtol)
-        tally.add(some.stop - first, "draws")
+        chunk = slice(first, min(first + CHUNK, sample.count))
+        keys = {key: values[chunk] for key, values in sample.keys.items()}
+        words[chunk] = judge_many(laid_over(stage, keys), chunk.stop - first, rtol)
+        tally.add(chunk.stop - first, "draws")
     return Fates(words)

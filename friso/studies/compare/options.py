@@ -62,7 +62,7 @@ class Option:
 class CompareOptions:
     """Those that the stage can have, a to g; why others are left out; and the deadband of the integrator [m]."""
 
-    every: tuple[Option, ...]
+    options: tuple[Option, ...]
     left_out: Mapping[str, str]
     deadband: float
 

@@ -182,16 +182,16 @@ def compare(
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     corner = _corner(machines.stage)
     progress(0, 1, "how fast the controller may be")
-    every = options(machines, within)
-    work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(every.every))
+    tried = options(machines, within)
+    work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(tried.options))
     results: list[Result] = []
-    for option in every.every:
+    for option in tried.options:
         measures, later = work.runs(option, len(results)), work.longer(option)
         loops = {result.letter: result.loops for result in results}
         results.append(Result(option, measures, later, loops.get(option.loop) or _loops(machines, option)))
-    left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in every.left_out.items()]
+    left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in tried.left_out.items()]
     notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
-    return Comparison(machines, every, tuple(results), within, seed, notes)
+    return Comparison(machines, tried, tuple(results), within, seed, notes)
 
 
 def _corner(stage: Stage) -> float:
@@ -232,15 +232,15 @@ class _Work:
     def longer(self, option: Option) -> Later:
         """An option on the first machines, for longer."""
         task = replace(self.task, duration=LONGER * self.task.duration)
-        some = min(FOLLOWED, self.machines.count)
-        return joined([followed(recorded, self.within) for recorded in self._recorded(option, task, some, LONGER)])
+        count = min(FOLLOWED, self.machines.count)
+        return joined([followed(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)])
 
     def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[Recorded]:
         """The runs of the first machines, chunk by chunk."""
         sample = self.machines.stage.flat()["drive.sample_time"]
         interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
-        every = self.machines.changes(option.changes)
-        changes = {key: value[:count] if np.ndim(value) else value for key, value in every.items()}
+        drawn = self.machines.changes(option.changes)
+        changes = {key: value[:count] if np.ndim(value) else value for key, value in drawn.items()}
         return run(option.stage, task, self.machines.seeds[:count].tolist(), interval, changes)
 
 

@@ -47,23 +47,23 @@ class Checked:
 def checked(sweep: Sweep, most: int) -> Checked:
     """The first `most` samples that have an edge, which are random ones, simulated."""
     usable = sweep.usable
-    some = usable.take(np.arange(min(most, len(usable.edge))))
-    runs = [_still_swing(some, share, *how) for how in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
+    samples = usable.take(np.arange(min(most, len(usable.edge))))
+    runs = [_still_swing(samples, share, *begin) for begin in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
     numbers = [int(swinging.any(axis=1).sum()) for swinging, _ in runs]
     completed = np.concatenate([done.ravel() for _, done in runs])
-    return Checked(len(some.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
+    return Checked(len(samples.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
 
 
-_How = Callable[[Ensemble, np.ndarray, int], Begin]
+_Begins = Callable[[Ensemble, np.ndarray, int], Begin]
 
 
-def _still_swing(sweep: Sweep, share: float, how: _How, tried: int) -> tuple[np.ndarray, np.ndarray]:
+def _still_swing(sweep: Sweep, share: float, begin: _Begins, tried: int) -> tuple[np.ndarray, np.ndarray]:
     """Which runs of each sample still swing at the end, and which were completed, shape (samples, tried)."""
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)
     values = {name: value[which] for name, value in sweep.values.items()} | {"crossover": share * sweep.edge[which]}
     stages = Ensemble.held(flat_of(values), len(which))
-    swings, completed = still_swings(stages, how(stages, values["crossover"], count), PERIODS[share])
+    swings, completed = still_swings(stages, begin(stages, values["crossover"], count), PERIODS[share])
     return swings.reshape(count, tried), completed.reshape(count, tried)
 
 

@@ -103,10 +103,10 @@ class Guideline:
     def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
         """Errors of the laws on those held-out samples for which `which` is true, shape (count,); None of none."""
         held = (self.free if free else self.locked).test.usable
-        some = held.take(which(held))
-        locked = self.locked.law.edge(some.values)
-        law = self.free.law.edge(some.values, locked) if free else locked
-        return Errors.between(law, some.edge) if len(law) else None
+        subset = held.take(which(held))
+        locked = self.locked.law.edge(subset.values)
+        law = self.free.law.edge(subset.values, locked) if free else locked
+        return Errors.between(law, subset.edge) if len(law) else None
 
     def held_out_by_rates(self) -> list[ByRates]:
         """Errors of the locked law by the ratio of its two rates."""
@@ -129,8 +129,8 @@ def by_rates(locked: Fit) -> list[ByRates]:
     ratio = _ratio(locked.law, held.values)
     decades = []
     for low, high in pairwise(RATIOS):
-        some = held.take((ratio >= low) & (ratio < high))
-        errors = Errors.between(locked.law.edge(some.values), some.edge) if len(some.edge) else None
+        subset = held.take((ratio >= low) & (ratio < high))
+        errors = Errors.between(locked.law.edge(subset.values), subset.edge) if len(subset.edge) else None
         decades.append(ByRates(low, high, errors))
     return decades
 

@@ -173,14 +173,16 @@ def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, 
 
 
 def _in_parts(
-    name: str, values: Mapping[str, np.ndarray], grid: np.ndarray, keep: Keep, tally: Tally, what: str
+    name: str, values: Mapping[str, np.ndarray], grid: np.ndarray, keep: Keep, tally: Tally, label: str
 ) -> Edges:
     parts = []
     for first in range(0, len(grid), PART):
-        here = slice(first, first + PART)
-        some = {group: value[here] for group, value in values.items()}
-        parts.append(keep.part(f"{name} {first}", lambda some=some, here=here: find_edges(_stages(some), grid[here])))
-        tally.add(STEPS[what] * len(grid[here]), what)
+        part = slice(first, first + PART)
+        subset = {group: value[part] for group, value in values.items()}
+        parts.append(
+            keep.part(f"{name} {first}", lambda subset=subset, part=part: find_edges(_stages(subset), grid[part]))
+        )
+        tally.add(STEPS[label] * len(grid[part]), label)
     return joined(parts)
 
 
@@ -188,7 +190,7 @@ def _stages(values: Mapping[str, np.ndarray]) -> Callable[[np.ndarray, np.ndarra
     """The stages of samples at crossovers in units of sqrt(sigma_0/m)."""
 
     def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
-        some = {name: value[which] for name, value in values.items()}
-        return Ensemble.held(flat_of({**some, "crossover": crossover}), len(which))
+        subset = {name: value[which] for name, value in values.items()}
+        return Ensemble.held(flat_of({**subset, "crossover": crossover}), len(which))
 
     return stages

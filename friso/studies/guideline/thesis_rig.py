@@ -91,8 +91,8 @@ def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[ThesisCase
     flat = base | {key: np.array([change.get(key, base[key]) for change in changes], float) for key in keys}
 
     def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
-        some = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
-        return Ensemble.held(some | {CROSSOVER: crossover}, len(which))
+        subset = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+        return Ensemble.held(subset | {CROSSOVER: crossover}, len(which))
 
     grid = FREE_GRID if free else RIGID_GRID
     edges = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))

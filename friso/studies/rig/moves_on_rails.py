@@ -181,14 +181,14 @@ def follow(
     seeds: Sequence[int],
     changes: Mapping[str, Any],
     progress: Progress = silent,
-    what: str = "",
+    label: str = "",
 ) -> RailRuns:
     """Runs of a task and what became of them; the samples are forgotten chunk by chunk."""
     parts: list[RailRuns] = []
-    progress(0, len(seeds), what)
+    progress(0, len(seeds), label)
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
         parts.append(rail_runs(chunk))
-        progress(int(chunk.numbers[-1]) + 1, len(seeds), what)
+        progress(int(chunk.numbers[-1]) + 1, len(seeds), label)
     return joined(parts)
 
 

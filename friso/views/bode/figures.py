@@ -202,8 +202,10 @@ def _sensitivity(bode: Bode) -> Figure:
     limit = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
     axis = Axis("|1/(1 + L)|", "dB", (LEAST_SENSITIVITY, max(10.0, 1.08 * largest)))
     caption = "How much of a disturbance remains: above 0 dB the controller amplifies it."
-    lost = f"; {(~stable).sum()} unstable ones are left out; near them the sensitivity is unbounded"
-    note = f"Band: smallest to largest of {stable.sum()} stable states{'' if stable.all() else lost}." if bands else ""
+    excluded = f"; {(~stable).sum()} unstable ones are left out; near them the sensitivity is unbounded"
+    note = (
+        f"Band: smallest to largest of {stable.sum()} stable states{'' if stable.all() else excluded}." if bands else ""
+    )
     panel = Panel("", Axis.of_frequency(_hertz(bode)), axis, lines, limits=(limit,), bands=bands)
     return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
 

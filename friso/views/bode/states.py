@@ -37,10 +37,10 @@ def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     ]
     if not has_family(bode):
         return tuple(cases)
-    (settled, margins), (worst, lost) = bode.settled, bode.worst
+    (settled, margins), (worst, worst_margins) = bode.settled, bode.worst
     cases.append(ShownState("Worst settled", GREY, place(settled, bode), margins))
     if worst != settled:
-        cases.append(ShownState("Worst of the family", GREY, place(worst, bode), lost))
+        cases.append(ShownState("Worst of the family", GREY, place(worst, bode), worst_margins))
     return tuple(cases)
 
 

@@ -129,20 +129,20 @@ def _where(bode: Bode) -> list[str]:
     return states + [_speeds(speeds, bode) for speeds in bode.unstable]
 
 
-def _stuck(lost: np.ndarray, bode: Bode) -> str:
+def _stuck(unstable: np.ndarray, bode: Bode) -> str:
     """Stuck under these bias forces [N], or under any; nothing without friction."""
     if not has_friction(bode):
         return ""
-    low, high = float(lost.min()), float(lost.max())
+    low, high = float(unstable.min()), float(unstable.max())
     if (low, high) == (bode.scan.members.bias.min(), bode.scan.members.bias.max()):
         return "stuck"
     return f"stuck under a bias force of {with_unit(low, 'N') if low == high else range_with_unit(low, high, 'N')}"
 
 
-def _speeds(lost: Unstable, bode: Bode) -> str:
+def _speeds(unstable: Unstable, bode: Bode) -> str:
     speeds = bode.scan.members.speed[~bode.scan.members.stuck]
-    window = window_with_unit(lost.low, lost.high, (float(speeds.min()), float(speeds.max())), "m/s")
-    return in_words(f"sliding{'' if lost.forward else ' backwards'}, {window}", lost.touched, has_limiter(bode))
+    window = window_with_unit(unstable.low, unstable.high, (float(speeds.min()), float(speeds.max())), "m/s")
+    return in_words(f"sliding{'' if unstable.forward else ' backwards'}, {window}", unstable.touched, has_limiter(bode))
 
 
 def _why(bode: Bode) -> list[str]:

@@ -228,14 +228,14 @@ def _recommendation(comparison: Comparison) -> list[str]:
 
 def _performance(comparison: Comparison) -> list[str]:
     """How fast the options that bring the machines to rest do so, how still these are then, and how sure that is."""
-    resting, some = _resting(comparison), min(FOLLOWED, comparison.machines.count)
+    resting, followed = _resting(comparison), min(FOLLOWED, comparison.machines.count)
     lines = [
         f"{label(result)}: in position in {with_unit(result.settling.value, 's')} "
         f"(median){_still(result, comparison)}; at least {percentage(result.settled.low)} % of such machines come to "
         "rest (95 % confidence)."
         for result in resting
     ]
-    longer = f"Of {some} machines followed {LONGER} times as long, {100 * ENOUGH:g} % or more stay at rest with "
+    longer = f"Of {followed} machines followed {LONGER} times as long, {100 * ENOUGH:g} % or more stay at rest with "
     return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []
 
 

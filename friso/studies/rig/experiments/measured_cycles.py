@@ -182,10 +182,12 @@ def _longer(task: MoveTask) -> MoveTask:
     return replace(task, duration=LONGER * task.duration)
 
 
-def started(stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, what: str) -> RailRuns:
+def started(
+    stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, label: str
+) -> RailRuns:
     """What became of machines, shape (count,), at the first start after which each swings on; else after the move."""
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
-    runs = [follow(stage, _longer(task), [seed] * count, changes, progress, what) for task in tasks]
+    runs = [follow(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
     every = joined(runs).shaped(len(tasks), count)
     first = np.argmax(every.swings, axis=0)
     return RailRuns(**{entry.name: getattr(every, entry.name)[first, np.arange(count)] for entry in fields(RailRuns)})
@@ -198,13 +200,13 @@ def varied(
     seeds: np.ndarray,
     swing: float,
     progress: Progress,
-    what: str,
+    label: str,
 ) -> tuple[RailRuns, np.ndarray]:
     """Moves on all rails of all cases, shape (cases * rails,), and the asymmetry of friction about their targets."""
     count = len(next(iter(cases.values())))
     changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     changes["rail.seed"] = np.tile(seeds, count)
-    followed = follow(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, what)
+    followed = follow(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, label)
     sides = distance(stage) + np.array([-swing / 2, swing / 2])
     flat, runs = stage.flat(), range(count * len(seeds))
     at = [friction_factors(flat | {key: values[run] for key, values in changes.items()}, sides)[0] for run in runs]

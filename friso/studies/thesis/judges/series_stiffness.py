@@ -24,11 +24,14 @@ _EXACT = 1e-9
 def printed_formulas(evidence: Evidence) -> Finding:
     """Both printed formulas against what follows from the balance of forces, and Eq. 1 against the plant."""
     return Finding(
-        (*compare(PRINTED_STIFFNESS, PRINTED_SENSITIVITY), in_the_plant(PRINTED_STIFFNESS, evidence.analysis.springs))
+        (
+            *judged_formulas(PRINTED_STIFFNESS, PRINTED_SENSITIVITY),
+            in_the_plant(PRINTED_STIFFNESS, evidence.analysis.springs),
+        )
     )
 
 
-def compare(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, Part, Part]:
+def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, Part, Part]:
     """The given formulas, in K_F and K_J, against two springs that carry one force."""
     force, middle, end = sp.symbols("F u x")
     balance = sp.solve([K_F * middle - force, K_J * (end - middle) - force], [middle, end], dict=True)[0]
