@@ -595,8 +595,7 @@ def test_a_swinging_loop_is_not_the_friction_of_the_rail() -> None:
     swing = 0.4 * np.sin(2 * np.pi * 1.3 * log.time)
     found = friction_position(replace(log, signals={**log.signals, "force": log["force"] + swing}), 1.0)
     assert not found.separated
-    assert "do not repeat" in found.verdict
-    assert "cannot be read off" in found.verdict
+    assert found.repeatability.value < 0.5
     assert found.passes[0].harmonics[0].frequency == pytest.approx(1.3, rel=0.1)
     assert found.passes[0].harmonics[0].amplitude == pytest.approx(0.4, rel=0.2)
 

@@ -99,8 +99,8 @@ def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
 
 @dataclass(frozen=True)
 class Predictor(Generic[Result]):
-    """How a result predicts another log, with what is known of the machine: the prediction, or None for a log of which
-    it can tell nothing. `needs` is what there has to be, in words; `check` raises InputError where logs, to which
+    """How a result predicts another log, with what is known of the machine: the prediction, or None for a log that
+    it cannot predict. `needs` is what there has to be, in words; `check` raises InputError where logs, to which
     nothing has been fitted yet, will not be able to."""
 
     needs: str
@@ -118,7 +118,7 @@ class ExperimentKind(Generic[Result]):
     last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts). `partial`: whether a log
     shows too little for a result of its own, such as one event; logs like that count as one log with gaps. `together`:
     all its logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured
-    them, too. `claims` answers why a log of which nobody said what it is may be of this kind, or None; `around` makes
+    them, too. `claims` says why a log without a stated kind may be of this one, or None; `around` makes
     up a stage around a log where none is given. `notes` are what the engineer should know of all its results, the stage
     being given or not; `doubts` what speaks against believing a result, in sentences, and `failed` whether its analysis
     failed, whatever of it still holds. Functions raise InputError for logs that cannot be used."""

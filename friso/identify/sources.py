@@ -110,7 +110,7 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
 
 
 def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
-    """A log of which nobody said what it is, its kind of experiment, and why. Raises GapsError for all that is open,
+    """A log without a stated kind, its kind of experiment, and why. Raises GapsError for all that is open,
     the units included that most kinds need."""
     gaps: list[LogError] = []
     kind = reason = ""
@@ -153,7 +153,7 @@ def named(path: Path, mapping: Mapping, kind: str) -> Log:
 
 
 def recognised(log: Log, path: Path) -> tuple[str, str]:
-    """The only kind of experiment that a log of which nobody said what it is may be of, and why. Raises InputError
+    """The only kind of experiment that a log without a stated kind may be of, and why. Raises InputError
     where none claims it, or several do."""
     course = Course(log)
     claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}

@@ -91,7 +91,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
     """The estimate as far as the key allows it, or None; and why it is not as it was, if it is not."""
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
-        what = f"no more is known than that it is {' and '.join(ends)}" if ends else "nothing is known of it"
+        what = f"known only to be {' and '.join(ends)}" if ends else "unknown"
         return None, f"{what}, the stage file keeps what it had"
     if not estimate.high > estimate.low:
         return None, "its uncertainty is not known, the stage file keeps what it had"

@@ -47,7 +47,7 @@ def identify(
         typer.Option(
             "--as",
             metavar="KIND",
-            help="Kind of experiment, one of those below; moves and frequency responses tell it themselves.",
+            help="Kind of experiment (see the list below); moves and frequency responses are recognised.",
         ),
     ] = None,
     maps: Maps = None,
@@ -133,8 +133,8 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
 
 def _command(options: Sequence[str]) -> str:
     """The command as it was called, with more options: to be copied."""
-    said = (argument if argument.isalnum() else shlex.quote(argument) for argument in sys.argv[1:])
-    return " ".join(["friso", *said, *options])
+    arguments = (argument if argument.isalnum() else shlex.quote(argument) for argument in sys.argv[1:])
+    return " ".join(["friso", *arguments, *options])
 
 
 def _stage(path: Path | None, overrides: list[str] | None) -> Stage | None:

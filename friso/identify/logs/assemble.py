@@ -183,7 +183,8 @@ def _spans(base: Track) -> str:
     parts = base.segments
     listed = ", ".join(f"{_instant(base, p.start)} to {_instant(base, p.stop - 1)}" for p in parts[:6])
     more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
-    return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {len(parts)} segments: {listed}{more}"
+    count = "1 segment" if len(parts) == 1 else f"{len(parts)} segments"
+    return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {count}: {listed}{more}"
 
 
 def _instant(base: Track, number: int) -> str:

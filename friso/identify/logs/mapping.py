@@ -112,8 +112,8 @@ def mapping_text(mapping: Mapping) -> str:
 
 
 def place_for(log: Path, folder: Path) -> Path:
-    """Where the mapping of a log can be kept: beside it, or in the folder where that cannot be written. What is kept
-    from writing on purpose stays so for a superuser, who could all the same."""
+    """Where the mapping of a log can be kept: beside it, or in the folder where that cannot be written. A folder that
+    is write-protected stays so for a superuser."""
     beside = sidecar(log)
     writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
     return beside if writable else sidecar(log, folder)

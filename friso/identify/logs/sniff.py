@@ -50,7 +50,7 @@ class TextLayout:
         names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
         return (
             f"delimiter {names[self.delimiter]}, decimal {'comma' if self.decimal == ',' else 'point'}, "
-            f"encoding {self.encoding}, {self.first} lines before the numbers"
+            f"encoding {self.encoding}, {self.first} line{'' if self.first == 1 else 's'} before the numbers"
         )
 
 

@@ -77,7 +77,7 @@ def _evened(name: str, raw: Track) -> Track:
         scatter += float(np.sum((raw.time[part] - time[part]) ** 2))
     jitter = np.sqrt(scatter / time.size) / raw.period
     raw.read.append(
-        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps scatter {jitter:.2g} of a step"
+        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {100 * jitter:.2g} % of a step"
     )
     if jitter <= EVEN:
         raw.time = time

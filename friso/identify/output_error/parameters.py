@@ -66,7 +66,7 @@ def parameters_of(
     if flat["friction.model"] in FITTED:
         parameters += _friction(flat, levels, speed, travel, both_ways)
     elif flat["friction.model"] != "none":
-        actual = f'"{flat["friction.model"]}", of which it is not known what a log shows'
+        actual = f'"{flat["friction.model"]}", a law that friso cannot fit'
         raise InputError("friction.model", actual, f"one of {', '.join(FITTED)}, or none", 'model = "lugre"')
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))

@@ -208,7 +208,7 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
         return ""
     step = flat["drive.sample_time"]
     if abs(step / sample_time - 1) >= SAME:
-        return f"{CONTINUOUS}: the drive samples each {step:g} s, the log {sample_time:g} s"
+        return f"{CONTINUOUS}: the drive samples every {1e3 * step:g} ms, the log every {1e3 * sample_time:g} ms"
     return ""
 
 

@@ -83,7 +83,7 @@ def friction_position(
     position, force = on_bearing(log), channel(log, "force")
     if not stretches:
         unknown = _no_repeatability("no stretch of constant velocity")
-        verdict = "Dynamic friction cannot be read off: the log has no stretch of constant velocity."
+        verdict = "Dynamic friction cannot be determined: the log has no stretch of constant velocity."
         return FrictionPosition((), unknown, (), False, verdict, ())
     travel = [np.ptp(position[p.span]) for p in stretches]
     long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
@@ -228,7 +228,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
     elif repeatability.value < REPEATS:
         reasons.append(
-            f"passes over the same places do not repeat it (correlation {repeatability.value:.2f}, 95 % interval "
+            f"repeated passes over the same places differ (correlation {repeatability.value:.2f}, 95 % interval "
             f"{repeatability.low:.2f} to {repeatability.high:.2f})"
         )
     quick = [m for m in maps if crossover and any(h.frequency > crossover for h in m.harmonics[:1])]
@@ -237,7 +237,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         reasons.append(f"the force oscillates at {fastest:.3g} Hz, too fast for a loop of {crossover:g} Hz to follow")
     varies = ", ".join(f"{m.spread:.2g} N at {abs(m.velocity) * 1e3:.3g} mm/s" for m in maps)
     if reasons:
-        return False, f"Dynamic friction cannot be read off: {'; '.join(reasons)}. The force varies by {varies}."
+        return False, f"Dynamic friction cannot be determined: {'; '.join(reasons)}. The force varies by {varies}."
     return True, (
         f"The force repeats from pass to pass (correlation {repeatability.value:.2f}, 95 % interval "
         f"{repeatability.low:.2f} to {repeatability.high:.2f}): it is friction along the rail, and varies by {varies}."

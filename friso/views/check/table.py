@@ -99,7 +99,7 @@ def _moves(case: Case) -> str:
 def _peaks(case: Case) -> str:
     """The peak count, and why it contradicts the verdict where it does."""
     remarks = {
-        ("hunts", False): f" (only those after {COUNTED_AFTER:g} s, above {with_unit(COUNTED_ABOVE, 'm')}, count)",
+        ("hunts", False): f" (counted only after {COUNTED_AFTER:g} s and above {with_unit(COUNTED_ABOVE, 'm')})",
         ("bistable", False): " (another motion hunts)",
         ("bistable", True): " (a long transient)",
         ("transient", True): " (a long transient)",

@@ -40,7 +40,7 @@ def _loop(case: Case) -> list[str]:
     if not case.unstable:
         return []
     where = listed([f"while the stage {state}" for state in case.unstable], "and")
-    return [f"the loop is unstable {where}, whatever the friction, a matter of tuning (friso bode). The stage"]
+    return [f"the loop is unstable {where}, whatever the friction: retune the controller (friso bode). The stage"]
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:
@@ -71,7 +71,7 @@ def at_the_end(case: Case) -> str:
 def _hunting(case: Case) -> str:
     if not case.judgement.observed:
         return f"hunts, {_swing(case)}."
-    seen = "This was observed in long simulations: no orbit that attracts could be closed."
+    seen = "This rests on long simulations: no attracting orbit could be closed."
     if case.judgement.swing:
         return f"hunts, {_swing(case)}. {seen}"
     size, after = with_unit(case.judgement.lasting, "m"), with_unit(case.judgement.followed, "s")
@@ -82,7 +82,7 @@ def _bistable(case: Case) -> str:
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
-        like = f"like this one, {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and time"
+        like = f"this move at {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and acceleration time"
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
     first = _unmoved(case) if case.unmoved else "settles after this move"
     if not starts:
@@ -104,7 +104,7 @@ def _transient(case: Case) -> str:
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end})."]
     if judgement.cycle:
-        says.append(f"Transients change slowly, by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
+        says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
     if judgement.settled_after is None:
         says.append(
             f"It does not settle to within {band_text(_TEN_MICRON)} in {with_unit(judgement.followed, 's')} either."
@@ -122,7 +122,7 @@ def _settling(case: Case) -> str:
 
 def _unmoved(case: Case) -> str:
     force, least = with_unit(case.largest_force, "N"), with_unit(case.breakaway, "N")
-    return f"this motion does not move the stage ({force} at most, and it breaks away from {least} on)"
+    return f"this motion does not move the stage (it exerts at most {force}; break-away takes {least})"
 
 
 def _settled(case: Case) -> str:
@@ -140,7 +140,7 @@ def _doubts(case: Case) -> list[str]:
     hunting = case.judgement.hunting
     if hunting.certain:
         return []
-    return [f"This is not certain: {hunting.reason}{'' if hunting.target else '; other motions may hunt'}."]
+    return [f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."]
 
 
 def _outlook(case: Case) -> list[str]:

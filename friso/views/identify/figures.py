@@ -76,6 +76,6 @@ def _intervals(identification: Identification) -> list[Figure]:
         (-0.6, len(bounded) - 0.4),
         words=tuple(SHORT.get(estimate.name, estimate.name.split(".")[-1]) for estimate in bounded),
     )
-    caption = "The shorter, the better known; 100 % and more: not even its sign or its order of magnitude."
+    caption = "Shorter is better known; from 100 % on not even the sign or order of magnitude is."
     panel = Panel("", x, y, tuple(stems), tuple(points))
     return [Figure("identify_intervals", "How well each quantity is known", caption, (panel,))]

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from friso.identify.method import Experiment, Identification, Prediction
     from friso.identify.sources import LogFile
 
-COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or why there is no value")
-"""Of the table of estimates."""
+COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")
+"""Columns of the table of estimates."""
 
 LEFT = "not identified"
 """Stands for the value of what the logs do not show."""

@@ -62,7 +62,7 @@ def _range(channel: ChannelContent) -> str:
 
 def _samples(channel: ChannelContent) -> str:
     rate = "" if channel.sample_rate is None else f" at {with_unit(channel.sample_rate, 'Hz', 4)}"
-    gaps = f", {channel.missing} no numbers" if channel.missing else ""
+    gaps = f", {channel.missing} not numbers" if channel.missing else ""
     return f"{channel.values.size}{rate}{gaps}"
 
 

@@ -23,7 +23,7 @@ def read_lvm(path: Path) -> ChannelTable:
 
 def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[Channel]:
     """The channels of a segment: values over an X column in seconds (the first, or one per channel). What the header
-    is stated of a channel stands above its column, the first column being that of the keys."""
+    states of a channel stands above its column, the first column being that of the keys."""
     names, data = segment["Channel names"], np.asarray(segment["data"], dtype=float)
     each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"
     above = 0 if none else -1  # the reader leaves out the empty first column of files without X values
