@@ -29,11 +29,11 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     for key in dict.fromkeys(estimate.name for estimate in estimates):
         estimates_of_key = [estimate for estimate in estimates if estimate.name == key]
         certain = [estimate for estimate in estimates_of_key if estimate.determined]
-        sure = _weighty(certain)
-        if len(sure) > 1:
-            answer, agrees = _mean(key, sure)
+        shown = with_interval(certain)
+        if len(shown) > 1:
+            answer, agrees = _mean(key, shown)
         elif certain:
-            answer, agrees = (sure or certain)[0], True
+            answer, agrees = (shown or certain)[0], True
         else:
             answer, agrees = _left(key, estimates_of_key)
         answers.append(answer)
@@ -58,7 +58,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
     """
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
     precision = {
-        key: sum(_weight(estimate) for estimate in _weighty(estimates) if estimate.name == key) for key in keys
+        key: sum(_weight(estimate) for estimate in with_interval(estimates) if estimate.name == key) for key in keys
     }
     covariance = np.diag([1 / precision[key] for key in keys])
     for group, matrix in groups:
@@ -72,8 +72,8 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
     return keys, (joint + joint.T) / 2
 
 
-def _weighty(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """Those that can be weighted: shown, with an interval."""
+def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """Those that are shown, with an interval, by which they can be weighted."""
     return [estimate for estimate in estimates if estimate.determined]
 
 

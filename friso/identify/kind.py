@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.combine import Correlated
+from friso.identify.combine import Correlated, with_interval
 from friso.identify.estimate import Estimate
 from friso.identify.logs.joined import together
 from friso.identify.logs.log import Log
@@ -90,11 +90,6 @@ def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
     """Estimates that are independent of one another."""
     certain = with_interval(estimates)
     return certain, np.eye(len(certain))
-
-
-def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """Those that are shown, with an interval."""
-    return [estimate for estimate in estimates if estimate.determined]
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.identify.combine import Correlated
+from friso.identify.combine import Correlated, with_interval
 from friso.identify.estimate import Estimate
 from friso.identify.kind import (
     AnalysisSettings,
@@ -16,7 +16,6 @@ from friso.identify.kind import (
     Prior,
     Source,
     independent,
-    with_interval,
 )
 from friso.identify.logs.log import Log
 from friso.identify.readings.course import Course

@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.identify.combine import Correlated
+from friso.identify.combine import Correlated, with_interval
 from friso.identify.estimate import Estimate
-from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source, with_interval
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identify.logs.log import Log
 from friso.identify.readings.at_bearing import (
     EXPLAINED,

@@ -73,7 +73,7 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
     measured = Series(hertz, np.abs(response.response), "measured", GREY, width=1.1)
     lines = tuple(Series(fine, np.abs(values), label, colour, dash, 1.5) for label, colour, dash, values in curves)
     masses = tuple(_mass_line(line, hertz, i == 0) for i, line in enumerate(bench.lines)) if driven else ()
-    frequency = _frequency(hertz)
+    frequency = Axis.of_frequency(hertz)
     gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
     above = Panel(_title(response), frequency, gain, (measured, *lines, *masses), bands=(area,))
     phase = Series(hertz, angle, "", GREY, width=1.1)
@@ -98,10 +98,6 @@ def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
     reach = np.array([max(line.low / 2, hertz[0]), min(line.high * 2, hertz[-1])])
     label = line.kind if named else ""
     return Series(reach, line.level.value / (2 * np.pi * reach) ** 2, label, INK, "dotted", 1.6)
-
-
-def _frequency(hertz: Array) -> Axis:
-    return Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
 
 
 def _unit(response: FrequencyResponse, power: str = "") -> str:
@@ -144,7 +140,7 @@ def _level_panel(response: FrequencyResponse) -> Panel:
         if np.nan_to_num(values).max() > 0
     )
     gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
-    return Panel(_title(response), _frequency(response.frequency), gain, lines)
+    return Panel(_title(response), Axis.of_frequency(response.frequency), gain, lines)
 
 
 def _departure(bench: Bench, name: str) -> Figure:
@@ -157,7 +153,7 @@ def _departure(bench: Bench, name: str) -> Figure:
         ends = np.array([departs.frequency.low, departs.frequency.high])
         bands = (Band(ends, np.full(2, limits[0]), np.full(2, limits[1]), "", AREA),)
     ratio = Axis("|G / G model|", "", limits, log=True)
-    panel = Panel("", _frequency(departs.lines), ratio, (line,), limits=(Limit((1.0,), "", INK),), bands=bands)
+    panel = Panel("", Axis.of_frequency(departs.lines), ratio, (line,), limits=(Limit((1.0,), "", INK),), bands=bands)
     text = with_interval(departs.frequency)
     caption = f"The driven mass's response over that of the two-mass model; departure: {text}."
     if departs.differ:
@@ -179,7 +175,7 @@ def _amplitudes(bench: Bench, name: str) -> Figure:
     level = Limit((1 / bench.drag.mass.value,), "mass line", GREY, "dotted")
     limits, unit = _around(*(line.y for line in lines)), _unit(bench.driven, "/s^2")
     size = Axis("Acceleration per input", unit, limits, log=True, prefixed=False)
-    panel = Panel("", _frequency(measured[0]), size, tuple(lines), limits=(level,))
+    panel = Panel("", Axis.of_frequency(measured[0]), size, tuple(lines), limits=(level,))
     caption = (
         f"A mass with a Coulomb friction of {with_interval(bench.drag.coulomb)} on a spring, simulated with the "
         f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left)} of the "
