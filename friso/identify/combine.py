@@ -39,7 +39,7 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         answers.append(answer)
         if not agrees:
             sentences.append(
-                f"{key}: the experiments disagree, and the interval allows for it: {_texts(sure or estimates_of_key)}"
+                f"{key}: the experiments disagree, and the interval allows for it: {_texts(shown or estimates_of_key)}"
             )
         beyond = [
             estimate
