@@ -68,14 +68,14 @@ class OutputFolder:
 
     def check(self, names: Iterable[str]) -> None:
         """Raises InputError where a file of such a name may not be written."""
-        there = [name for name in names if (self.folder / name).exists()]
-        for name in there:
+        existing = [name for name in names if (self.folder / name).exists()]
+        for name in existing:
             if any(file.exists() and (self.folder / name).samefile(file) for file in self.inputs):
                 actual = f"{self.folder}, where {name} is read"
                 raise InputError("--out", actual, "another folder", f"--out {self.folder}-2")
-        foreign = [name for name in there if name not in self.files]
-        if foreign and not self.overwrite:
-            actual = f"{self.folder}, with {_listed(foreign)}, which friso {self.command} has not written"
+        others = [name for name in existing if name not in self.files]
+        if others and not self.overwrite:
+            actual = f"{self.folder}, with {_listed(others)}, which friso {self.command} has not written"
             raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
 
     def write(
@@ -86,12 +86,12 @@ class OutputFolder:
         Raises InputError where one may not be written, OSError where one cannot.
         """
         self.check(files)
-        foreign = [name for name in files if name not in self.files and (self.folder / name).exists()]
+        others = [name for name in files if name not in self.files and (self.folder / name).exists()]
         contents = {self.folder / name: content for name, content in files.items()}
         marker = {self.folder / MARKER: self._marker(files)} if self.is_own else {}
         write({**contents, **(beside or {}), **marker}, progress)
-        if foreign:
-            say(f"replaced (--overwrite): {', '.join(foreign)}")
+        if others:
+            say(f"replaced (--overwrite): {', '.join(others)}")
         return [path for path, content in contents.items() if content is not None]
 
     def _marker(self, files: Files) -> str:

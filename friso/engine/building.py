@@ -26,14 +26,14 @@ def entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
     Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written."""
     requests = list(requests)
-    there = {request: request.entry() for request in requests}
-    if missing := [request for request, entry in there.items() if entry is None]:
+    compiled = {request: request.entry() for request in requests}
+    if missing := [request for request, entry in compiled.items() if entry is None]:
         _Work(missing).finish()
         prune(cache_folder())
-        there |= {request: request.entry() for request in missing}
-    if lost := [request.title for request, entry in there.items() if entry is None]:
+        compiled |= {request: request.entry() for request in missing}
+    if lost := [request.title for request, entry in compiled.items() if entry is None]:
         raise RuntimeError(f"what was compiled is not in {cache_folder()}: {', '.join(lost)}")
-    return [entry for request in requests if (entry := there[request]) is not None]
+    return [entry for request in requests if (entry := compiled[request]) is not None]
 
 
 class _Work:

@@ -109,8 +109,8 @@ def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
 
 def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
     """Raises LogError for a row with fewer cells than columns above others that have them all."""
-    there = frame.iloc[:, -1].notna().to_numpy()
-    missing = np.flatnonzero(~there[: int(np.flatnonzero(there)[-1])]) if there.any() else np.empty(0, dtype=int)
+    present = frame.iloc[:, -1].notna().to_numpy()
+    missing = np.flatnonzero(~present[: int(np.flatnonzero(present)[-1])]) if present.any() else np.empty(0, dtype=int)
     if not missing.size:
         return
     suspects = set((missing + form.first + 1).tolist())
@@ -148,14 +148,14 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
         values = cells.to_numpy(dtype=float)
         return None if np.isnan(values).all() else (values, "")
     texts = cells.astype(str).str.strip()
-    there = cells.notna() & (texts != "")
-    if texts[there].str.fullmatch(STAMP.pattern).all() and there.any():
-        return _stamped(path, texts, there, form), "s"
+    present = cells.notna() & (texts != "")
+    if texts[present].str.fullmatch(STAMP.pattern).all() and present.any():
+        return _stamped(path, texts, present, form), "s"
     texts = texts.where(~texts.str.lower().isin(("true", "false")), texts.str.lower().map({"true": "1", "false": "0"}))
     points = texts.str.replace(",", ".", regex=False) if form.decimal == "," else texts
-    values = as_numbers(points.where(there))
-    wrong = there.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
-    if wrong.sum() > 0.5 * there.sum():
+    values = as_numbers(points.where(present))
+    wrong = present.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
+    if wrong.sum() > 0.5 * present.sum():
         return None
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
@@ -171,16 +171,16 @@ def as_numbers(texts: Any) -> np.ndarray:
     return numbers.to_numpy(dtype=float)
 
 
-def _stamped(path: Path, texts: Any, there: Any, form: TextLayout) -> np.ndarray:
+def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
     """Seconds since the first of these time stamps; a time of day that steps back goes on the next day."""
     texts = texts.str.replace(",", ".", regex=False)
     try:
         stamps: Any
-        if texts[there].str.match(r"\d{4}-").all():
-            stamps = pd.to_datetime(texts.where(there), format="ISO8601", utc=True)
-            seconds = (stamps - stamps[there].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
+        if texts[present].str.match(r"\d{4}-").all():
+            stamps = pd.to_datetime(texts.where(present), format="ISO8601", utc=True)
+            seconds = (stamps - stamps[present].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
         else:
-            durations = texts.where(texts.str.count(":") == 2, texts + ":00").where(there)
+            durations = texts.where(texts.str.count(":") == 2, texts + ":00").where(present)
             stamps = pd.to_timedelta(durations)
             seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
@@ -188,7 +188,7 @@ def _stamped(path: Path, texts: Any, there: Any, form: TextLayout) -> np.ndarray
         raise LogError(
             "log", str(error), "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)
         ) from None
-    return seconds - seconds[int(np.flatnonzero(there)[0])]
+    return seconds - seconds[int(np.flatnonzero(present)[0])]
 
 
 def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:

@@ -37,9 +37,9 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
         start, step, unit_above = (_above(segment, key, i + above) for key in ("X0", "Delta_X", "Y_Unit_Label"))
         clock = time if time is not None else _even(start, step, len(data))
         heading, unit = split_heading(name)
-        there = ~np.isnan(data[:, i])
-        times = None if clock is None else clock[there]
-        out.append(Channel(heading, unit_above or unit, data[there, i], times, source))
+        present = ~np.isnan(data[:, i])
+        times = None if clock is None else clock[present]
+        out.append(Channel(heading, unit_above or unit, data[present, i], times, source))
     return out
 
 

@@ -149,9 +149,9 @@ def _floats(path: Path, form: TextLayout, frame: Any, column: int) -> np.ndarray
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return cells.to_numpy(dtype=float)
     texts = cells.astype(str).str.strip().str.replace(",", ".", regex=False)
-    there = (cells.notna() & (texts != "")).to_numpy()
+    present = (cells.notna() & (texts != "")).to_numpy()
     values = as_numbers(texts)
-    wrong = np.flatnonzero(np.isnan(values) & there)
+    wrong = np.flatnonzero(np.isnan(values) & present)
     if wrong.size:
         line = form.first + 1 + int(cells.index[wrong[0]])
         actual = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
