@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 import typer
+from typer.core import TyperGroup
 
 import friso
 from friso.cli.app import command_line
@@ -84,7 +85,7 @@ def test_views_stand_in_the_folder_of_their_command() -> None:
 def test_files_and_documents_of_commands_are_made_in_the_same_places() -> None:
     """A command that writes has <command>_files in page.py; every one with --json has <command>_document."""
     group = typer.main.get_command(command_line())
-    assert isinstance(group, typer.core.TyperGroup)
+    assert isinstance(group, TyperGroup)
     missing = []
     for name, command in group.commands.items():
         options = {option for parameter in command.params for option in parameter.opts}
