@@ -38,7 +38,7 @@ from friso.stage import Stage
 from friso.studies.compare import study
 from friso.studies.compare.study import compare
 from friso.studies.rig.experiments import hunting as rig_hunting
-from friso.studies.rig.hunted import rails
+from friso.studies.rig.moves_on_rails import rails
 from friso.views.compare.words import sentences as comparison_sentences
 from friso.views.rig.page import sentences
 
