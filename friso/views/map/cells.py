@@ -121,7 +121,7 @@ def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
 def cuts(runs: xr.Dataset) -> list[str]:
     """The values at which a larger map was cut, e.g. "Crossover 8 Hz"."""
     fixed = runs.coords.to_dataset()
-    return [_gridded(fixed.expanddims_of(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
+    return [_gridded(fixed.expand_dims(key), key).text(0) for key in fixed.coords if fixed[key].ndim == 0]
 
 
 def dims_of(runs: xr.Dataset) -> tuple[Hashable, ...]:
