@@ -100,6 +100,7 @@ class FakeCase:
     unstable: tuple[str, ...] = ()
     breakaway: float = 3.0
     unmoved: bool = False
+    feeding: Any = None
 
     @property
     def verdict(self) -> str:
