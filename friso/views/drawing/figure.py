@@ -40,15 +40,15 @@ class Axis:
     step: float | None = None
     prefixed: bool = True
 
-    @property
-    def label(self) -> str:
-        """What is written at the axis, e.g. "Time [s]"."""
-        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
-
     @classmethod
     def of_frequency(cls, hertz: Array) -> Axis:
         """A logarithmic axis over increasing frequencies [Hz], from the first to the last."""
         return cls("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
+
+    @property
+    def label(self) -> str:
+        """What is written at the axis, e.g. "Time [s]"."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
 
 @dataclass(frozen=True)
@@ -152,11 +152,6 @@ class Coloured:
     def label(self) -> str:
         """What is written at the colour bar."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
-
-    @classmethod
-    def of_frequency(cls, hertz: Array) -> Axis:
-        """A logarithmic axis over increasing frequencies [Hz], from the first to the last."""
-        return cls("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
 
     @property
     def has_numbers(self) -> bool:
