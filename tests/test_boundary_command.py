@@ -68,7 +68,7 @@ def test_the_locked_rig_flips_at_9_75_hz(single: tuple[dict, Path]) -> None:
 
 def test_the_document_of_one_key(single: tuple[dict, Path]) -> None:
     document, _ = single
-    assert document.keys() == {"conclusion", "key", "unit", "points", "ends", "branches"}
+    assert document.keys() == {"conclusion", "key", "unit", "points", "ends", "branches", "files", "plug_ins"}
     assert (document["key"], document["unit"]) == ("controller.crossover", "Hz")
     assert document["ends"] == {"low": "attracting cycle", "high": "no attracting cycle"}
     values = [point["value"] for point in document["points"]]
@@ -126,7 +126,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
     )
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
-    assert document.keys() == {"conclusion", "x", "y", "curves", "lost", "corners"}
+    assert document.keys() == {"conclusion", "x", "y", "curves", "lost", "corners", "files", "plug_ins"}
     assert document["y"] == {"key": "masses.cart", "unit": "g"}
     assert document["corners"] == {
         **{"low low": "attracting cycle", "low high": "attracting cycle"},

@@ -185,7 +185,7 @@ def test_the_document_has_the_agreed_keys(
             "leaves",
             "front",
         ),
-        *("controller", "verification", "files", "relax"),
+        *("controller", "verification", "files", "plug_ins", "relax"),
     }
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
     assert document["files"][0] == str(folder / "design.toml")
@@ -456,7 +456,7 @@ def test_no_design_as_a_document(no_design: None, tmp_path: Path, capsys: pytest
         command(RIG, SPEC, out=tmp_path / "out", as_json=True)
     shown = capsys.readouterr()
     document = _strict(shown.out)
-    assert document.keys() == {"conclusion", "stage", "spec", "feasible", "reason", "relax"}
+    assert document.keys() == {"conclusion", "stage", "spec", "feasible", "reason", "relax", "files", "plug_ins"}
     assert document["feasible"] is False
     assert document["relax"][1] == {
         "key": "leaves.length",

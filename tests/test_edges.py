@@ -115,7 +115,7 @@ def test_a_specification_given_as_a_stage_is_recognised_and_the_reverse(tmp_path
 
 def test_missing_keys_of_a_table_are_named_together() -> None:
     text = RIG.replace('static = "3 N"\n', "").replace('coulomb = "1 N"\n', "").replace('viscous = "0.5 N*s/m"\n', "")
-    with pytest.raises(InputError, match=r"static[\s\S]*nor coulomb"):
+    with pytest.raises(InputError, match=r"static[\s\S]*also missing: coulomb"):
         loads(text)
 
 

@@ -137,7 +137,7 @@ def test_the_document_has_the_agreed_keys(path: Path, capsys: pytest.CaptureFixt
     shown = capsys.readouterr()
     document = _strict(shown.out)
     assert shown.err == ""
-    assert document.keys() == KEYS | {"conclusion", "stage", "failure", "closed_forms"}
+    assert document.keys() == KEYS | {"conclusion", "stage", "failure", "closed_forms", "files", "plug_ins"}
     assert document["closed_forms"].keys() == KEYS
     assert (document["stage"], document["failure"]) == ("Thesis rig", None)
     assert (document["model"], document["closed_forms"]["model"]) == ("beams", "closed forms")

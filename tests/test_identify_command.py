@@ -274,8 +274,8 @@ def test_a_foreign_stage_file_is_not_overwritten(
 ) -> None:
     own = tmp_path / "identified.toml"
     own.write_bytes(inputs[1].read_bytes())
-    for stage, remedy in ((inputs[1], "--overwrite"), (own, "another folder")):
-        status, out, message = run(capsys, inputs[0], "--stage", stage, "--out", tmp_path)
+    for stage, options, remedy in ((inputs[1], (), "--overwrite"), (own, ("--overwrite",), "another folder")):
+        status, out, message = run(capsys, inputs[0], "--stage", stage, "--out", tmp_path, *options)
         assert (status, out) == (2, "")
         assert remedy in " ".join(message.split())
     assert own.read_bytes() == inputs[1].read_bytes()

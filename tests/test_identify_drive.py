@@ -17,7 +17,7 @@ def test_the_log_of_the_drive_itself_is_simulated_sampled() -> None:
 
 
 def test_a_log_at_another_rate_is_not_and_says_so() -> None:
-    assert "the drive samples each 0.001 s, the log 0.002 s" in why_continuous(axis(), 2e-3)
+    assert "the drive samples every 1 ms, the log every 2 ms" in why_continuous(axis(), 2e-3)
 
 
 def test_a_stage_without_sample_time_has_nothing_to_say() -> None:

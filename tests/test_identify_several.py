@@ -103,15 +103,20 @@ def axis() -> Stage:
 def test_a_controller_of_its_own(axis: Stage, refused: Refused) -> None:
     """Another gain takes its place among the others; a controller of another form replaces the stage's whole."""
     log = record("moves", 1e-3, position=np.arange(100.0), force=np.arange(100.0))
-    gain = as_set_up(axis, replace(log, setup={"controller.kp": "1e6 N/m"}))
+    gain = as_set_up(axis, replace(log, setup={"controller.kp": "1e6 N*s/m"}))
     assert gain["controller.kp"] == 1e6
-    assert gain["controller.kd"] == axis.flat()["controller.kd"]
-    form = {"controller.crossover": "20 Hz", "controller.alpha": "0.1", "controller.beta": "2"}
+    assert gain["controller.kv"] == axis.flat()["controller.kv"]
+    form = {
+        "controller.kind": "pid",
+        "controller.crossover": "20 Hz",
+        "controller.alpha": "0.1",
+        "controller.beta": "2",
+    }
     other = as_set_up(axis, replace(log, setup=form))
     assert other["controller.crossover"] == 20
     assert "controller.kp" not in other
     with refused("controller.kpp"):
-        as_set_up(axis, replace(log, setup={"controller.kpp": "1e6 N/m"}))
+        as_set_up(axis, replace(log, setup={"controller.kpp": "1e6 N*s/m"}))
 
 
 def test_predictions_that_cannot_be_made_are_refused_before_the_fit(axis: Stage, refused: Refused) -> None:

@@ -361,10 +361,10 @@ def test_what_a_judgement_depends_on() -> None:
     )
     assert [str(each) for each in found.depends_on] == ["alpha 0.2: holds (number 1)"]
     assert "unknown parameter (holds with alpha 0.2)" in found.reason
-    varied = "What the thesis leaves open, varied one at a time, "
-    assert found.dependence == f"{varied}2 values: a part changes its judgement with alpha (0.2: holds)."
+    varied = "Parameters left open by the thesis, varied one at a time "
+    assert found.dependence == f"{varied}(2 values): the judgement changes with alpha (0.2: holds)."
     untouched = verdict(claim, "5", finding(True), finding(True), [(OPEN[0], finding(True))])
-    assert untouched.dependence == f"{varied}1 values: none changes a judgement."
+    assert untouched.dependence == f"{varied}(1 values): no judgement changes."
     assert verdict(claim, "5", finding(True), finding(True), []).dependence.startswith("Nothing that")
 
 

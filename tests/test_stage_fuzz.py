@@ -55,6 +55,8 @@ def check(text: str) -> None:
     for key, value in flattened(file).items():
         if key in ("name", "source"):
             assert getattr(stage, key) == value
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            assert all(f"{key}.{number}.{name}" in flat for number, table in enumerate(value, 1) for name in table)
         elif isinstance(value, str) and key in units:
             assert flat[key] == pytest.approx(
                 si_value(value, units[key]), rel=1e-12, abs=5e-318

@@ -73,7 +73,6 @@ class Cascade(ControllerSection):
     words: ClassVar[Mapping[str, str]] = MappingProxyType(
         {
             "kv": "Position gain kv",
-            "kp": "Velocity gain kp",
             "velocity_integral_time": "Integral time of velocity",
         }
     )
