@@ -400,7 +400,7 @@ def test_windows_of_kicks(windows, text):
     ("judgement", "peaks", "text"),
     [
         (hunts(), 6, "6"),
-        (hunts(), 0, "0 (only those after 10 s, above 100 µm, count)"),
+        (hunts(), 0, "0 (counted only after 10 s and above 100 µm)"),
         (hunts(verdict="bistable"), 0, "0 (another motion hunts)"),
         (settles(verdict="transient"), 8, "8 (a long transient)"),
         (settles(), 0, "0"),

@@ -365,7 +365,7 @@ def test_what_a_judgement_depends_on() -> None:
     assert found.dependence == f"{varied}(2 values): the judgement changes with alpha (0.2: holds)."
     untouched = verdict(claim, "5", finding(True), finding(True), [(OPEN[0], finding(True))])
     assert untouched.dependence == f"{varied}(1 values): no judgement changes."
-    assert verdict(claim, "5", finding(True), finding(True), []).dependence.startswith("Nothing that")
+    assert verdict(claim, "5", finding(True), finding(True), []).dependence.startswith("No open parameter")
 
 
 def test_a_variant_is_compared_with_the_baseline_alone() -> None:

@@ -264,8 +264,14 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
         return _complete(cause, key)
     if problem["type"] == "extra_forbidden":
         near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
-        return unknown_key(key, cls.model_fields, _described(cls, near, kind)[1])
+        return unknown_key(key, _own_first(cls), _described(cls, near, kind)[1])
     return InputError(key, quoted(problem["input"]), *_described(cls, key, kind))
+
+
+def _own_first(cls: type[Section]) -> list[str]:
+    """The keys of a table, its own before those that it shares with others."""
+    declared = (name for base in cls.__mro__ for name in vars(base).get("__annotations__", ()))
+    return [name for name in dict.fromkeys(declared) if name in cls.model_fields]
 
 
 def _complete(error: InputError, key: str) -> InputError:

@@ -71,26 +71,28 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     """Follow orbits from states (count, states) over times [s] (count,), with a small deviation along every state.
 
     That along one of them, whose rate is the largest, follows from the others: the flow carries the rates at the start
-    to those at the end.
+    to those at the end. A state alone does not tell the rates where modes remember: then all are followed.
     """
     count, size = states.shape
     every, before = np.arange(count)[:, None], stages.rates(states)
     last = np.argmax(np.abs(before) / stages.scales, axis=1)
     order = np.argsort(np.arange(size) == last[:, None], axis=1, kind="stable")
-    others = order[:, :-1]
-    runs = np.repeat(np.arange(count), size - 1)
+    followed = size if stages.kernel.switches else size - 1
+    others = order[:, :followed]
+    runs = np.repeat(np.arange(count), followed)
     starts = np.hstack([states[runs], np.eye(size)[others].reshape(-1, size)])
     results = stages.take(runs).run(starts, times[runs], rtol, variational=True, window=0.0)
-    both = results.ends.reshape(count, size - 1, 2 * size)
+    both = results.ends.reshape(count, followed, 2 * size)
     ends, columns = both[:, 0, :size], both[:, :, size:]
     flows = np.empty((count, size, size))
     flows[every, :, others] = columns
-    with np.errstate(divide="ignore", invalid="ignore"):
-        left = stages.rates(ends) - np.einsum("kj,kji->ki", before[every, others], columns)
-        flows[every[:, 0], :, last] = left / before[every[:, 0], last, None]
+    if followed < size:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            left = stages.rates(ends) - np.einsum("kj,kji->ki", before[every, others], columns)
+            flows[every[:, 0], :, last] = left / before[every[:, 0], last, None]
     extremes = (STATISTICS.index(name) for name in ("deviation_max", "deviation_min"))
-    high, low = (results.statistics[:: size - 1, column] for column in extremes)
-    return Shot(sign * ends, sign * flows, high, low, np.all(done(results).reshape(count, size - 1), axis=1))
+    high, low = (results.statistics[::followed, column] for column in extremes)
+    return Shot(sign * ends, sign * flows, high, low, np.all(done(results).reshape(count, followed), axis=1))
 
 
 def simplest(sign: float) -> int:
