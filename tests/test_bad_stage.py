@@ -262,7 +262,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         (
             'return_at = "5 s"',
             'velocity = "1 m/s"',
-            ("motion.velocity", "an unknown key", "one of kind, duration, acceleration", "kind ="),
+            ("motion.velocity", "an unknown key", "one of kind, acceleration", "kind ="),
         ),
         # rules between keys
         (
@@ -456,7 +456,7 @@ def test_no_file_and_folder(tmp_path: Path, refused: Refused) -> None:
         ({"controller": "12 Hz"}, ["controller\n", '"12 Hz"', "a table of keys"]),
         ({"controller.kp": "3 N/m"}, ["controller\n", "together with kp", "not both"]),
         ({"joint.locked": "True"}, ["joint.locked\n", '"True"', "true or false"]),
-        ({"motion.kind": "ramp"}, ["motion.acceleration\n", "an unknown key", "kind, duration, velocity"]),
+        ({"motion.kind": "ramp"}, ["motion.acceleration\n", "an unknown key", "one of kind, velocity"]),
         ({"motion": None}, ["motion\n", "nothing", "a table [motion]"]),
         ({"": "x"}, ["an unknown key", "one of name, source"]),
         ({"name": "\ud800"}, ["name\n", "\\ud800", "a text in quotes"]),
