@@ -116,10 +116,12 @@ def checked_metadata(path: Path) -> Metadata:
     if number is not None and number > FORMAT:
         actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
-    if number == FORMAT and entry["sha256"] == sealed:
-        return Metadata(document, entry["study"], entry["axes"], entry["notes"])
     if number == FORMAT:
-        raise _damaged(path, "is damaged")
+        study, axes, notes = (entry.get(name) for name in ("study", "axes", "notes"))
+        whole = isinstance(study, str) and isinstance(axes, dict) and isinstance(notes, dict)
+        if not whole or entry.get("sha256") != sealed:
+            raise _damaged(path, "is damaged")
+        return Metadata(document, study, axes, notes)
     if "equations" in attributes:
         actual, expected = "a store of an earlier friso, or a damaged one", "to run the study again under a new name"
         raise StoreError("", actual, expected, _EXAMPLE, str(path))

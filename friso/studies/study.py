@@ -201,7 +201,7 @@ def study_of(runs: xr.Dataset) -> Study:
         dimensions.append(Dimension(str(name), axes))
     stage = loads(runs.attrs["stage"])
     metrics = tuple(name for name in METRICS if name in runs)
-    links, rtol = json.loads(runs.attrs["links"]), float(runs.attrs["rtol"])
+    links, rtol = dict(json.loads(runs.attrs["links"])), float(runs.attrs["rtol"])
     return Study(stage, tuple(dimensions), links, metrics, rtol, bool(runs.attrs["refined"]))
 
 
