@@ -23,8 +23,8 @@ from friso.equations.as_built import AsBuilt, as_built
 from friso.equations.component import TICK, TIME
 from friso.equations.model import Model, assemble
 from friso.equations.structure import structure
-from friso.rig.run import as_built_keys
 from friso.stage import Stage
+from friso.virtual_rig.run import as_built_keys
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 import variants as v

@@ -15,12 +15,12 @@ import numpy as np
 
 import friso
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
-from friso.design.method import design
-from friso.design.spec import load_spec
-from friso.flexure import closed_forms
-from friso.flexure.beams import beams
-from friso.flexure.joint import first_interfering
-from friso.flexure.mechanism import Mechanism
+from friso.design_method.method import design
+from friso.design_method.spec import load_spec
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.mechanism import Mechanism
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MANY = 1_000_000

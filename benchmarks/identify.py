@@ -24,16 +24,16 @@ import numpy as np
 
 from benchmarks.report import Goal, print_goals, print_table
 from friso.errors import InputError
-from friso.identify.estimate import Estimate
-from friso.identify.experiments.break_away import static_from_ramps
-from friso.identify.experiments.steps import stiffness_from_steps
-from friso.identify.experiments.stick_slip import static_from_stick_slip
-from friso.identify.logs.log import Log
-from friso.identify.moves import identify_moves
-from friso.identify.output_error.parameters import MASS, RATIO, parameters_of
-from friso.identify.output_error.problem import closed_loop
-from friso.identify.readings.friction_velocity import friction_velocity
-from friso.identify.response.analysis import analyse
+from friso.identification.estimate import Estimate
+from friso.identification.experiments.break_away import static_from_ramps
+from friso.identification.experiments.steps import stiffness_from_steps
+from friso.identification.experiments.stick_slip import static_from_stick_slip
+from friso.identification.logs.log import Log
+from friso.identification.moves import identify_moves
+from friso.identification.output_error.parameters import MASS, RATIO, parameters_of
+from friso.identification.output_error.problem import closed_loop
+from friso.identification.readings.friction_velocity import friction_velocity
+from friso.identification.response.analysis import analyse
 from friso.intervals import COVERAGE
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))

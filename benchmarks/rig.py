@@ -16,9 +16,9 @@ from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.rig.run import RTOL, run
 from friso.stage import Stage, load
 from friso.studies.rig.moves_on_rails import INTERVAL, move, with_joint
+from friso.virtual_rig.run import RTOL, run
 
 FILE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 RUNS = 32

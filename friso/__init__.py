@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import friso.interrupts  # isort: skip  (first: what follows takes a while)
 import friso.equations.controllers  # registers the controllers with the stage file
 import friso.equations.friction  # and the friction laws
-import friso.flexure.joint  # noqa: F401 (and what follows from leaf springs)
+import friso.leaf_springs.joint  # noqa: F401 (and what follows from leaf springs)
 from friso.errors import InputError, LogError, SpecError, StageError, StoreError
 from friso.stage import Stage, load, loads, save
 from friso.version import VERSION as __version__

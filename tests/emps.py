@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from friso.identify.logs.assemble import read_log
-from friso.identify.logs.log import Log
-from friso.identify.logs.mapping import from_options
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.log import Log
+from friso.identification.logs.mapping import from_options
 
 EMPS = Path(__file__).parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 

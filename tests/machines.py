@@ -14,9 +14,9 @@ from scipy.integrate import cumulative_trapezoid
 
 import friso
 from friso.engine.driven import follow
-from friso.identify.logs.log import Log
-from friso.identify.output_error.problem import RTOL, closed_loop
-from friso.identify.readings.common import record
+from friso.identification.logs.log import Log
+from friso.identification.output_error.problem import RTOL, closed_loop
+from friso.identification.readings.common import record
 
 FIXED = 1e9
 """Mass [kg] of a cart that is held: it does not move."""

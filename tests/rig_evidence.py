@@ -4,8 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.estimate import Estimate
-from friso.identify.response.response import FrequencyResponse
+from friso.identification.estimate import Estimate
+from friso.identification.response.response import FrequencyResponse
 from friso.studies.rig.experiments.frf import MeasuredLoop
 from friso.studies.rig.experiments.in_position import InPosition, Standstill
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover

@@ -30,9 +30,9 @@ from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases
 from friso.hunting.cycle.hunting import Hunting
 from friso.hunting.cycle.hunting import hunting as hunting_of
-from friso.identify.experiments.moves import identify_moves
-from friso.identify.output_error.problem import closed_loop
-from friso.identify.readings.common import record
+from friso.identification.experiments.moves import identify_moves
+from friso.identification.output_error.problem import closed_loop
+from friso.identification.readings.common import record
 from friso.progress import silent
 from friso.stage import Stage
 from friso.studies.compare import study

@@ -25,12 +25,12 @@ import friso
 from friso.cli.app import main
 from friso.cli.commands.design import design as command
 from friso.cli.output import MARKER
-from friso.design import choice, controller, edges, front, hunting_map, method, population, verification
-from friso.design.edges import Corners
-from friso.design.geometry import Geometry, Sheet
-from friso.design.method import Design, NoDesign
-from friso.design.relax import Relaxation
-from friso.design.spec import Position, Spec, load_spec
+from friso.design_method import choice, controller, edges, front, hunting_map, method, population, verification
+from friso.design_method.edges import Corners
+from friso.design_method.geometry import Geometry, Sheet
+from friso.design_method.method import Design, NoDesign
+from friso.design_method.relax import Relaxation
+from friso.design_method.spec import Position, Spec, load_spec
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.views.design.control import controller_step, moves_step, parallel_gains

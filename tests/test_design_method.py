@@ -9,31 +9,31 @@ import pytest
 from beyond_flip import CREEPING
 
 import friso
-from friso.design import front as front_module
-from friso.design import relax as relax_module
-from friso.design.choice import chosen, confirmed
-from friso.design.controller import comfortable_below, controller, dampings
-from friso.design.edges import Corners, edges_over, rigid
-from friso.design.front import Candidate, front, judged
-from friso.design.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
-from friso.design.method import NoDesign, fitted, least_friction, leaves
-from friso.design.modal import Modal
-from friso.design.population import Population, corners
-from friso.design.prepare import prepared, with_leaves
-from friso.design.relax import relaxations
-from friso.design.requirements import PARASITIC, RESERVE, LeafTask, requirements
-from friso.design.spec import Spec, load_spec
-from friso.design.verification import RTOL, MachineOutcomes, tried, verification
-from friso.flexure import beams as beams_module
-from friso.flexure import closed_forms
-from friso.flexure.beams import BeamFailure
-from friso.flexure.closed_model import closed
-from friso.flexure.evaluation import Evaluation
-from friso.flexure.mechanism import Mechanism
+from friso.design_method import front as front_module
+from friso.design_method import relax as relax_module
+from friso.design_method.choice import chosen, confirmed
+from friso.design_method.controller import comfortable_below, controller, dampings
+from friso.design_method.edges import Corners, edges_over, rigid
+from friso.design_method.front import Candidate, front, judged
+from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
+from friso.design_method.method import NoDesign, fitted, least_friction, leaves
+from friso.design_method.modal import Modal
+from friso.design_method.population import Population, corners
+from friso.design_method.prepare import prepared, with_leaves
+from friso.design_method.relax import relaxations
+from friso.design_method.requirements import PARASITIC, RESERVE, LeafTask, requirements
+from friso.design_method.spec import Spec, load_spec
+from friso.design_method.verification import RTOL, MachineOutcomes, tried, verification
 from friso.frequency.crossover import limits, settled_margin
 from friso.frequency.tuning import Tuning
 from friso.hunting.margin import margin
 from friso.hunting.measures import measured_run
+from friso.leaf_springs import beams as beams_module
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.beams import BeamFailure
+from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.mechanism import Mechanism
 from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -142,7 +142,7 @@ def test_a_geometry_at_which_beams_fail_is_marked(
     task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The search goes on without it."""
-    from friso.design import choice as choice_module
+    from friso.design_method import choice as choice_module
 
     calls = []
 
@@ -291,7 +291,7 @@ def test_the_least_friction_is_that_of_the_range(base: Stage) -> None:
 def test_without_a_comfortable_crossover_there_is_no_design(
     base: Stage, task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from friso.design import method
+    from friso.design_method import method
 
     monkeypatch.setattr(method, "comfortable_below", lambda ranges, highest: None)
     with pytest.raises(NoDesign, match="modulus margin"):
@@ -315,7 +315,7 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
 
 
 def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    from friso.design import verification as module
+    from friso.design_method import verification as module
 
     monkeypatch.setattr(module, "MACHINES", 200)
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)

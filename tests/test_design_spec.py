@@ -10,10 +10,10 @@ import pytest
 from refusals import Refused
 
 import friso
-from friso.design.geometry import Geometry, Sheet, box, rounded, sheets
-from friso.design.population import corners, sampled, typical_move
-from friso.design.prepare import prepared, with_leaves
-from friso.design.spec import Spec, load_spec
+from friso.design_method.geometry import Geometry, Sheet, box, rounded, sheets
+from friso.design_method.population import corners, sampled, typical_move
+from friso.design_method.prepare import prepared, with_leaves
+from friso.design_method.spec import Spec, load_spec
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = EXAMPLES / "specs" / "thesis.toml"

@@ -10,8 +10,8 @@ from refusals import Refused
 
 import friso
 from friso.errors import InputError
-from friso.identify.logs import mapping
-from friso.identify.logs.read import read_frequency_response
+from friso.identification.logs import mapping
+from friso.identification.logs.read import read_frequency_response
 from friso.stage import Stage, loads, numeric_keys, parse_set
 from friso.stage.plausible import doubts
 

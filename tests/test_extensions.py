@@ -15,13 +15,13 @@ import pytest
 from friso.cli.app import main
 from friso.cli.command import COMMANDS, Command
 from friso.cli.output import OutputFolder, print_document
-from friso.identify.estimate import Estimate
-from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
-from friso.identify.kinds import KINDS, in_order
-from friso.identify.logs.channel import Channel, ChannelTable
-from friso.identify.logs.format import FORMATS, LogFormat
-from friso.identify.logs.log import Log
-from friso.identify.logs.read import file_format, read_table
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.kinds import KINDS, in_order
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.format import FORMATS, LogFormat
+from friso.identification.logs.log import Log
+from friso.identification.logs.read import file_format, read_table
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.stage.foreign import foreign

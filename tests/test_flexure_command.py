@@ -23,10 +23,10 @@ from friso.cli.commands.flexure import EXAMPLE
 from friso.cli.commands.flexure import flexure as command
 from friso.cli.output import MARKER
 from friso.errors import InputError
-from friso.flexure.beams import BeamFailure
-from friso.flexure.both_models import BEAMS, CLOSED, BothModels, both_models
-from friso.flexure.evaluation import Mode
-from friso.flexure.mechanism import Mechanism
+from friso.leaf_springs.beams import BeamFailure
+from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels, both_models
+from friso.leaf_springs.evaluation import Mode
+from friso.leaf_springs.mechanism import Mechanism
 from friso.stage import Stage
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Figure
@@ -117,7 +117,7 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(mechanism: Mechanism, stroke: float) -> None:
         raise BeamFailure("The beams find no equilibrium at a deflection of 1 mm: reduce the stroke.")
 
-    monkeypatch.setattr("friso.flexure.both_models.beams", fail)
+    monkeypatch.setattr("friso.leaf_springs.both_models.beams", fail)
 
 
 def _strict(text: str) -> dict[str, Any]:

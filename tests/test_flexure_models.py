@@ -15,13 +15,13 @@ from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from friso.flexure import closed_forms, curved, plate
-from friso.flexure.beam_system import BeamFailure, Configuration, LeafBeams
-from friso.flexure.beams import beams
-from friso.flexure.closed_model import closed
-from friso.flexure.evaluation import VISIBLE
-from friso.flexure.joint import first_interfering, parasitic_mode
-from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
+from friso.leaf_springs import closed_forms, curved, plate
+from friso.leaf_springs.beam_system import BeamFailure, Configuration, LeafBeams
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.evaluation import VISIBLE
+from friso.leaf_springs.joint import first_interfering, parasitic_mode
+from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 
 MANY = settings(max_examples=40, deadline=None, derandomize=True)
 FEW = settings(max_examples=10, deadline=None, derandomize=True)

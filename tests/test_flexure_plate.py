@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ritz import plate as ritz
 
-from friso.flexure import plate
+from friso.leaf_springs import plate
 
 FEW = settings(max_examples=12, deadline=None, derandomize=True)
 SLENDER = st.floats(0.8, 6.0)

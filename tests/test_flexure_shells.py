@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import shells
 
-from friso.flexure.beams import beams
-from friso.flexure.closed_model import closed
-from friso.flexure.evaluation import Evaluation, Model
-from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.evaluation import Evaluation, Model
+from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 
 MODELS: dict[str, Model] = {"closed forms": closed, "beams": beams}

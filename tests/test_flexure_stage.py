@@ -9,10 +9,10 @@ from refusals import Refused
 
 import friso
 from friso.errors import InputError
-from friso.flexure import closed_forms
-from friso.flexure.beams import beams
-from friso.flexure.joint import parasitic_mode
-from friso.flexure.mechanism import Mechanism
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.joint import parasitic_mode
+from friso.leaf_springs.mechanism import Mechanism
 from friso.materials import materials
 from friso.stage import Stage, load, loads, save, violations
 from friso.studies.cells import allowed, flat_cells

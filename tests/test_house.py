@@ -24,13 +24,13 @@ SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.p
 
 ABOUT_TUNING = (
     *(
-        "design/",
+        "design_method/",
         "views/design/",
         "studies/thesis/",
         "studies/guideline/",
         "studies/rig/experiments/measured_cycles.py",
     ),
-    *("frequency/tuning.py", "identify/stage_file.py", "identify/output_error/problem.py"),
+    *("frequency/tuning.py", "identification/stage_file.py", "identification/output_error/problem.py"),
 )
 """Modules that import a form of the PID controller: the design method, the studies of the thesis and the guideline are
 about van Dijk's rules (Eq. 7, 8); identify makes controllers of its own."""
@@ -38,9 +38,9 @@ about van Dijk's rules (Eq. 7, 8); identify makes controllers of its own."""
 RECIPES = {
     "controller": "equations/controllers",
     "friction law": "equations/friction",
-    "kind of experiment": "identify/experiments",
+    "kind of experiment": "identification/experiments",
     "command and its page": "cli/commands",
-    "log format": "identify/logs",
+    "log format": "identification/logs",
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
 

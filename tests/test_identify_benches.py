@@ -8,16 +8,16 @@ import pytest
 import scipy.io
 from scipy import signal
 
-from friso.identify.response.closed_loop import feedback
-from friso.identify.response.departure import departure, friction_from_departure
-from friso.identify.response.limit_cases import visible
-from friso.identify.response.mass_line import mass_lines
-from friso.identify.response.modes import fit_modes
-from friso.identify.response.periodic import multisine
-from friso.identify.response.records import ResponseRecord, relative_error
-from friso.identify.response.response import Channels, FrequencyResponse
-from friso.identify.response.simulated import explained
-from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened
+from friso.identification.response.closed_loop import feedback
+from friso.identification.response.departure import departure, friction_from_departure
+from friso.identification.response.limit_cases import visible
+from friso.identification.response.mass_line import mass_lines
+from friso.identification.response.modes import fit_modes
+from friso.identification.response.periodic import multisine
+from friso.identification.response.records import ResponseRecord, relative_error
+from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.simulated import explained
+from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 BAND = (3.0, 20.1)

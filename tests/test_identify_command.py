@@ -21,10 +21,10 @@ from snapshots import Snapshots
 
 import friso
 from friso.cli.app import main
-from friso.identify import method
-from friso.identify.logs.log import Log
-from friso.identify.output_error import fit as fitting
-from friso.identify.output_error import profile as profiles
+from friso.identification import method
+from friso.identification.logs.log import Log
+from friso.identification.output_error import fit as fitting
+from friso.identification.output_error import profile as profiles
 from friso.stage.correlations import beside, read_correlations
 
 pytestmark = pytest.mark.xdist_group("identify-moves")

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from friso import load
-from friso.identify.output_error.problem import why_continuous
+from friso.identification.output_error.problem import why_continuous
 
 EMPS = Path(__file__).parents[1] / "examples" / "emps_axis.toml"
 

@@ -18,18 +18,18 @@ from scipy.io import loadmat
 from scipy.signal import lfilter
 
 import friso
-from friso.identify.combine import combined
-from friso.identify.estimate import Estimate
-from friso.identify.experiments.break_away import static_from_ramps
-from friso.identify.experiments.steps import stiffness_from_steps
-from friso.identify.experiments.stick_slip import static_from_stick_slip
-from friso.identify.logs.log import Log
-from friso.identify.method import identify
-from friso.identify.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
-from friso.identify.readings.friction_position import friction_position
-from friso.identify.readings.friction_velocity import friction_velocity
-from friso.identify.readings.rate_effect import break_away, share_below, static_friction
-from friso.identify.response.fitting import ResponseFit
+from friso.identification.combine import combined
+from friso.identification.estimate import Estimate
+from friso.identification.experiments.break_away import static_from_ramps
+from friso.identification.experiments.steps import stiffness_from_steps
+from friso.identification.experiments.stick_slip import static_from_stick_slip
+from friso.identification.logs.log import Log
+from friso.identification.method import identify
+from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
+from friso.identification.readings.friction_position import friction_position
+from friso.identification.readings.friction_velocity import friction_velocity
+from friso.identification.readings.rate_effect import break_away, share_below, static_friction
+from friso.identification.response.fitting import ResponseFit
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
     EXPERIMENTS,

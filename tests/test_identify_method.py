@@ -12,16 +12,16 @@ from scipy.ndimage import gaussian_filter1d
 
 import friso
 from friso.errors import InputError
-from friso.identify.combine import combined, correlations
-from friso.identify.estimate import Estimate
-from friso.identify.logs.log import Log
-from friso.identify.method import identify
-from friso.identify.readings.common import record
-from friso.identify.readings.course import external
-from friso.identify.response.analysis import analyse
-from friso.identify.sources import recognised
-from friso.identify.stage_file import identified
-from friso.identify.stage_keys import fitting
+from friso.identification.combine import combined, correlations
+from friso.identification.estimate import Estimate
+from friso.identification.logs.log import Log
+from friso.identification.method import identify
+from friso.identification.readings.common import record
+from friso.identification.readings.course import external
+from friso.identification.response.analysis import analyse
+from friso.identification.sources import recognised
+from friso.identification.stage_file import identified
+from friso.identification.stage_keys import fitting
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
 

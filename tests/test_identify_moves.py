@@ -15,17 +15,17 @@ from patched import patched
 from refusals import Refused
 
 import friso
-from friso.identify import moves as method
-from friso.identify.errors import errors_of
-from friso.identify.logs.log import Log
-from friso.identify.moves import IdentifiedMoves, identify_moves, simulated_log
-from friso.identify.output_error import fit as fitting
-from friso.identify.output_error import profile as profiles
-from friso.identify.output_error.fit import everywhere, first_values, fit, nearby
-from friso.identify.output_error.identifiable import BRISTLES
-from friso.identify.output_error.parameters import HIGHEST_RATIO, SHORTEST
-from friso.identify.output_error.problem import closed_loop
-from friso.identify.output_error.refine import bounds_of, costs
+from friso.identification import moves as method
+from friso.identification.errors import errors_of
+from friso.identification.logs.log import Log
+from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
+from friso.identification.output_error import fit as fitting
+from friso.identification.output_error import profile as profiles
+from friso.identification.output_error.fit import everywhere, first_values, fit, nearby
+from friso.identification.output_error.identifiable import BRISTLES
+from friso.identification.output_error.parameters import HIGHEST_RATIO, SHORTEST
+from friso.identification.output_error.problem import closed_loop
+from friso.identification.output_error.refine import bounds_of, costs
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
 

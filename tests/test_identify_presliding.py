@@ -12,11 +12,11 @@ from rig_machines import EXAMPLE, built
 from scipy.integrate import solve_ivp
 
 import friso
-from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
-from friso.identify.logs.log import Log
-from friso.identify.method import identify
-from friso.identify.readings.at_bearing import Between, StructureMode, between
-from friso.identify.readings.common import deflections, jackknife, record
+from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
+from friso.identification.logs.log import Log
+from friso.identification.method import identify
+from friso.identification.readings.at_bearing import Between, StructureMode, between
+from friso.identification.readings.common import deflections, jackknife, record
 from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.presliding import GENTLE, presliding_log
 from friso.studies.rig.outcome import rig_log

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from friso.identify.causes import causes
-from friso.identify.combine import combined
-from friso.identify.estimate import Estimate
-from friso.identify.inverse_model import inverse_model
-from friso.identify.logs.log import Log
-from friso.identify.model_error import all_with_model_error, of_inverse_model, with_causes, with_model_error
-from friso.identify.output_error.parameters import FitParameter, parameters_of
-from friso.identify.output_error.problem import tracking
-from friso.identify.quality import Quality, halves, noise_of, whole_error
-from friso.identify.readings.common import record
-from friso.identify.spread import groups_of, spread_of
-from friso.identify.stage_file import NOT_IDENTIFIED, identified, made_up, origins, with_origins, written
+from friso.identification.causes import causes
+from friso.identification.combine import combined
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import inverse_model
+from friso.identification.logs.log import Log
+from friso.identification.model_error import all_with_model_error, of_inverse_model, with_causes, with_model_error
+from friso.identification.output_error.parameters import FitParameter, parameters_of
+from friso.identification.output_error.problem import tracking
+from friso.identification.quality import Quality, halves, noise_of, whole_error
+from friso.identification.readings.common import record
+from friso.identification.spread import groups_of, spread_of
+from friso.identification.stage_file import NOT_IDENTIFIED, identified, made_up, origins, with_origins, written
 from friso.views.identify.numbers import interval_text, value_text
 
 DT = 1e-3

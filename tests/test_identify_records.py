@@ -12,19 +12,19 @@ from refusals import Refused
 from test_identify_views import moves
 
 import friso
-from friso.identify.inverse_model import inverse_model, motion, unit_of
-from friso.identify.kind import AnalysisSettings
-from friso.identify.logs.assemble import read_log
-from friso.identify.logs.integrated import NOTE
-from friso.identify.logs.log import Log
-from friso.identify.logs.mapping import Mapping
-from friso.identify.method import Identification, identify
-from friso.identify.moves import IdentifiedMoves
-from friso.identify.output_error.answers import estimates_of
-from friso.identify.output_error.coverage import coverage
-from friso.identify.output_error.identifiable import Identified
-from friso.identify.readings.common import LINEARITY, record
-from friso.identify.sources import named, read_all
+from friso.identification.inverse_model import inverse_model, motion, unit_of
+from friso.identification.kind import AnalysisSettings
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.integrated import NOTE
+from friso.identification.logs.log import Log
+from friso.identification.logs.mapping import Mapping
+from friso.identification.method import Identification, identify
+from friso.identification.moves import IdentifiedMoves
+from friso.identification.output_error.answers import estimates_of
+from friso.identification.output_error.coverage import coverage
+from friso.identification.output_error.identifiable import Identified
+from friso.identification.readings.common import LINEARITY, record
+from friso.identification.sources import named, read_all
 from friso.views.identify.document import identify_document
 from friso.views.identify.words import answer, headline
 

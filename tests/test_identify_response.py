@@ -7,20 +7,20 @@ import pytest
 from refusals import Refused
 from scipy import signal
 
-from friso.identify.estimate import Estimate
-from friso.identify.logs.log import Log
-from friso.identify.response.arbitrary import local_polynomial, welch
-from friso.identify.response.closed_loop import crossovers, disagreement, feedback, open_loop
-from friso.identify.response.departure import Drag, departure, friction_from_departure
-from friso.identify.response.limit_cases import visible
-from friso.identify.response.mass_line import mass_lines, straight_lines
-from friso.identify.response.modes import fit_modes
-from friso.identify.response.period import find_periods
-from friso.identify.response.periodic import multisine
-from friso.identify.response.records import ResponseRecord, drift, from_log, relative_error
-from friso.identify.response.response import FrequencyResponse
-from friso.identify.response.simulated import explained, slid
-from friso.identify.response.two_mass import fit_two_mass, two_masses, widened
+from friso.identification.estimate import Estimate
+from friso.identification.logs.log import Log
+from friso.identification.response.arbitrary import local_polynomial, welch
+from friso.identification.response.closed_loop import crossovers, disagreement, feedback, open_loop
+from friso.identification.response.departure import Drag, departure, friction_from_departure
+from friso.identification.response.limit_cases import visible
+from friso.identification.response.mass_line import mass_lines, straight_lines
+from friso.identification.response.modes import fit_modes
+from friso.identification.response.period import find_periods
+from friso.identification.response.periodic import multisine
+from friso.identification.response.records import ResponseRecord, drift, from_log, relative_error
+from friso.identification.response.response import FrequencyResponse
+from friso.identification.response.simulated import explained, slid
+from friso.identification.response.two_mass import fit_two_mass, two_masses, widened
 from friso.stage import loads
 
 DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz

@@ -11,14 +11,14 @@ from test_identify_experiments import DT, FLAT, LUGRE, ramps, travels
 
 import friso
 from friso.errors import InputError
-from friso.identify.experiments.break_away import static_from_ramps
-from friso.identify.kind import as_set_up
-from friso.identify.kinds import KINDS
-from friso.identify.logs.joined import joined
-from friso.identify.logs.log import Log
-from friso.identify.method import check_predictions, identify
-from friso.identify.readings.common import record
-from friso.identify.readings.friction_velocity import friction_velocity
+from friso.identification.experiments.break_away import static_from_ramps
+from friso.identification.kind import as_set_up
+from friso.identification.kinds import KINDS
+from friso.identification.logs.joined import joined
+from friso.identification.logs.log import Log
+from friso.identification.method import check_predictions, identify
+from friso.identification.readings.common import record
+from friso.identification.readings.friction_velocity import friction_velocity
 from friso.stage import Stage
 
 

@@ -15,34 +15,34 @@ from hypothesis import strategies as st
 from pages import Page
 from snapshots import Snapshots
 
-from friso.identify.combine import combined
-from friso.identify.errors import SimulationErrors, residual_of
-from friso.identify.estimate import NO_INTERVAL, Estimate
-from friso.identify.experiments.break_away import static_from_ramps
-from friso.identify.experiments.constant_speed import FrictionAtSpeeds
-from friso.identify.experiments.presliding import bristles_from_presliding
-from friso.identify.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
-from friso.identify.experiments.steps import stiffness_from_steps
-from friso.identify.experiments.stick_slip import static_from_stick_slip
-from friso.identify.inverse_model import inverse_model, motion
-from friso.identify.logs.log import Log
-from friso.identify.logs.measured_response import MeasuredResponse
-from friso.identify.method import Experiment, Identification, Prediction
-from friso.identify.moves import IdentifiedMoves, SimulatedLog
-from friso.identify.output_error.coverage import coverage
-from friso.identify.output_error.fit import OutputErrorFit, first_values
-from friso.identify.output_error.parameters import parameters_of
-from friso.identify.output_error.problem import Simulated, closed_loop, tracking
-from friso.identify.output_error.profile import Profile
-from friso.identify.quality import Quality
-from friso.identify.readings.at_bearing import Between
-from friso.identify.readings.common import deflections, record
-from friso.identify.readings.friction_position import friction_position
-from friso.identify.readings.friction_velocity import friction_velocity
-from friso.identify.response.analysis import analyse
-from friso.identify.response.two_mass import two_masses
-from friso.identify.sources import LogFile
-from friso.identify.stage_file import identified, made_up, written
+from friso.identification.combine import combined
+from friso.identification.errors import SimulationErrors, residual_of
+from friso.identification.estimate import NO_INTERVAL, Estimate
+from friso.identification.experiments.break_away import static_from_ramps
+from friso.identification.experiments.constant_speed import FrictionAtSpeeds
+from friso.identification.experiments.presliding import bristles_from_presliding
+from friso.identification.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
+from friso.identification.experiments.steps import stiffness_from_steps
+from friso.identification.experiments.stick_slip import static_from_stick_slip
+from friso.identification.inverse_model import inverse_model, motion
+from friso.identification.logs.log import Log
+from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.method import Experiment, Identification, Prediction
+from friso.identification.moves import IdentifiedMoves, SimulatedLog
+from friso.identification.output_error.coverage import coverage
+from friso.identification.output_error.fit import OutputErrorFit, first_values
+from friso.identification.output_error.parameters import parameters_of
+from friso.identification.output_error.problem import Simulated, closed_loop, tracking
+from friso.identification.output_error.profile import Profile
+from friso.identification.quality import Quality
+from friso.identification.readings.at_bearing import Between
+from friso.identification.readings.common import deflections, record
+from friso.identification.readings.friction_position import friction_position
+from friso.identification.readings.friction_velocity import friction_velocity
+from friso.identification.response.analysis import analyse
+from friso.identification.response.two_mass import two_masses
+from friso.identification.sources import LogFile
+from friso.identification.stage_file import identified, made_up, written
 from friso.stage.correlations import Correlations
 from friso.views.drawing import plotly_renderer
 from friso.views.drawing.figure import Figure, Panel, Series

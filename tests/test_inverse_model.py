@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from refusals import Refused
 
 from friso.errors import InputError
-from friso.identify.inverse_model import bandwidth_of, inverse_model
-from friso.identify.logs.log import Log
-from friso.identify.readings.common import record
+from friso.identification.inverse_model import bandwidth_of, inverse_model
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import record
 
 EMPS = Path(__file__).parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 DT = 1e-3

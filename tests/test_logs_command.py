@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from inside import friso_inside
 
-from friso.identify.contents import content_of
-from friso.identify.logs.mapping import Mapping, from_options
+from friso.identification.contents import content_of
+from friso.identification.logs.mapping import Mapping, from_options
 from friso.views.logs.words import next_command, sparkline
 
 TIME = 1e-3 * np.arange(1200)

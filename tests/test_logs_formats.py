@@ -16,11 +16,11 @@ from refusals import Refused
 from scipy.io import savemat
 
 from friso.errors import InputError
-from friso.identify.logs import confined
-from friso.identify.logs import format as reading
-from friso.identify.logs.channel import Channel, ChannelTable
-from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
-from friso.identify.logs.units import split_heading
+from friso.identification.logs import confined
+from friso.identification.logs import format as reading
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
+from friso.identification.logs.units import split_heading
 from friso.system import LIMITS_MEMORY
 
 M = log_files.motion()

@@ -11,16 +11,16 @@ from refusals import Refused
 from scipy.io import savemat
 
 from friso.errors import InputError
-from friso.identify.logs import mapping as mappings
-from friso.identify.logs.assemble import read_log
-from friso.identify.logs.checks import clipped_share, held, unwrapped
-from friso.identify.logs.delays import fitted_lag, in_blocks, lag
-from friso.identify.logs.gaps import GapsError
-from friso.identify.logs.log import ROLES, Log
-from friso.identify.logs.mapping import Mapping, from_options
-from friso.identify.logs.roles import role_of
-from friso.identify.logs.time_base import together, track
-from friso.identify.logs.units import in_si, read_scale, spelled, split_heading
+from friso.identification.logs import mapping as mappings
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.checks import clipped_share, held, unwrapped
+from friso.identification.logs.delays import fitted_lag, in_blocks, lag
+from friso.identification.logs.gaps import GapsError
+from friso.identification.logs.log import ROLES, Log
+from friso.identification.logs.mapping import Mapping, from_options
+from friso.identification.logs.roles import role_of
+from friso.identification.logs.time_base import together, track
+from friso.identification.logs.units import in_si, read_scale, spelled, split_heading
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 M = log_files.motion(2000)

@@ -24,9 +24,9 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
 from friso.hunting.cycle.multipliers import slopes
 from friso.hunting.cycle.shooting import shoot
-from friso.identify.output_error.parameters import parameters_of
-from friso.rig.run import as_built_keys, failures, run
-from friso.rig.task import own_motion
+from friso.identification.output_error.parameters import parameters_of
+from friso.virtual_rig.run import as_built_keys, failures, run
+from friso.virtual_rig.task import own_motion
 
 pytestmark = pytest.mark.xdist_group("maxwell_slip")
 

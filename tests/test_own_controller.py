@@ -17,11 +17,10 @@ from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
 from friso.frequency import crossover
 from friso.hunting import Case
-from friso.identify.moves import identify_moves
-from friso.identify.output_error.problem import closed_loop
-from friso.identify.readings.common import record
+from friso.identification.moves import identify_moves
+from friso.identification.output_error.problem import closed_loop
+from friso.identification.readings.common import record
 from friso.progress import silent
-from friso.rig.run import as_built_keys
 from friso.stage import Stage, save
 from friso.studies.compare import study
 from friso.studies.compare.study import compare
@@ -29,6 +28,7 @@ from friso.studies.rig.experiments import hunting
 from friso.studies.rig.moves_on_rails import rails
 from friso.views.compare.words import sentences as comparison_sentences
 from friso.views.rig.page import sentences
+from friso.virtual_rig.run import as_built_keys
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 CONTROLLER = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg", "force_limit": "200 N"}

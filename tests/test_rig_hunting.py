@@ -11,7 +11,6 @@ from refusals import Refused
 from friso import load
 from friso.engine.arrays import Status
 from friso.progress import silent
-from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig.experiments import hunting, in_position, measured_cycles, stroke_crossover
 from friso.studies.rig.moves_on_rails import (
@@ -29,6 +28,7 @@ from friso.studies.rig.moves_on_rails import (
 )
 from friso.views.rig.document import rig_document
 from friso.views.rig.page import figures, sentences
+from friso.virtual_rig.run import Recorded
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
 

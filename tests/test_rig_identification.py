@@ -7,7 +7,7 @@ import pytest
 from refusals import Refused
 
 import friso
-from friso.identify.experiments.stick_slip import static_from_stick_slip
+from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.progress import silent
 from friso.stage import Stage
 from friso.studies.rig import excitation, many_speeds, sizes

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from rig_machines import built, mean_level, sources, through_files
 
-from friso.identify.experiments.frequency import _of_stage_alone
-from friso.identify.method import identify
-from friso.identify.readings.common import record
-from friso.identify.readings.friction_velocity import friction_velocity
+from friso.identification.experiments.frequency import _of_stage_alone
+from friso.identification.method import identify
+from friso.identification.readings.common import record
+from friso.identification.readings.friction_velocity import friction_velocity
 from friso.stage import load
 from friso.stage.files import save
 from friso.studies.rig.experiments.stiction import slow_motion

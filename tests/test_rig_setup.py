@@ -6,9 +6,9 @@ import pytest
 from refusals import Refused
 
 import friso
-from friso.identify.kind import as_set_up
-from friso.identify.logs.mapping import Mapping, load, mapping_text, sidecar
-from friso.identify.sources import read_all
+from friso.identification.kind import as_set_up
+from friso.identification.logs.mapping import Mapping, load, mapping_text, sidecar
+from friso.identification.sources import read_all
 from friso.progress import silent
 from friso.stage import Stage
 from friso.studies.rig.experiments import constant_speed, presliding, stiction

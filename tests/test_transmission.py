@@ -15,9 +15,9 @@ from friso.frequency.parts import plant
 from friso.hunting.cycle.hunting import cannot_hunt, hunting
 from friso.hunting.feeding import Decline, Feeding, dry_friction
 from friso.hunting.loop import unstable
-from friso.rig.run import as_built_keys
 from friso.stage import Stage
 from friso.views.check.feeding_words import feeding_sentences
+from friso.virtual_rig.run import as_built_keys
 
 LUGRE = {
     "model": "lugre",

@@ -125,7 +125,7 @@ def test_a_number_of_leaves_is_certain(refused: Refused) -> None:
 
 def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
     """One value is meant there, or a range that is allowed: not what is known of a machine."""
-    from friso.design.spec import SpecMachine
+    from friso.design_method.spec import SpecMachine
 
     with refused("bandwidth_limit"):
         SpecMachine(bandwidth_limit="48 Hz +/- 5 Hz")

@@ -20,10 +20,10 @@ import numpy as np
 import psutil
 
 import friso
-from friso.design.spec import load_spec
-from friso.identify.logs import binary, confined, mapping
-from friso.identify.logs.assemble import read_log
-from friso.identify.logs.read import is_frequency_response, read_frequency_response
+from friso.design_method.spec import load_spec
+from friso.identification.logs import binary, confined, mapping
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.read import is_frequency_response, read_frequency_response
 from friso.stage import Stage
 from friso.stage.correlations import read_correlations
 from friso.studies.request import Request

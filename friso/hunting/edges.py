@@ -1,7 +1,8 @@
 """The edge of the symmetric cycle of many stages: the lowest crossover at and above which it is not known to attract.
 
 What else may attract beyond, such as an asymmetric cycle, is looked for after a jump and where no orbit could be
-closed, and nowhere else; `friso.hunting.margin` and `friso.design.edges` rest on a survey of everything that attracts.
+closed, and nowhere else; `friso.hunting.margin` and `friso.design_method.edges` rest on a survey of everything that
+attracts.
 """
 
 from __future__ import annotations

@@ -23,8 +23,8 @@ from friso.cli.progress import ProgressBar
 STAGES = ("design.toml", "worst.toml")
 
 if TYPE_CHECKING:
-    from friso.design.method import Design, NoDesign
-    from friso.design.spec import Spec
+    from friso.design_method.method import Design, NoDesign
+    from friso.design_method.spec import Spec
     from friso.stage import Stage
 
 
@@ -40,8 +40,8 @@ def design(
 
     Example: friso design examples/thesis_rig.toml examples/specs/thesis.toml --out design
     """
-    from friso.design.method import NoDesign
-    from friso.design.spec import load_spec
+    from friso.design_method.method import NoDesign
+    from friso.design_method.spec import load_spec
 
     stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
     spec = load_spec(spec_file)
@@ -68,7 +68,7 @@ def design(
 
 def _designed(stage: Stage, spec: Spec, target: OutputFolder) -> tuple[Design, list[Path]]:
     """The design and its files, with progress on a terminal. Raises InputError, NoDesign."""
-    from friso.design.method import design as method
+    from friso.design_method.method import design as method
     from friso.views.design.page import design_files
 
     with ProgressBar() as progress:

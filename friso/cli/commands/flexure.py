@@ -15,8 +15,8 @@ from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
-    from friso.flexure.both_models import BothModels
-    from friso.flexure.mechanism import Mechanism
+    from friso.leaf_springs.both_models import BothModels
+    from friso.leaf_springs.mechanism import Mechanism
 
 STROKE = Quantity("m", positive, "1 mm")
 EXAMPLE = """[flexure]
@@ -45,7 +45,7 @@ def flexure(
     stage = read_stage(stage_file, overrides, leaves_out=())
     mechanism = _mechanism(stage, str(stage_file))
     deflection = _stroke(stroke, stage, mechanism)
-    from friso.flexure.both_models import both_models
+    from friso.leaf_springs.both_models import both_models
 
     target = output_folder("flexure", out, overwrite, [stage_file])
     files = []
@@ -69,7 +69,7 @@ def flexure(
 
 def _mechanism(stage: Stage, origin: str) -> Mechanism:
     """The leaf springs of the stage. Raises InputError without [flexure]."""
-    from friso.flexure.mechanism import Mechanism
+    from friso.leaf_springs.mechanism import Mechanism
 
     if stage.flexure is None:
         expected = "a table of leaf springs, from which joint.stiffness and [parasitic] follow (leave these out)"

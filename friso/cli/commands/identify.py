@@ -20,11 +20,11 @@ from friso.quantities import Quantity, positive
 from friso.stage import Stage, load
 
 if TYPE_CHECKING:
-    from friso.identify.kind import AnalysisSettings
-    from friso.identify.logs.log import Log
-    from friso.identify.logs.mapping import Mapping
-    from friso.identify.method import Identification, Prediction
-    from friso.identify.sources import LogFile
+    from friso.identification.kind import AnalysisSettings
+    from friso.identification.logs.log import Log
+    from friso.identification.logs.mapping import Mapping
+    from friso.identification.method import Identification, Prediction
+    from friso.identification.sources import LogFile
     from friso.views.files import Content
 
 STAGE = "identified.toml"
@@ -77,10 +77,10 @@ def identify(
 
     Example: friso identify log.csv --stage stage.toml --map position=ActPos --scale force="35.15 N/V" --out identified
     """
-    from friso.identify.logs.mapping import from_options
-    from friso.identify.method import check_predictions
-    from friso.identify.method import identify as identification
-    from friso.identify.method import predict as predict_log
+    from friso.identification.logs.mapping import from_options
+    from friso.identification.method import check_predictions
+    from friso.identification.method import identify as identification
+    from friso.identification.method import predict as predict_log
 
     assumed, settings = _stage(stage, overrides), _settings(bandwidth, band, period)
     mapping = from_options(maps or (), units or (), scales or (), dt, kind)
@@ -104,7 +104,7 @@ def identify(
 def _read(paths: list[Path], options: Mapping, target: OutputFolder) -> list[LogFile]:
     """The logs; what was said of them is kept, also where more has to be said. Raises InputError, for all that is
     open with the command that tells it."""
-    from friso.identify.sources import OpenQuestions, read_all
+    from friso.identification.sources import OpenQuestions, read_all
 
     try:
         files = read_all(paths, options, target.folder)
@@ -117,8 +117,8 @@ def _read(paths: list[Path], options: Mapping, target: OutputFolder) -> list[Log
 
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
     """Keep what was said of logs, by file, for the next time, where it is not kept so already."""
-    from friso.identify.logs.mapping import load, mapping_text
-    from friso.identify.sources import kept_at
+    from friso.identification.logs.mapping import load, mapping_text
+    from friso.identification.sources import kept_at
 
     folder = target.folder
     new = {path: said for path, said in mappings.items() if said != load(path, folder)}
@@ -148,7 +148,7 @@ def _stage(path: Path | None, overrides: list[str] | None) -> Stage | None:
 
 def _settings(bandwidth: str | None, band: str | None, period: str | None) -> AnalysisSettings:
     """What the user chose for the analyses. Raises InputError."""
-    from friso.identify.kind import AnalysisSettings
+    from friso.identification.kind import AnalysisSettings
     from friso.intervals import Span
 
     values = []
@@ -166,7 +166,7 @@ def _settings(bandwidth: str | None, band: str | None, period: str | None) -> An
 
 def _others(inputs: Sequence[LogFile]) -> list[Log]:
     """The logs to be predicted. Raises InputError."""
-    from friso.identify.logs.log import Log
+    from friso.identification.logs.log import Log
 
     logs = [item.source for item in inputs if isinstance(item.source, Log)]
     if len(logs) < len(inputs):
@@ -199,7 +199,7 @@ def _answer(
 
 def listed_kinds() -> list[tuple[str, str]]:
     """The kinds of experiment that `--as` takes, each in one line."""
-    from friso.identify.kinds import KINDS
+    from friso.identification.kinds import KINDS
 
     return [(name, KINDS.one_line(name)) for name in KINDS]
 

@@ -14,7 +14,7 @@ from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 
 if TYPE_CHECKING:
-    from friso.identify.contents import LogContent
+    from friso.identification.contents import LogContent
 
 
 def logs(
@@ -31,7 +31,7 @@ def logs(
 
     Example: friso logs log.csv --out logs
     """
-    from friso.identify.logs.mapping import from_options
+    from friso.identification.logs.mapping import from_options
 
     options = from_options(maps or (), units or (), scales or (), dt)
     target = output_folder("logs", out, overwrite, logs)
@@ -39,7 +39,7 @@ def logs(
     wrong: list[InputError] = []
     files: list[Path] = []
     with ProgressBar("reading") as progress:
-        from friso.identify.contents import content_of
+        from friso.identification.contents import content_of
 
         for number, path in enumerate(logs):
             progress(number, len(logs), path.name)

@@ -81,7 +81,7 @@ def rig(
 def _announce(stage: Stage) -> None:
     """What to know of the drive before it runs."""
     from friso.equations.as_built import whole_samples
-    from friso.rig.run import SAMPLE_TIME, as_built_keys
+    from friso.virtual_rig.run import SAMPLE_TIME, as_built_keys
 
     if stage.drive is None or stage.drive.sample_time is None:
         say(f"drive.sample_time is not given: {SAMPLE_TIME * 1e6:g} us, as in the thesis")

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from friso.errors import InputError
-from friso.rig.run import SAMPLE_TIME
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, as_tuned
 from friso.stage.correlations import Correlations, Sample, draw
+from friso.virtual_rig.run import SAMPLE_TIME
 
 LEAST, MOST = 20, 100_000
 """Machines at least, for an interval to tell anything, and at most, which take hours."""

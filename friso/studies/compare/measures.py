@@ -16,8 +16,8 @@ from friso.frequency.members import limit_cases
 from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces
 from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS, last_outside
 from friso.hunting.turning import WINDOW
-from friso.rig.run import Recorded
 from friso.stage import Stage
+from friso.virtual_rig.run import Recorded
 
 DENSITY, SLOWEST = 100, 0.1
 """Frequencies per decade at which loops are looked at, besides those about resonances, and the lowest, as a share of

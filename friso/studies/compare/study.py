@@ -10,8 +10,6 @@ import numpy as np
 from friso.equations.motion import last_corner
 from friso.errors import InputError
 from friso.progress import Progress, silent
-from friso.rig.run import Recorded, run
-from friso.rig.task import MoveTask, own_motion
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.machines import Machines, draw_machines
@@ -27,6 +25,8 @@ from friso.studies.compare.measures import (
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
 from friso.studies.shares import Share, share
+from friso.virtual_rig.run import Recorded, run
+from friso.virtual_rig.task import MoveTask, own_motion
 
 INTERVAL = 1e-3
 """Time [s] between what is looked at, at least: the next whole number of samples."""

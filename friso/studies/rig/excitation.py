@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.response.periodic import multisine
-from friso.identify.response.records import ResponseRecord, from_log
-from friso.identify.response.response import Channels, FrequencyResponse
-from friso.rig.run import Recorded, as_built_keys, run
-from friso.rig.task import standing
+from friso.identification.response.periodic import multisine
+from friso.identification.response.records import ResponseRecord, from_log
+from friso.identification.response.response import Channels, FrequencyResponse
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog, stopped
 from friso.studies.rig.sizes import friction, interval, pace
+from friso.virtual_rig.run import Recorded, as_built_keys, run
+from friso.virtual_rig.task import standing
 
 PERIOD, PERIODS = 8.0, 8
 """Periods of the crossover in one of the multisine, which is the inverse of its lowest line (1 Hz on the thesis's rig),

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 
 from friso.frequency.friction import steady_force
-from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
-from friso.identify.readings.passes import passes
-from friso.rig.rail import friction_factors
-from friso.rig.run import run
-from friso.rig.task import legs
+from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identification.readings.passes import passes
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog, rig_log
 from friso.studies.rig.sizes import interval, longest_travel, moving_mass, pace, quicker, travel
+from friso.virtual_rig.rail import friction_factors
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import legs
 
 FASTER = (4.0, 3.0, 2.0, 1.5, 1.0)
 """Crossovers over the stage's own that are tried, one after the other: our choice."""

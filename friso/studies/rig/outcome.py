@@ -10,11 +10,11 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.errors import InputError
-from friso.identify.logs.log import Log
-from friso.identify.readings.common import record
-from friso.rig.run import Recorded
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import record
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
+from friso.virtual_rig.run import Recorded
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,10 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth, proportional_stiffness, sped_up
 from friso.errors import InputError
-from friso.rig.run import as_built_keys
-from friso.rig.task import own_motion
 from friso.stage import Stage
 from friso.stage.transmission import moving_mass as mass_moved
+from friso.virtual_rig.run import as_built_keys
+from friso.virtual_rig.task import own_motion
 
 WIDE = 8.0
 """Stroke of the identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""

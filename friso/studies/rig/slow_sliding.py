@@ -11,16 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
-from friso.identify.readings.at_bearing import between
-from friso.identify.readings.passes import passes
-from friso.rig.rail import friction_factors
-from friso.rig.run import as_built_keys, run
-from friso.rig.task import legs
+from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
+from friso.identification.readings.at_bearing import between
+from friso.identification.readings.passes import passes
 from friso.stage import Stage
 from friso.studies.rig.many_speeds import speeds_of
 from friso.studies.rig.outcome import RigLog, rig_log
 from friso.studies.rig.sizes import interval, moving_mass, pace, travel
+from friso.virtual_rig.rail import friction_factors
+from friso.virtual_rig.run import as_built_keys, run
+from friso.virtual_rig.task import legs
 
 UNSTEADY, STEADY, PLACES = 2, 1, 8
 """How many of the fastest speeds that were not steady it goes, and of the slowest that were; at so many places along

@@ -16,11 +16,11 @@ import numpy as np
 
 from friso.engine.simulate import simulate
 from friso.frequency.describing.mass_line import mass_line
-from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
-from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
-from friso.identify.logs.log import Log
-from friso.identify.readings.common import record
-from friso.identify.readings.friction_position import FrictionPosition, friction_position
+from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import record
+from friso.identification.readings.friction_position import FrictionPosition, friction_position
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.experiments.in_position import InPosition

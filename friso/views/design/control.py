@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from friso.design.method import Design
-from friso.design.verification import MachineOutcomes
+from friso.design_method.method import Design
+from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
 from friso.frequency.crossover import WANTED
 from friso.views.design.window import CrossoverBound, comfortable, lower, upper

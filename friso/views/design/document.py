@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.design.choice import Confirmed
-from friso.design.edges import Corners
-from friso.design.front import Candidate
-from friso.design.geometry import Geometry
-from friso.design.method import SLOW, Design, NoDesign
-from friso.design.relax import Relaxation
-from friso.design.verification import MachineOutcomes
+from friso.design_method.choice import Confirmed
+from friso.design_method.edges import Corners
+from friso.design_method.front import Candidate
+from friso.design_method.geometry import Geometry
+from friso.design_method.method import SLOW, Design, NoDesign
+from friso.design_method.relax import Relaxation
+from friso.design_method.verification import MachineOutcomes
 from friso.stage.stage import numeric_keys
 from friso.views.design.control import parallel_gains
 from friso.views.design.window import lower, upper

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.design.choice import Confirmed
-from friso.design.front import Candidate
-from friso.design.method import Design
-from friso.design.verification import MachineOutcomes
+from friso.design_method.choice import Confirmed
+from friso.design_method.front import Candidate
+from friso.design_method.method import Design
+from friso.design_method.verification import MachineOutcomes
 from friso.frequency.crossover import WANTED
 from friso.views.design.window_figure import window_figure
 from friso.views.design.words import hertz, size

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from friso.design.method import Design
-from friso.design.requirements import Requirement, Way
+from friso.design_method.method import Design
+from friso.design_method.requirements import Requirement, Way
 from friso.views.design.words import DesignStep, hertz, leaves, plain, size
 from friso.views.drawing.prefixes import listed, percent
 from friso.views.flexure.table import megapascals, newtons_per

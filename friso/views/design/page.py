@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from markupsafe import Markup
 
-from friso.design.method import Design
+from friso.design_method.method import Design
 from friso.materials import materials
 from friso.views.design.figures import design_figures
 from friso.views.design.leaves import requirement_rows

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from friso.design.edges import Corners
-from friso.design.method import Design
+from friso.design_method.edges import Corners
+from friso.design_method.method import Design
 from friso.views.design.control import controller_step, moves_step
 from friso.views.design.leaves import leaves_step
 from friso.views.design.words import DesignStep, brings, corner, edge, gaps, hertz, plain, size

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.design.method import Design
+from friso.design_method.method import Design
 from friso.frequency.crossover import WANTED
 from friso.frequency.ranges import Range
 

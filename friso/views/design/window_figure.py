@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.design.edges import Corners
-from friso.design.method import Design
+from friso.design_method.edges import Corners
+from friso.design_method.method import Design
 from friso.frequency.crossover import WANTED
 from friso.frequency.ranges import Range
 from friso.views.design.window import stiffest, view

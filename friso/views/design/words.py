@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from friso.design.edges import Corners
-from friso.design.geometry import Geometry
-from friso.design.method import Design, NoDesign
-from friso.design.relax import Relaxation
-from friso.design.verification import MachineOutcomes
+from friso.design_method.edges import Corners
+from friso.design_method.geometry import Geometry
+from friso.design_method.method import Design, NoDesign
+from friso.design_method.relax import Relaxation
+from friso.design_method.verification import MachineOutcomes
 from friso.stage.stage import numeric_keys
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.drawing.prefixes import choose, percent, pretty, with_unit

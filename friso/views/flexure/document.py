@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from friso.flexure.both_models import BothModels
-from friso.flexure.evaluation import Evaluation
+from friso.leaf_springs.both_models import BothModels
+from friso.leaf_springs.evaluation import Evaluation
 from friso.views.documents import plain_json
 from friso.views.flexure.words import sentences
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from friso.flexure.mechanism import Mechanism
+from friso.leaf_springs.mechanism import Mechanism
 from friso.views.flexure.layout import ABOVE, CLAMP, FOOT, RIM, SCALES, STOP, WIDTH, PaperDrawing, block_size
 from friso.views.flexure.svg import (
     TEXT,

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from friso.flexure.both_models import BEAMS, CLOSED, BothModels
-from friso.flexure.evaluation import Evaluation
+from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels
+from friso.leaf_springs.evaluation import Evaluation
 from friso.views.drawing.figure import BLUE, GREY, ORANGE, Array, Axis, Dash, Figure, Markers, Panel, Series
 from friso.views.flexure.modes import modes_figure
 

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
-from friso.flexure.mechanism import Mechanism
+from friso.leaf_springs.mechanism import Mechanism
 from friso.views.flexure.svg import Point
 
 WIDTH, ROOM = 210.0, 202.0

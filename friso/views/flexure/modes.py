@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from friso.flexure.evaluation import Evaluation, Mode
-from friso.flexure.mechanism import Mechanism
+from friso.leaf_springs.evaluation import Evaluation, Mode
+from friso.leaf_springs.mechanism import Mechanism
 from friso.views.drawing.figure import BLUE, LIGHT, VERMILLION, Array, Axis, Figure, Panel, Series
 from friso.views.drawing.prefixes import with_unit
 from friso.views.flexure.layout import block_size

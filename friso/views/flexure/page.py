@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from friso.flexure.both_models import BothModels
+from friso.leaf_springs.both_models import BothModels
 from friso.materials import materials
 from friso.views.drawing.figure import GREEN, VERMILLION, Figure
 from friso.views.files import Content, pictures

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from friso.flexure.both_models import BothModels
-from friso.flexure.evaluation import Evaluation, Mode
+from friso.leaf_springs.both_models import BothModels
+from friso.leaf_springs.evaluation import Evaluation, Mode
 from friso.views.drawing.prefixes import NOTHING, percent, with_unit
 
 INTERFERES = "interferes"

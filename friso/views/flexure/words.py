@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from friso.flexure.both_models import BothModels
-from friso.flexure.evaluation import Evaluation
-from friso.flexure.mechanism import AXES, GRAVITY
+from friso.leaf_springs.both_models import BothModels
+from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.mechanism import AXES, GRAVITY
 from friso.stage import Stage
 from friso.views.drawing.prefixes import listed, percent, with_unit
 from friso.views.flexure.table import megapascals, newtons_per

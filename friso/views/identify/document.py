@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from friso.identify.kind import Source
-from friso.identify.logs.log import Log
-from friso.identify.method import Experiment, Identification, Prediction
-from friso.identify.sources import LogFile
+from friso.identification.kind import Source
+from friso.identification.logs.log import Log
+from friso.identification.method import Experiment, Identification, Prediction
+from friso.identification.sources import LogFile
 from friso.views.documents import plain_json
 from friso.views.identify.estimates import key_document
 from friso.views.identify.kind_view import view_of

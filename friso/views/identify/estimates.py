@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.estimate import Estimate
-from friso.identify.stage_file import written
+from friso.identification.estimate import Estimate
+from friso.identification.stage_file import written
 
 
 def ends_document(estimate: Estimate) -> dict[str, Any]:

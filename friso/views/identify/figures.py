@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.identify.method import Identification, Prediction
+from friso.identification.method import Identification, Prediction
 from friso.views.drawing.figure import BLUE, ORANGE, Axis, Figure, Markers, Panel, Series, Symbol
 from friso.views.identify.kind_view import view_of
 from friso.views.identify.words import labels, ordered, prediction_view

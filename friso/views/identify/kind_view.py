@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
-from friso.identify.kind import Source
-from friso.identify.kinds import KINDS
-from friso.identify.logs.log import Log
+from friso.identification.kind import Source
+from friso.identification.kinds import KINDS
+from friso.identification.logs.log import Log
 from friso.registry import Registry
 from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.views.identify.numbers import name_of, with_interval

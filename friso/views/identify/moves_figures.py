@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.inverse_model import EDGE, SMOOTH, motion
-from friso.identify.logs.log import Log
-from friso.identify.moves import IdentifiedMoves
-from friso.identify.output_error.parameters import FitParameter
-from friso.identify.output_error.problem import Simulated
-from friso.identify.output_error.profile import Profile
-from friso.identify.quality import steady_friction
-from friso.identify.readings.common import cart, on_bearing
+from friso.identification.inverse_model import EDGE, SMOOTH, motion
+from friso.identification.logs.log import Log
+from friso.identification.moves import IdentifiedMoves
+from friso.identification.output_error.parameters import FitParameter
+from friso.identification.output_error.problem import Simulated
+from friso.identification.output_error.profile import Profile
+from friso.identification.quality import steady_friction
+from friso.identification.readings.common import cart, on_bearing
 from friso.views.drawing.figure import (
     BLUE,
     GREY,

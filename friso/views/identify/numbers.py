@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from friso.identify.estimate import Estimate
+from friso.identification.estimate import Estimate
 from friso.views.drawing.prefixes import NOTHING, choose, pretty
 from friso.views.map.words import quantity
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from friso.identify.method import Identification, Prediction
-from friso.identify.sources import LogFile
-from friso.identify.stage_file import with_origins
+from friso.identification.method import Identification, Prediction
+from friso.identification.sources import LogFile
+from friso.identification.stage_file import with_origins
 from friso.stage.correlations import beside, correlations_text
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures

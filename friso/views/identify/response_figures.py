@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.response.analysis import Bench
-from friso.identify.response.mass_line import StraightLine
-from friso.identify.response.response import FrequencyResponse
+from friso.identification.response.analysis import Bench
+from friso.identification.response.mass_line import StraightLine
+from friso.identification.response.response import FrequencyResponse
 from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
     BLUE,

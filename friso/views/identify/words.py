@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from friso.identify.kinds import KINDS
-from friso.identify.logs.log import Log
+from friso.identification.kinds import KINDS
+from friso.identification.logs.log import Log
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.identify.kind_view import Facts, PredictionView, view_of
 from friso.views.identify.numbers import interval_text, name_of, value_text, with_interval, within
 
 if TYPE_CHECKING:
-    from friso.identify.estimate import Estimate
-    from friso.identify.kind import Source
-    from friso.identify.method import Experiment, Identification, Prediction
-    from friso.identify.sources import LogFile
+    from friso.identification.estimate import Estimate
+    from friso.identification.kind import Source
+    from friso.identification.method import Experiment, Identification, Prediction
+    from friso.identification.sources import LogFile
 
 COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or reason")
 """Columns of the table of estimates."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from friso.identify.contents import ChannelContent, LogContent
+from friso.identification.contents import ChannelContent, LogContent
 from friso.views.documents import plain_json
 from friso.views.logs.words import conclusions, next_command
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from friso.identify.contents import ChannelContent, LogContent
+from friso.identification.contents import ChannelContent, LogContent
 from friso.views.drawing.figure import BLUE, Axis, Figure, Panel, Series
 from friso.views.logs.words import title
 

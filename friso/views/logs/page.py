@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friso.identify.contents import LogContent
+from friso.identification.contents import LogContent
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.logs.figures import logs_figures

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.contents import ChannelContent, LogContent
+from friso.identification.contents import ChannelContent, LogContent
 from friso.views.drawing.figure import GREEN, ORANGE
 from friso.views.drawing.prefixes import NOTHING, range_with_unit, with_unit
 

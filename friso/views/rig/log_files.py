@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from friso.axis import unit_shown
-from friso.identify.logs.mapping import Mapping, mapping_text, sidecar
+from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog
 from friso.views.files import Content

@@ -9,16 +9,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.readings.friction_position import FrictionPosition, friction_position
-from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identification.readings.friction_position import FrictionPosition, friction_position
+from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.progress import Progress
-from friso.rig.run import run
-from friso.rig.task import legs
 from friso.stage import Stage
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log, stopped
 from friso.studies.rig.sizes import freed, interval, locked, longest_travel, moving_mass, pace, travel
 from friso.studies.rig.slow_sliding import Slow, slow_sliding
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import legs
 
 DURATIONS = (480.0, 120.0)
 """Periods of the crossover that the way takes: 2.5 and 10 mm/s on the thesis's rig."""

@@ -9,17 +9,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identify.estimate import Estimate
-from friso.identify.response.closed_loop import crossovers
-from friso.identify.response.mass_line import mass_lines
-from friso.identify.response.response import FrequencyResponse
+from friso.identification.estimate import Estimate
+from friso.identification.response.closed_loop import crossovers
+from friso.identification.response.mass_line import mass_lines
+from friso.identification.response.response import FrequencyResponse
 from friso.progress import Progress
-from friso.rig.run import run
-from friso.rig.task import standing
 from friso.stage import Stage
 from friso.studies.rig.excitation import excite, loop, plant
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked, pace, quicker, travel
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import standing
 
 PLACES, FREE_PLACES = 10, 3
 """Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""

@@ -13,13 +13,13 @@ import numpy as np
 from scipy.signal import welch
 
 from friso.progress import Progress
-from friso.rig.run import Recorded, as_built_keys, run
-from friso.rig.task import MoveTask, standing
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import interval
+from friso.virtual_rig.run import Recorded, as_built_keys, run
+from friso.virtual_rig.task import MoveTask, standing
 
 FASTER = 2.0
 """Crossover over that of the stage: 16 Hz for the 8 Hz of the thesis's rig (Sec. 4.3.2)."""

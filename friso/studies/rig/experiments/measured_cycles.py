@@ -17,8 +17,6 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.progress import Progress
-from friso.rig.rail import friction_factors
-from friso.rig.task import MoveTask
 from friso.stage import Stage
 from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.moves_on_rails import (
@@ -36,6 +34,8 @@ from friso.studies.rig.moves_on_rails import (
 )
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.shares import Share, share
+from friso.virtual_rig.rail import friction_factors
+from friso.virtual_rig.task import MoveTask
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
 """Standard deviations of static and of Coulomb friction, over their means: our choice."""

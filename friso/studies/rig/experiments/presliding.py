@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
-from friso.identify.readings.at_bearing import between
+from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
+from friso.identification.readings.at_bearing import between
 from friso.progress import Progress
-from friso.rig.run import as_built_keys
 from friso.stage import Stage
 from friso.studies.rig.excitation import Excitation, excite
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import locked, pace, travel
+from friso.virtual_rig.run import as_built_keys
 
 PLACES = 3
 """Places along the travel: our choice."""

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.equations.continuous import slow_gains
-from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.identification.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.progress import Progress
-from friso.rig.run import run
-from friso.rig.task import staircase
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import FIXED, freed, interval, pace
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import staircase
 
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
 """A step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and the directions of the steps, our choice."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.readings.rate_effect import static_friction
+from friso.identification.readings.rate_effect import static_friction
 from friso.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
 from friso.studies.thesis.experiments import (
     RANGE,

@@ -8,9 +8,9 @@ from itertools import product
 
 import numpy as np
 
-from friso.flexure.beams import beams
-from friso.flexure.evaluation import Evaluation
-from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.studies import thesis_rig

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.experiments.break_away import BreakAway
-from friso.identify.kind import Source
+from friso.identification.experiments.break_away import BreakAway
+from friso.identification.kind import Source
 from friso.views.drawing.figure import INK, Axis, Band, Figure, Limit, Markers, Panel
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import estimate_document

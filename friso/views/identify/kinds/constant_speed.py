@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.experiments.constant_speed import FrictionAtSpeeds
-from friso.identify.readings.friction_position import FrictionPosition
-from friso.identify.readings.friction_velocity import Direction, FrictionVelocity
+from friso.identification.experiments.constant_speed import FrictionAtSpeeds
+from friso.identification.readings.friction_position import FrictionPosition
+from friso.identification.readings.friction_velocity import Direction, FrictionVelocity
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,

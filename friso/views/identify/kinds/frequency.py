@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.response.analysis import Bench
-from friso.identify.response.departure import Drag
-from friso.identify.response.mass_line import StraightLine
+from friso.identification.response.analysis import Bench
+from friso.identification.response.departure import Drag
+from friso.identification.response.mass_line import StraightLine
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView

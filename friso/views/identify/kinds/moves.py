@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from friso.identify.inverse_model import InverseModel
-from friso.identify.logs.log import Log
-from friso.identify.moves import IdentifiedMoves, SimulatedLog
-from friso.identify.output_error.profile import Profile
+from friso.identification.inverse_model import InverseModel
+from friso.identification.logs.log import Log
+from friso.identification.moves import IdentifiedMoves, SimulatedLog
+from friso.identification.output_error.profile import Profile
 from friso.views.drawing.figure import Figure
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import ends_document

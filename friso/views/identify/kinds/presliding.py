@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from friso.identify.experiments.presliding import Presliding
-from friso.identify.kind import Source
+from friso.identification.experiments.presliding import Presliding
+from friso.identification.kind import Source
 from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import TIME, Facts, KindView

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.experiments.slow_sliding import SlowSliding
-from friso.identify.kind import Source
+from friso.identification.experiments.slow_sliding import SlowSliding
+from friso.identification.kind import Source
 from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import TIME, Facts, KindView

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.experiments.steps import StepStiffness
-from friso.identify.kind import Source
+from friso.identification.experiments.steps import StepStiffness
+from friso.identification.kind import Source
 from friso.views.drawing.figure import BLUE, INK, Axis, Band, Figure, Markers, Panel, Series
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import AREA, TIME, Facts, KindView

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.experiments.stick_slip import StickSlip
-from friso.identify.kind import Source
-from friso.identify.logs.log import Log
+from friso.identification.experiments.stick_slip import StickSlip
+from friso.identification.kind import Source
+from friso.identification.logs.log import Log
 from friso.views.drawing.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import estimate_document

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.estimate import Estimate
+from friso.identification.estimate import Estimate
 from friso.studies.rig.experiments.constant_speed import ConstantSpeedResult, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail
 from friso.studies.rig.outcome import Outcome, RigLog

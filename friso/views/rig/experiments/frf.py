@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.estimate import Estimate
-from friso.identify.response.response import FrequencyResponse
+from friso.identification.estimate import Estimate
+from friso.identification.response.response import FrequencyResponse
 from friso.studies.rig.experiments.frf import RATIOS, Frf, MeasuredLoop, Plant, nearest
 from friso.studies.rig.outcome import Outcome
 from friso.views.bode.figures import phases

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from friso.identify.experiments.presliding import Presliding
+from friso.identification.experiments.presliding import Presliding
 from friso.studies.rig.experiments.presliding import Bristles
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import Figure

@@ -1,0 +1,108 @@
+"""The leaf springs chosen from the front: softest that do, in sizes that can be made, confirmed by the beam model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.design_method.front import Candidate, judged
+from friso.design_method.geometry import Geometry, mechanisms, rounded, sizes_of
+from friso.design_method.requirements import LeafTask, Requirement, buckling_share, load_stress, requirements
+from friso.leaf_springs.beams import BeamFailure, beams
+from friso.leaf_springs.evaluation import Evaluation
+from friso.leaf_springs.joint import first_interfering
+
+STEP = 1e-4
+"""Sizes are whole multiples of this [m]."""
+
+SHOWN = 24
+"""Candidates of the front that the beam model confirms, at most."""
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """A candidate by the beam model: its drive stiffness [N/m] and first interfering frequency [Hz], NaN with the
+    reason in `failure` where that could not be evaluated."""
+
+    candidate: Candidate
+    stiffness: float
+    frequency: float
+    failure: str = ""
+
+
+@dataclass(frozen=True)
+class ChosenLeaves:
+    """The geometry chosen, by the beam model; its requirements, and by what factor it breaks each by closed forms (at
+    most 1); and of the geometries that were passed over, what beams found or why they failed."""
+
+    geometry: Geometry
+    beams: Evaluation
+    requirements: tuple[Requirement, ...]
+    excess: np.ndarray
+    passed_over: tuple[str, ...]
+
+    @property
+    def frequency(self) -> float:
+        """First interfering frequency [Hz], the lower one of both models: in one two modes may hide each other."""
+        mode = self.beams.interfering
+        return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
+
+
+def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | None:
+    """The softest geometry that meets all requirements, by closed forms and by beams; None if there is none."""
+    needs, passed = requirements(task), []
+    for geometry, excess in _in_order(task, needs, candidates):
+        try:
+            evaluation = evaluated(task, geometry)
+        except BeamFailure as failure:
+            passed.append(str(failure))
+            continue
+        choice = ChosenLeaves(geometry, evaluation, tuple(needs), excess, tuple(passed))
+        if choice.frequency >= task.spec.safety.parasitic * task.crossover and _bears(task, evaluation):
+            return choice
+        passed.append(f"beams: {evaluation.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
+    return None
+
+
+def _bears(task: LeafTask, by_beams: Evaluation) -> bool:
+    """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
+    safety = task.spec.safety
+    stays = safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction
+    swing = 0.0 if np.isnan(by_beams.fatigue_margin) else 1 / by_beams.fatigue_margin
+    lasts = safety.fatigue * (swing + load_stress(by_beams.mechanism, task) / by_beams.mechanism.yield_strength) <= 1
+    return bool(stays and lasts and safety.buckling * buckling_share(by_beams.mechanism, task, by_beams.buckling) <= 1)
+
+
+def _in_order(
+    task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
+) -> Iterator[tuple[Geometry, np.ndarray]]:
+    """Geometries in whole sizes that meet the requirements by closed forms, the softest first."""
+    enough = task.spec.safety.parasitic * task.crossover
+    near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
+    sizes = list({geometry: None for start in near for geometry in rounded(task.spec, start, STEP)})
+    if not sizes:
+        return
+    judgement = judged(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])
+    for k in np.argsort(judgement.stiffness):
+        if np.all(judgement.excess[k] <= 1):
+            yield sizes[k], judgement.excess[k]
+
+
+def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
+    """A geometry by the beam model. Raises BeamFailure."""
+    return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0), task.stroke)
+
+
+def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
+    """Some of the front, evenly, by the beam model; where that fails, why."""
+    for k in np.unique(np.linspace(0, len(candidates) - 1, SHOWN).astype(int)):
+        candidate = candidates[k]
+        try:
+            evaluation = evaluated(task, candidate.geometry)
+        except BeamFailure as failure:
+            yield Confirmed(candidate, np.nan, np.nan, str(failure))
+            continue
+        mode = evaluation.interfering
+        yield Confirmed(candidate, float(evaluation.drive[0]), mode.frequency if mode else np.nan)

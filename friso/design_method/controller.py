@@ -1,0 +1,93 @@
+"""The controller of a design: how fast it may be, with which margins, and what joint damping would add."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.modal import Modal
+from friso.design_method.population import Population
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.frequency.crossover import Limits
+from friso.frequency.ranges import Range, shared
+from friso.frequency.tuning import Tuning, tuning
+from friso.leaf_springs.evaluation import Evaluation
+from friso.stage import Stage
+
+RATIOS = np.geomspace(0.02, 0.7, 9)
+"""Joint damping that is tried, as a damping ratio of the stage on the joint."""
+
+ENOUGH = 0.95
+"""Share of the best modulus margin that damping reaches, from which more is not worth its trouble."""
+
+
+@dataclass(frozen=True)
+class Damping:
+    """Joint dampings [N s/m] tried, the stage's own first, and the least modulus margin with each (0: not stable)."""
+
+    tried: np.ndarray
+    margins: np.ndarray
+
+    @property
+    def worth(self) -> int:
+        """The number of the least damping that does nearly all that damping can do; 0 where the stage's own does."""
+        return int(np.flatnonzero(self.margins >= ENOUGH * self.margins.max())[0])
+
+
+@dataclass(frozen=True)
+class DesignedController:
+    """Gains by van Dijk's rules at the `crossover` [Hz] chosen; the ranges of crossovers that are stable and
+    comfortable; the least modulus margin of the settled states, in the stage of the design and in each corner (n,); and
+    what joint damping adds."""
+
+    crossover: float
+    gains: Tuning
+    limits: Limits
+    margin: float
+    corners: np.ndarray
+    damping: Damping
+
+
+def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
+    """The highest crossover [Hz] of the ranges that is not above `highest`."""
+    below = [min(high, highest) for low, high in ranges if low < highest]
+    return max(below) if below else None
+
+
+def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
+    """The crossovers [Hz] with a modulus margin of 0.5 in all settled states, with the masses of the stage and with all
+    those of the population."""
+    flat = stage.flat()
+    ranges = Modal.of(flat, leaves).comfortable
+    masses = {
+        tuple((key, value) for key, value in population.of(k).items() if key.startswith("masses."))
+        for k in range(population.count)
+    }
+    for group in sorted(masses):
+        if group:
+            ranges = shared(ranges, Modal.of({**flat, **dict(group)}, leaves).comfortable)
+    return ranges
+
+
+def controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> DesignedController:
+    """The controller of a stage with leaf springs, its crossover chosen."""
+    flat = stage.flat()
+    gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))
+    corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
+    tried = dampings(flat)
+    damping = Damping(tried, np.array([_margin({**flat, "joint.damping": trial}, leaves) for trial in tried]))
+    return DesignedController(flat[CROSSOVER], gains, ranges, _margin(flat, leaves), corners, damping)
+
+
+def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
+    return float(Modal.of(flat, leaves).margin(flat[CROSSOVER])[0])
+
+
+def dampings(flat: Mapping[str, Any]) -> np.ndarray:
+    """Dampings of the joint [N s/m] to be tried: the stage's own and larger ones."""
+    critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
+    given_damping = flat["joint.damping"]
+    return np.array([given_damping, *(damping for damping in RATIOS * critical if damping > given_damping)])

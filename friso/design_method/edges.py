@@ -1,0 +1,99 @@
+"""The edge of hunting over the corners of a specification: the highest crossover at which anything attracts.
+
+Coarser than `friso.hunting.edges`, which tells how hunting ends and closes orbits to find out: a design asks for 1 or
+2 % in seconds, and simulates all its moves afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.population import Population
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.hunting.attractors import attractors
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.progress import Progress, silent
+
+ROUNDS = 3
+"""Bisections of the step that holds an edge: to 1 or 2 % of it on the grids here."""
+
+RTOL = 1e-7
+"""Relative tolerance to which orbits are closed: their multipliers are needed to a percent."""
+
+
+@dataclass(frozen=True)
+class Corners:
+    """The corners of a specification with the highest crossover [Hz] at which anything attracts in each, shape (n,): 0
+    where nothing does from `searched[0]` on, infinite where something does at `searched[1]`. In `unknown` of them the
+    simulations below the edge failed or had not settled when they were stopped: that counts as hunting."""
+
+    population: Population
+    edges: np.ndarray
+    searched: tuple[float, float]
+    unknown: int = 0
+
+    @property
+    def worst(self) -> int:
+        """The number of the corner that hunts up to the highest crossover."""
+        return int(self.edges.argmax())
+
+    @property
+    def highest(self) -> float:
+        """The highest crossover [Hz] at which anything attracts in any of them; at least where the search begins."""
+        return float(max(self.searched[0], self.edges.max()))
+
+    @property
+    def hunts(self) -> bool:
+        """Whether anything attracts anywhere in the range that was searched."""
+        return bool(np.any(self.edges > 0))
+
+
+def edges_over(
+    flat: Mapping[str, Any],
+    population: Population,
+    low: float,
+    high: float,
+    steps: int,
+    progress: Progress = silent,
+    label: str = "",
+) -> Corners:
+    """The edges of the stage `flat` in all corners, tuned by van Dijk's rules: on a grid of so many `steps` from `high`
+    down to `low` [Hz], as far as to the first point at which anything attracts, and between that and the one above.
+    `label` names the search to the progress."""
+    ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
+    grid, count = np.log(np.geomspace(low, high, steps)), population.count
+    inside, outside, undecided = np.full(count, -np.inf), np.full(count, np.inf), np.zeros(count, bool)
+
+    def survey(which: np.ndarray, crossover: np.ndarray) -> None:
+        attract, decided = _attract(ensemble, which, crossover)
+        outside[which[~attract]] = crossover[~attract]
+        inside[which[attract]], undecided[which[attract]] = crossover[attract], ~decided[attract]
+
+    for k, point in enumerate(grid[::-1]):
+        progress(k, steps + ROUNDS, label)
+        if (left := np.flatnonzero(np.isneginf(inside))).size:
+            survey(left, np.full(left.size, point))
+    between = np.flatnonzero(np.isfinite(inside) & np.isfinite(outside))
+    for k in range(ROUNDS if between.size else 0):
+        progress(steps + k, steps + ROUNDS, label)
+        survey(between, (inside[between] + outside[between]) / 2)
+    edges = np.where(np.isneginf(inside), 0.0, np.exp((inside + outside) / 2))
+    return Corners(population, edges, (low, high), int(undecided.sum()))
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def _attract(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
+    whether they decided that."""
+    chosen = ensemble.take(which)
+    survey = attractors(Ensemble.held({**chosen.flat, CROSSOVER: np.exp(crossover)}, len(which)), rtol=RTOL)
+    return survey.attracts | ~survey.decided, survey.decided
+
+
+def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The stage without isolator: cart and stage as one mass, which a joint locked by its fixtures makes of them."""
+    return {key: value for key, value in flat.items() if not key.startswith(("joint.", "flexure.", "parasitic."))}

@@ -1,0 +1,117 @@
+"""The Pareto front of leaf springs: drive stiffness against first interfering frequency, within all requirements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets
+from friso.design_method.requirements import PARASITIC, LeafTask, Requirement, requirements
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.joint import first_interfering
+
+POPULATION, GENERATIONS = 160, 120
+"""Geometries of the genetic algorithm, and how often they are renewed."""
+
+SEARCHED = 60
+"""Generations of the search for a geometry to start from."""
+
+SEED = 34
+"""Seed of the random numbers: the same front for the same specification."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Leaf springs with their drive stiffness [N/m] and first interfering frequency [Hz] by closed forms."""
+
+    geometry: Geometry
+    stiffness: float
+    frequency: float
+
+
+def front(task: LeafTask) -> list[Candidate]:
+    """The front, by rising stiffness (NSGA-II, doi:10.1109/4235.996017); empty where no geometry meets the requirements
+    except the one on the frequency, which is an objective here."""
+    from pymoo.algorithms.moo.nsga2 import NSGA2
+    from pymoo.operators.crossover.sbx import SBX
+    from pymoo.operators.mutation.pm import PM
+    from pymoo.optimize import minimize
+
+    needs = [requirement for requirement in requirements(task) if requirement.name != PARASITIC]
+    start = closest(task, needs)
+    if start is None:
+        return []
+    low, high = _ends(task)
+    first = low + (high - low) * np.random.default_rng(SEED).random((POPULATION, len(low)))
+    first[: len(first) // 4] = start  # from where the others are reached, however little room there is
+    variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
+    algorithm = NSGA2(pop_size=POPULATION, **variation)
+    result = minimize(_problem(task, needs), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
+    if result.X is None or result.F is None:
+        return []
+    bought = sheets(task.spec)
+    chosen, objectives = (np.atleast_2d(np.asarray(array, dtype=float)) for array in (result.X, result.F))
+    candidates = [
+        Candidate(Geometry.of(np.exp(x[:3]), bought[int(x[3])]), float(np.exp(f[0])), float(np.exp(-f[1])))
+        for x, f in zip(chosen, objectives, strict=True)
+    ]
+    return sorted(candidates, key=lambda candidate: candidate.stiffness)
+
+
+def _ends(task: LeafTask) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest variables, each (4,): logarithms of the sizes, and the number of the sheet."""
+    low, high = box(task.spec)
+    return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
+
+
+def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
+    """The two objectives and the requirements, as pymoo takes them."""
+    from pymoo.core.problem import Problem
+
+    low, high = _ends(task)
+    bought = sheets(task.spec)
+
+    class Leaves(Problem):
+        def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+            judgement = judged(task, needs, np.exp(x[:, :3]), [bought[int(k)] for k in x[:, 3]])
+            out["F"] = np.stack([np.log(judgement.stiffness), -np.log(judgement.frequency)], axis=1)
+            out["G"] = np.log(judgement.excess)
+
+    return Leaves(n_var=len(low), n_obj=2, n_ieq_constr=len(needs), xl=low, xu=high)
+
+
+def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
+    """A geometry, as the logarithms of its sizes and the number of its sheet (4,), that meets the requirements with the
+    most to spare, by differential evolution; None if none meets them."""
+    bought = sheets(task.spec)
+
+    def objective(x: np.ndarray) -> np.ndarray:
+        judgement = judged(task, needs, np.exp(x[:3]).T, [bought[int(k)] for k in x[3]])
+        return np.log(judgement.excess).max(axis=1)
+
+    low, high = _ends(task)
+    bounds = [*zip(low, high + 1e-12 * (high == low), strict=True)]
+    minimum = differential_evolution(
+        objective, bounds, vectorized=True, updating="deferred", maxiter=SEARCHED, rng=SEED, polish=False
+    )
+    return minimum.x if minimum.fun <= 0 else None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Geometries: their drive stiffness [N/m] and first interfering frequency [Hz], shape (count,), and by what factor
+    each requirement is broken, (count, requirements)."""
+
+    stiffness: np.ndarray
+    frequency: np.ndarray
+    excess: np.ndarray
+
+
+def judged(task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
+    """Geometries by closed forms."""
+    many = mechanisms(task.flat, sizes, bought)
+    excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]
+    return Judged(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))

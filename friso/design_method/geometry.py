@@ -1,0 +1,104 @@
+"""The leaf springs that may be built: geometries as numbers to choose from, and as mechanisms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.spec import Spec
+from friso.leaf_springs.mechanism import Mechanism
+from friso.materials import materials
+
+SIZES = ("length", "width", "spacing")
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What is bought: how many leaves, of which sheet [m] and material."""
+
+    leaves: float
+    thickness: float
+    material: str
+
+
+def sheets(spec: Spec) -> list[Sheet]:
+    """All that may be bought."""
+    section = spec.leaves
+    return [
+        Sheet(*sheet) for sheet in product(section.leaves, sorted(map(float, section.thickness)), section.materials)
+    ]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Leaf springs: length, width and spacing [m], and their sheet."""
+
+    length: float
+    width: float
+    spacing: float
+    sheet: Sheet
+
+    @classmethod
+    def of(cls, sizes: np.ndarray, sheet: Sheet) -> Geometry:
+        """Of length, width and spacing [m], shape (3,)."""
+        length, width, spacing = sizes.tolist()
+        return cls(length, width, spacing, sheet)
+
+    def keys(self) -> dict[str, Any]:
+        """The keys of [flexure], as text with units."""
+        sizes = {f"flexure.{name}": f"{getattr(self, name) * 1e3:.6g} mm" for name in SIZES}
+        bought = {
+            "flexure.leaves": int(self.sheet.leaves),
+            "flexure.thickness": f"{self.sheet.thickness * 1e3:.6g} mm",
+            "flexure.material": self.sheet.material,
+        }
+        return sizes | bought
+
+
+def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) -> Mechanism:
+    """Geometries of lengths, widths and spacings [m], shape (count, 3), each of its sheet, in the stage `flat`."""
+    sheet_materials = [materials()[sheet.material] for sheet in bought]
+    columns = {
+        "leaves": [sheet.leaves for sheet in bought],
+        "thickness": [sheet.thickness for sheet in bought],
+        "young": [material.young for material in sheet_materials],
+        "poisson": [material.poisson for material in sheet_materials],
+        "density": [material.density for material in sheet_materials],
+        "yield": [material.yield_strength for material in sheet_materials],
+        "fatigue": [material.fatigue for material in sheet_materials],
+    }
+    keys = {f"flexure.{name}": np.array(column, float) for name, column in columns.items()}
+    keys |= {f"flexure.{name}": column for name, column in zip(SIZES, sizes.T, strict=True)}
+    return Mechanism.of({**flat, **moved_along(flat, sizes[:, 0]), **keys})
+
+
+def moved_along(flat: Mapping[str, Any], length: Any) -> dict[str, Any]:
+    """The points of the stage that are given: as the length [m] changes, they stay as far from the leaf ends."""
+    points = [f"flexure.{name}_x" for name in ("centre", "actuation", "sensor")]
+    return {key: flat[key] + length - flat["flexure.length"] for key in points if key in flat}
+
+
+def box(spec: Spec) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest length, width and spacing [m], each (3,)."""
+    ends = np.array([spec.leaves.space(name) for name in SIZES])
+    return ends[:, 0], ends[:, 1]
+
+
+def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
+    """Their lengths, widths and spacings [m], shape (count, 3)."""
+    return np.array([[getattr(geometry, name) for name in SIZES] for geometry in geometries])
+
+
+def rounded(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
+    """The geometries with whole multiples of a step [m] next to one, as far as there is space for them."""
+    low, high = box(spec)
+    near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]
+    corners = [np.array(corner) for corner in product(*map(sorted, near))]
+    inside = [
+        corner for corner in corners if np.all(corner >= low * (1 - 1e-9)) and np.all(corner <= high * (1 + 1e-9))
+    ]
+    return [Geometry.of(corner, geometry.sheet) for corner in inside]

@@ -1,0 +1,47 @@
+"""Where moves come to rest over crossover and stroke about a design, over the corners of its specification."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.design_method.population import Population, typical_move
+from friso.design_method.spec import Spec
+from friso.design_method.verification import tried
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.stage import Stage
+
+CROSSOVERS, STROKES = 24, 16
+"""Points of the map."""
+
+REACH = (1 / 30, 2.0), (1 / 30, 3.0)
+"""The ranges of crossover and stroke, in units of the design's."""
+
+
+@dataclass(frozen=True)
+class HuntingMap:
+    """Crossovers [Hz] (n,) and strokes [m] (m,), and the share of the corners, (m, n), in which the stage is not in
+    position a quarter of a minute after a typical move; NaN where a run failed."""
+
+    crossovers: np.ndarray
+    strokes: np.ndarray
+    share: np.ndarray
+
+
+def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
+    """The map about a design, at its own drive stiffness."""
+    flat = stage.flat()
+    crossovers, strokes = (
+        np.geomspace(low * flat[key], high * flat[key], count)
+        for key, (low, high), count in zip((CROSSOVER, "joint.stroke"), REACH, (CROSSOVERS, STROKES), strict=True)
+    )
+    shape = (STROKES, CROSSOVERS, population.count)
+    stroke, crossover, number = (
+        axis.ravel() for axis in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
+    )
+    machines = {key: value[number] for key, value in population.keys.items()}
+    runs = {**flat, **machines, **typical_move(spec), CROSSOVER: crossover, "joint.stroke": stroke}
+    outcome = tried(runs, len(number), float(spec.position.window), patient=False)
+    share = np.where(outcome.completed, outcome.restless, np.nan).reshape(shape).mean(axis=2)
+    return HuntingMap(crossovers, strokes, share)

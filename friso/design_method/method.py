@@ -1,0 +1,259 @@
+"""The design method (thesis, Sec. 3.4): from a specification to leaf springs, stroke, crossover and gains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.choice import ChosenLeaves, Confirmed, chosen, confirmed
+from friso.design_method.controller import DesignedController, comfortable, comfortable_below, controller, dampings
+from friso.design_method.edges import Corners, edges_over, rigid
+from friso.design_method.front import Candidate, front
+from friso.design_method.hunting_map import HuntingMap, hunting_map
+from friso.design_method.modal import Modal
+from friso.design_method.population import Population, corners
+from friso.design_method.prepare import prepared, with_leaves
+from friso.design_method.relax import Relaxation, relaxations
+from friso.design_method.requirements import LeafTask
+from friso.design_method.spec import Spec
+from friso.design_method.verification import Verification, verification
+from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.frequency.crossover import Limits, limits
+from friso.progress import Progress, silent
+from friso.stage import Stage
+
+STROKES = 4
+"""Strokes that are tried where the specification leaves a range, the largest first."""
+
+FIRST, BEYOND, STEPS = 1 / 40, 3.0, 24
+"""Where edges are searched, in units of the machine's limit: from there to there, in so many steps."""
+
+ABOVE = 2.0
+"""End of the search with an isolator, in units of the crossover chosen."""
+
+SLOW = 0.05
+"""Share of the moves that may take longer than the settling time specified."""
+
+ROUNDS, LOWER = 12, 0.97
+"""How often leaves and crossover are chosen anew, and the factor on a crossover for which beams confirm no leaves."""
+
+ALIKE = 0.98
+"""Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
+
+
+class NoDesign(Exception):
+    """No design meets the specification: why, and what to relax by how much."""
+
+    def __init__(self, reason: str, relaxed: tuple[Relaxation, ...] = ()) -> None:
+        super().__init__(reason)
+        self.reason, self.relaxed = reason, relaxed
+
+
+@dataclass(frozen=True)
+class LeavesAndCrossover:
+    """Leaves and crossover that go together: the task the leaves were chosen for, the choice, the stage with both, and
+    how fast its controller may be."""
+
+    task: LeafTask
+    choice: ChosenLeaves
+    stage: Stage
+    limits: Limits
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design with the numbers of each step.
+
+    `without`: the edges of hunting over the `corners` of the specification without isolator, `edges` with it.
+    `candidates`: the Pareto front, some of it `confirmed` by beams; `fitted`: what was chosen. `controller`: margins.
+    `map`: hunting over crossover and stroke. `verification`: the moves simulated. `stage`: the design as a stage.
+    `damped`: the joint damping with which the crossover could be `faster` [Hz], where margins hold it down.
+    """
+
+    spec: Spec
+    original: Stage
+    without: Corners
+    candidates: tuple[Candidate, ...]
+    confirmed: tuple[Confirmed, ...]
+    fitted: LeavesAndCrossover
+    edges: Corners
+    controller: DesignedController
+    map: HuntingMap
+    verification: Verification
+    damped: Relaxation | None
+    faster: float
+
+    @property
+    def stage(self) -> Stage:
+        return self.fitted.stage
+
+    @property
+    def unmet(self) -> tuple[Relaxation, ...]:
+        """What the verification found not to be met: the settling time, with that which would be; moves that do not
+        come to rest are reported by the verification itself."""
+        limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(SLOW)
+        if limit is None or settling <= limit or not np.isfinite(settling):
+            return ()
+        name = f"{1 - SLOW:.0%} of the moves settle in time"
+        later = Relaxation(name, "position.settling_time", float(limit), settling, "s")
+        return (self.damped, later) if self.damped else (later,)
+
+    @property
+    def meets(self) -> bool:
+        """Whether all moves come to rest, and settle in the time specified."""
+        limit, free = self.spec.position.settling_time, self.verification.free
+        return not free.missed and (limit is None or free.slower_than(SLOW) <= limit)
+
+    @property
+    def needed(self) -> bool:
+        """Whether the machine hunts without isolator at all crossovers that it allows."""
+        return self.spec.safety.hunting * self.without.highest > self.spec.limit
+
+
+def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
+    """Carry the method out. Raises InputError for input that cannot be used, NoDesign if nothing meets the
+    specification."""
+    base = prepared(stage, spec)
+    flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
+    without = edges_over(
+        rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS, progress, "hunting without isolator"
+    )
+    friction = least_friction(population, flat)
+    if friction <= 0:
+        raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
+    task, candidates = leaves(spec, flat, friction, progress)
+    progress(0, 1, "leaves and crossover")
+    fit = fitted(base, task, candidates, population)
+    crossover = fit.stage.flat()[CROSSOVER]
+    progress(0, 1, "hunting with isolator")
+    stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
+    worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
+    edges = edges_over(
+        worst, population, FIRST * crossover, ABOVE * crossover, STEPS, progress, "hunting with isolator"
+    )
+    _does_not_hunt(fit, edges)
+    progress(0, 1, "margins")
+    control = controller(fit.stage, fit.choice.beams, fit.limits, population)
+    progress(0, 1, "hunting map")
+    edges_map = hunting_map(fit.stage, spec, population)
+    by_beams = tuple(confirmed(fit.task, candidates))
+    tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
+    damped, faster = with_damping(fit)
+    results = (without, tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
+    return Design(spec, stage, *results)
+
+
+def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
+    """The least joint damping of those tried with which the crossover could be what leaves and machine allow, and that
+    crossover [Hz]; none where it is already, or where damping does not help."""
+    flat, spec = fit.stage.flat(), fit.task.spec
+    target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
+    if flat[CROSSOVER] >= ALIKE * target:
+        return None, target
+    for damping in dampings(flat)[1::2]:
+        ranges = Modal.of({**flat, "joint.damping": damping}, fit.choice.beams).comfortable
+        best = comfortable_below(ranges, target)
+        if best is not None and best >= ALIKE * target:
+            name = f"crossover of up to {best:.3g} Hz with a modulus margin of 0.5"
+            return Relaxation(name, "joint.damping", flat["joint.damping"], float(damping), "N*s/m"), best
+    return None, target
+
+
+def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
+    """The least force of the joint [N] at which the cart breaks away: in the weaker direction, less what a bias force
+    on the cart takes of it."""
+    key = "friction.static" if "friction.static" in flat else "friction.coulomb"
+    weaker = 1 - abs(flat.get("friction.asymmetry", 0.0))
+    return float(np.min(population.keys.get(key, flat[key]))) * weaker - abs(flat.get("bias.cart", 0.0))
+
+
+def leaves(
+    spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress
+) -> tuple[LeafTask, list[Candidate]]:
+    """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
+    Raises NoDesign where no leaf springs meet the requirements."""
+    stroke, choices = spec.leaves.stroke, []
+    several = stroke.high > stroke.low
+    strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
+    for k, size in enumerate(strokes):
+        progress(k, len(strokes), "leaf springs")
+        task = LeafTask(spec, size, spec.limit, friction, flat)
+        if candidates := front(task):
+            choices.append((task, candidates))
+            if allowed(task, candidates) >= spec.limit:
+                break
+    if not choices:
+        raise NoDesign(
+            "no leaf springs meet the specification", relaxations(LeafTask(spec, strokes[-1], 0.0, friction, flat))
+        )
+    return max(choices, key=lambda pair: min(allowed(*pair), spec.limit))
+
+
+def allowed(task: LeafTask, candidates: list[Candidate]) -> float:
+    """The highest crossover [Hz] whose multiple is still below a first interfering frequency of the front."""
+    return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
+
+
+def fitted(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
+    """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
+    target = min(task.spec.limit, allowed(task, candidates))
+    for _ in range(ROUNDS):
+        task = replace(task, crossover=target)
+        choice = chosen(task, candidates)
+        if choice is None:
+            target *= LOWER
+            continue
+        stage = with_leaves(base, choice.geometry, task.stroke)
+        ranges = replace(limits(stage.flat()), comfortable=comfortable(stage, choice.beams, population))
+        best = comfortable_below(ranges.comfortable, target)
+        if best is None:
+            raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
+        if best >= ALIKE * target:
+            return LeavesAndCrossover(task, choice, stage.replace({CROSSOVER: f"{_down(best):.6g} Hz"}), ranges)
+        target = best
+    raise NoDesign(
+        f"none of the {len(candidates)} leaf springs on the front, in sizes rounded to tenths of a millimetre, is "
+        f"confirmed by the beam model at a crossover of {target:.3g} Hz"
+    )
+
+
+def _down(crossover: float) -> float:
+    """Rounded down to three digits."""
+    step = 10 ** (np.floor(np.log10(crossover)) - 2)
+    return float(np.floor(crossover / step * (1 + 1e-9)) * step)
+
+
+def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners) -> None:
+    """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
+    spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
+    needed = spec.safety.hunting * edges.highest
+    if not edges.hunts or needed <= crossover:
+        return
+    until = f"{edges.highest:.3g} Hz" if np.isfinite(needed) else f"beyond {edges.searched[1]:.3g} Hz"
+    stiffness, stroke = fit.stage.flat()["joint.stiffness"], fit.task.stroke * 1e3
+    reason = (
+        f"with the softest leaf springs available, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the "
+        f"stage hunts up to {until}; a crossover above that by the safety factor of {spec.safety.hunting:g} is not "
+        f"possible, the highest is {crossover:.3g} Hz"
+    )
+    raise NoDesign(reason, tuple(_ways_out(fit, edges.highest, needed, crossover)))
+
+
+def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
+    """What would let the crossover keep its distance from the edge [Hz]."""
+    spec, name = fit.task.spec, "crossover above the edge of hunting"
+    above = [max(low, needed) for low, high in fit.limits.comfortable if high > needed]
+    allowed_ = fit.choice.frequency / spec.safety.parasitic
+    if spec.limit < needed and above and min(above) <= allowed_:
+        yield Relaxation(name, "machine.bandwidth_limit", spec.limit, min(above), "Hz")
+    if edge < crossover:
+        yield Relaxation(name, "safety.hunting", spec.safety.hunting, crossover / edge, "")
+    damping = fit.stage.flat()["joint.damping"]
+    for larger in dampings(fit.stage.flat())[1:]:
+        damped = {**fit.stage.flat(), "joint.damping": larger}
+        if any(low <= needed <= high for low, high in Modal.of(damped, fit.choice.beams).comfortable):
+            yield Relaxation(name, "joint.damping", damping, float(larger), "N*s/m")
+            return

@@ -1,0 +1,90 @@
+"""The loop with all modes of the leaf springs that actuator and sensor see, of which the equations have one only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import bandwidth, faster
+from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
+from friso.frequency.drive import DriveTiming
+from friso.frequency.family import controller, distance_to_lines, grid, plants, stability_by_poles
+from friso.frequency.members import Members
+from friso.frequency.ranges import Range, ranges_below
+from friso.leaf_springs.evaluation import Evaluation
+
+AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
+"""Where the loop is looked at about a mode, in units of its half width."""
+
+
+@dataclass(frozen=True)
+class Modal:
+    """Settled states of a stage (members,) with their plants without parasitic mode, `bare`, and with those of the leaf
+    springs, `with_modes`, both of shape (members, frequencies) [m/N], the drive included, over `omega` [rad/s].
+
+    Modes add to the motion of the stage as a rigid mass, whatever the cart does far below them.
+    """
+
+    flat: Mapping[str, Any]
+    members: Members
+    omega: np.ndarray
+    bare: np.ndarray
+    with_modes: np.ndarray
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
+        """A stage given as flat keys with the modes of its leaf springs."""
+        rigid = {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
+        members, drive = settled_members(rigid), DriveTiming.of(rigid)
+        omega = _frequencies(rigid, leaves, drive)
+        bare = plants(rigid, members, omega) * drive.transfer(omega)
+        return cls(rigid, members, omega, bare, bare + compliance(leaves, omega) * drive.transfer(omega))
+
+    def margin(self, crossover: np.ndarray) -> np.ndarray:
+        """The least modulus margin of all states at each crossover [Hz], shape (n,); 0 where one is unstable."""
+        return np.array([self._margin(float(value)) for value in np.atleast_1d(crossover)])
+
+    def _margin(self, crossover: float) -> float:
+        keys = self._at(np.array(crossover))
+        shape = controller(keys, self.omega)
+        bare, loop = self.bare * shape, self.with_modes * shape
+        settled = stability_by_poles(keys, self.members).abscissa < 0
+        stable = settled & (np.abs(_turns((1 + loop) / (1 + bare))) < 0.5)
+        return float(distance_to_lines(loop).min()) if stable.all() else 0.0
+
+    def _at(self, crossover: np.ndarray) -> dict[str, Any]:
+        return faster(self.flat, crossover / bandwidth(self.flat))
+
+    @property
+    def comfortable(self) -> tuple[Range, ...]:
+        """The crossovers [Hz] with a modulus margin of 0.5."""
+        return ranges_below(np.geomspace(*searched(self.flat), STEPS), lambda at: WANTED - self.margin(at))
+
+
+def _turns(ratio: np.ndarray) -> np.ndarray:
+    """How often the curves, (..., frequencies), run around the origin from the first frequency to the last."""
+    return np.angle(ratio[..., 1:] / ratio[..., :-1]).sum(axis=-1) / (2 * np.pi)
+
+
+def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
+    """What the modes other than the drive mode add to the plant [m/N] at frequencies [rad/s], shape (frequencies,)."""
+    zeta = float(leaves.mechanism.damping_ratio)
+    parts = [
+        mode.actuator
+        * mode.sensor
+        / ((2 * np.pi * mode.frequency) ** 2 - omega**2 + 2j * zeta * 2 * np.pi * mode.frequency * omega)
+        for mode in leaves.modes[1:]
+    ]
+    return np.sum(parts, axis=0)
+
+
+def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
+    """Angular frequencies that show the loop at all crossovers, and every mode."""
+    ends = [grid(faster(flat, np.array(end / bandwidth(flat))), DENSITY) for end in searched(flat)]
+    zeta = float(leaves.mechanism.damping_ratio)
+    about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
+    frequencies = np.unique(np.concatenate([*ends, *about]))
+    return frequencies[(frequencies > 0) & (frequencies < drive.highest)]

@@ -1,0 +1,146 @@
+"""The machines that a specification allows: its corners, and machines and moves drawn at random from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from friso.design_method.spec import Spec
+from friso.errors import InputError
+from friso.intervals import Interval
+
+LEVELS = (0.0, 0.5, 1.0)
+"""Shares of each range of static friction and gap that the corners take: hunting is not monotonous in them."""
+
+SEED = 6
+"""Seed of the scrambled Sobol sequence: the same machines for the same specification."""
+
+DISTANT = 5.0
+"""Time [s] from the start of a move to that of the way back, at least, as in the thesis's path."""
+
+
+@dataclass(frozen=True)
+class Population:
+    """Machines: flat keys to SI arrays (count,) that differ from those of the stage."""
+
+    keys: Mapping[str, np.ndarray]
+    count: int
+
+    def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """The flat keys of the stage with its numbers replaced by those of these machines; its controller is kept."""
+        return {**flat, **self.keys}
+
+    def of(self, number: int) -> dict[str, float]:
+        """What differs in one of the machines."""
+        return {key: float(values[number]) for key, values in self.keys.items()}
+
+
+def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
+    """The ends of all ranges of friction and masses, and the middle of those of static friction and gap.
+
+    Static friction and gap are combined with each other and with masses that are all light or all heavy; the rest of
+    the friction goes together, viscous friction against it, since it is what damps. Raises InputError where friction
+    never falls.
+    """
+    friction, masses = _friction(spec, flat), _masses(spec)
+    main = [name for name in ("static", "coulomb", "gap") if name in friction]
+    rest = [name for name in friction if name not in main]
+    groups = [dict.fromkeys(masses, share) for share in (0.0, 1.0)] if masses else [{}]
+    turned = (
+        [{name: 1 - share if name == "viscous" else share for name in rest} for share in (0.0, 1.0)] if rest else [{}]
+    )
+    ranges = friction | masses
+    levels = product(*(LEVELS if ranges[name].high > ranges[name].low else (0.0,) for name in main))
+    rows = [
+        {**dict(zip(main, level, strict=True)), **side, **mass} for level, side, mass in product(levels, turned, groups)
+    ]
+    shares = {name: np.array([row[name] for row in rows]) for name in ranges}
+    population = _population(ranges, shares, flat, len(rows))
+    _falls(population, flat)
+    return population
+
+
+def _falls(population: Population, flat: Mapping[str, Any]) -> None:
+    """Raises InputError where sliding friction is nowhere below the static one although there are both."""
+    static, coulomb = (population.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
+    if static is not None and coulomb is not None and np.all(coulomb >= static):
+        text = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
+        expected = "static friction above Coulomb friction (that of the stage file where the specification gives none)"
+        raise InputError("friction.static", text, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
+
+
+def sampled(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
+    """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (its tolerance either way, and down
+    by the share of it that the load may take, `softening`), travel and acceleration (evenly in the logarithm)."""
+    ranges = _friction(spec, flat) | _masses(spec)
+    names = [*ranges, "stiffness", "travel", "acceleration"]
+    sequence = qmc.Sobol(len(names), rng=SEED).random_base2(int(np.ceil(np.log2(count))))[:count]
+    shares = dict(zip(names, sequence.T, strict=True))
+    population = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
+    moves = _moves(spec, shares["travel"], shares["acceleration"])
+    tolerance = spec.safety.stiffness_tolerance
+    factors = Interval((1 - tolerance) * (1 - softening), 1 + tolerance, "").at(shares["stiffness"])
+    stiffness = {"joint.stiffness": flat["joint.stiffness"] * factors}
+    return Population({**population.keys, **moves, **stiffness}, count)
+
+
+def typical_move(spec: Spec) -> dict[str, Any]:
+    """The keys of a move in the middle of the ranges of travel and acceleration."""
+    keys = _moves(spec, np.array(0.5), np.array(0.5))
+    return {"motion.kind": "there_and_back", **{key: float(value) for key, value in keys.items()}}
+
+
+def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
+    """There and back, at shares of the ranges."""
+    distance, rate = (
+        interval.low * (interval.high / interval.low) ** share
+        for interval, share in ((spec.moves.travel, travel), (spec.moves.acceleration, acceleration))
+    )
+    time = np.sqrt(distance / rate)
+    back = np.maximum(DISTANT, 2 * time + DISTANT / 2)
+    return {
+        "motion.acceleration": rate,
+        "motion.acceleration_time": time,
+        "motion.return_at": back,
+    }
+
+
+def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
+    """The ranges of friction by key. Raises InputError for one that the stage's friction law does not have."""
+    values = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
+    ranges = {name: interval for name, interval in values.items() if interval is not None}
+    for name in ranges:
+        key = f"friction.{'coulomb' if name == 'gap' else name}"
+        if key not in flat:
+            law = flat["friction.model"]
+            expected = "a range of a key that the friction law of the stage has"
+            raise InputError(f"friction.{name}", f"a range, but the stage has {law} friction", expected)
+    return ranges
+
+
+def _masses(spec: Spec) -> dict[str, Interval]:
+    masses = {name: getattr(spec.masses, name) for name in ("cart", "stage")}
+    return {name: interval for name, interval in masses.items() if interval is not None}
+
+
+def _population(
+    ranges: Mapping[str, Interval], shares: Mapping[str, np.ndarray], flat: Mapping[str, Any], count: int
+) -> Population:
+    """Machines at shares of the ranges; those whose sliding friction is no smaller than the static one are given almost
+    as much: they cannot hunt, but exist."""
+    values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
+    keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}
+    if "friction.static" not in flat:
+        return Population(keys | {f"friction.{name}": value for name, value in values.items()}, count)
+    static = np.broadcast_to(values.get("static", flat["friction.static"]), (count,)).astype(float)
+    if "gap" in values:
+        values["coulomb"] = static * (1 - values.pop("gap"))
+    else:
+        values["coulomb"] = np.minimum(values.get("coulomb", flat["friction.coulomb"]), static)
+    values["static"] = static
+    return Population(keys | {f"friction.{name}": value for name, value in values.items()}, count)

@@ -1,0 +1,67 @@
+"""The stage that a design starts from, and the stage with leaf springs."""
+
+from __future__ import annotations
+
+from friso.design_method.geometry import Geometry, moved_along
+from friso.design_method.spec import Spec
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.errors import InputError
+from friso.stage import Stage
+
+JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
+
+
+def prepared(stage: Stage, spec: Spec) -> Stage:
+    """The stage with a free joint of leaf springs, the largest that the specification allows, to be replaced; masses in
+    the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
+    ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
+    _can_be_isolated(stage)
+    section = spec.leaves
+    low, high = (min(map(float, section.thickness)), section.stroke.high)
+    masses: dict[str, str | None] = {
+        f"masses.{name}": f"{mass.centre!r} kg"
+        for name in ("cart", "stage")
+        if (mass := getattr(spec.masses, name)) is not None
+    }
+    if masses and "tuned_mass" in stage.controller.as_written():
+        masses[TUNED_MASS] = None  # it follows the masses
+    sizes = {f"flexure.{name}": f"{section.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
+    leaves = {
+        "flexure.leaves": section.leaves[0],
+        "flexure.thickness": f"{low!r} m",
+        "flexure.material": section.materials[0],
+        "joint.locked": False,
+        "joint.stroke": f"{high!r} m",
+        CROSSOVER: f"{spec.limit!r} Hz",
+    }
+    joint = stage.joint
+    removed = {"joint.stiffness": None} if joint and joint.stiffness is not None else {}
+    removed |= {"parasitic": None} if stage.parasitic else {}
+    numbers = ("young", "poisson", "density", "yield", "fatigue")
+    section = stage.flexure.as_written() if stage.flexure else {}
+    removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in section}
+    base = stage.replace(removed | masses | sizes | leaves)
+    return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base
+
+
+def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
+    """A prepared stage with leaf springs of a geometry and a stroke [m]."""
+    name = f"{base.name}, with friction isolator" if base.name else "With friction isolator"
+    moved = {key: f"{place * 1e3:.6g} mm" for key, place in moved_along(base.flat(), geometry.length).items()}
+    return base.replace({"name": name, "joint.stroke": f"{stroke * 1e3:.6g} mm", **geometry.keys(), **moved})
+
+
+def _can_be_isolated(stage: Stage) -> None:
+    if stage.masses.cart is None or stage.masses.stage is None:
+        expected = "both masses: the isolator goes between cart and stage"
+        raise InputError("masses", "a single mass", expected, 'cart = "1.2 kg", stage = "0.5 kg"')
+    if stage.joint is None or stage.joint.damping is None:
+        expected = "a [joint] with its damping and its limiter; its stiffness follows from the design"
+        raise InputError("joint", "nothing" if stage.joint is None else "no damping", expected, JOINT)
+    if stage.friction is None or stage.friction.model == "none":
+        raise InputError(
+            "friction", "none", "friction, without which no isolator is needed", '[friction] model = "lugre" ...'
+        )
+    if CROSSOVER not in stage.flat():
+        expected = "a controller tuned by van Dijk's rules; its crossover follows from the design"
+        raise InputError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

@@ -1,0 +1,131 @@
+"""When no leaf springs meet a specification: which requirement to relax, and by how much it has to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms
+from friso.design_method.requirements import LeafTask, Requirement, less, more, requirements
+from friso.leaf_springs.mechanism import Mechanism
+
+BEYOND = 3.0
+"""Factor by which space and sheets are looked at beyond what the specification allows."""
+
+POPULATION, GENERATIONS, SEED = 16, 80, 5
+"""Population, generations and seed of differential evolution (doi:10.1023/A:1008202821328)."""
+
+UNMET = 10.0
+"""Added to the objective where another requirement is not met: the logarithm of a factor beyond all relaxation."""
+
+SPARE, MORE = 0.01, 1.03
+"""Logarithm of the factor by which the others have to be kept, and the factor by which more is asked of the one that is
+relaxed: sizes are made in whole tenths, and beams have to confirm them."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """A `key` of the specification that, changed alone from `value` to `needed` [unit], lets the requirement be met: in
+    leaf springs, by those of a `geometry` (None for what is not about them)."""
+
+    requirement: str
+    key: str
+    value: float
+    needed: float
+    unit: str
+    geometry: Geometry | None = None
+
+
+def relaxations(task: LeafTask) -> tuple[Relaxation, ...]:
+    """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
+    first. Empty where no single one is enough."""
+    needs = [*requirements(task), *_space(task)]
+    all_relaxations = [relaxation for k in range(len(needs)) for relaxation in _alone(task, needs, k)]
+    return tuple(sorted(all_relaxations, key=_change))
+
+
+def _change(relaxation: Relaxation) -> float:
+    """How large a change is, as a factor's logarithm."""
+    return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
+
+
+def _space(task: LeafTask) -> list[Requirement]:
+    """The limits of space and sheets as requirements."""
+    low, high = box(task.spec)
+    gauges = sorted(map(float, task.spec.leaves.thickness))
+    limits = []
+    for name, least, most in zip((*SIZES, "thickness"), [*low, gauges[0]], [*high, gauges[-1]], strict=True):
+        words, key = "sheets" if name == "thickness" else f"{name} of the leaves", f"leaves.{name}"
+        limits += [
+            Requirement(f"{words}, at least", (less(key, float(least), "m"),), _over(name, least, low=True)),
+            Requirement(f"{words}, at most", (more(key, float(most), "m"),), _over(name, most, low=False)),
+        ]
+    return limits
+
+
+def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
+    def excess(mechanism: Mechanism) -> Any:
+        return limit / getattr(mechanism, name) if low else getattr(mechanism, name) / limit
+
+    return excess
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Geometries in more space than is allowed, as variables: logarithms of length, width, spacing and thickness, and
+    the number of the kind. The thickness is `free`, or that of the next available sheet."""
+
+    task: LeafTask
+    free: bool
+
+    @property
+    def kinds(self) -> list[tuple[float, str]]:
+        """Numbers of leaves with materials."""
+        section = self.task.spec.leaves
+        return [(count, material) for count in section.leaves for material in section.materials]
+
+    @property
+    def gauges(self) -> np.ndarray:
+        return np.sort(np.array(self.task.spec.leaves.thickness, dtype=float))
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        low, high = box(self.task.spec)
+        ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(BEYOND) * np.array([-1, 1])
+        return [*map(tuple, ends), (0, len(self.kinds) - 1e-9)]
+
+    def built(self, x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
+        """Sizes (count, 3) and sheets of the variables, (5, count)."""
+        sizes, gauges, kinds = np.exp(x[:4]).T, self.gauges, self.kinds
+        nearest = gauges[np.abs(np.log(gauges) - x[3][:, None]).argmin(axis=1)]
+        thickness = sizes[:, 3] if self.free else nearest
+        chosen = (kinds[int(n)] for n in x[4])
+        return sizes[:, :3], [Sheet(count, float(t), of) for t, (count, of) in zip(thickness, chosen, strict=True)]
+
+
+def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
+    """The least relaxation of requirement `k` with which the others can be met."""
+    of_sheets = np.array([requirement.ways[0].key == "leaves.thickness" for requirement in needs])
+    trials = _Trials(task, free=bool(of_sheets[k]))
+    spare = np.where(of_sheets, 0.0, SPARE)  # what may be bought is met exactly
+
+    def objective(x: np.ndarray) -> np.ndarray:
+        many = mechanisms(task.flat, *trials.built(x))
+        excess = np.log([np.broadcast_to(requirement.excess(many), x.shape[1]) for requirement in needs])
+        others = np.delete(excess + spare[:, None], k, axis=0).max(axis=0)
+        return np.where(others <= 1e-9, excess[k], UNMET + others)
+
+    search = {"popsize": POPULATION, "maxiter": GENERATIONS, "rng": SEED, "polish": False}
+    with np.errstate(divide="ignore"):  # a requirement that asks for nothing
+        minimum = differential_evolution(objective, trials.bounds, vectorized=True, updating="deferred", **search)
+    if minimum.fun >= UNMET:
+        return
+    (sizes,), (sheet,) = trials.built(minimum.x[:, None])
+    for remedy in needs[k].ways:
+        needed = remedy.needed(MORE * float(np.exp(max(minimum.fun, 0.0))))
+        if needed is not None and not np.isclose(needed, remedy.value, rtol=1e-6):
+            yield Relaxation(needs[k].name, remedy.key, remedy.value, needed, remedy.unit, Geometry.of(sizes, sheet))

@@ -1,0 +1,177 @@
+"""What a specification requires of leaf springs, each as a ratio: of many geometries at once, by closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.design_method.spec import Spec
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.mechanism import GRAVITY, Mechanism
+
+RESERVE = 1.015
+"""By how much closed forms may be off in stress and buckling load (docs/flexure.md): geometries keep this distance, so
+that the beam model confirms them."""
+
+
+@dataclass(frozen=True)
+class LeafTask:
+    """What leaf springs are designed for: the specification, a stroke [m], the crossover [Hz] whose multiple the first
+    interfering frequency has to be, the least static friction [N], and the flat keys of the stage without its joint's
+    leaves."""
+
+    spec: Spec
+    stroke: float
+    crossover: float
+    friction: float
+    flat: Mapping[str, Any]
+
+    @property
+    def load(self) -> float:
+        """Force along the leaves [N]: what the specification says and the weight of the heaviest stage."""
+        masses = self.spec.masses.stage
+        heaviest = masses.high if masses else float(self.flat["masses.stage"])
+        return float(self.spec.load.force_x) + GRAVITY * heaviest
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to relax a requirement: the `key` of the specification, its `value` there and `unit`, and to what it has to
+    be changed for a geometry that breaks the requirement by a factor (None: no change of it is enough)."""
+
+    key: str
+    value: float
+    unit: str
+    needed: Callable[[float], float | None]
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A requirement in words, the ways to relax it, and by what factor geometries break it: 1 where they just do."""
+
+    name: str
+    ways: tuple[Way, ...]
+    excess: Callable[[Mechanism], Any]
+
+
+def more(key: str, value: float, unit: str) -> Way:
+    """To be relaxed by making it larger."""
+    return Way(key, value, unit, lambda excess: value * excess)
+
+
+def less(key: str, value: float, unit: str) -> Way:
+    """To be relaxed by making it smaller."""
+    return Way(key, value, unit, lambda excess: value / excess)
+
+
+def factor(key: str, value: float) -> Way:
+    """A factor of safety, which cannot be smaller than 1."""
+    return Way(key, value, "", lambda excess: value / excess if value >= excess else None)
+
+
+BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first interfering frequency"
+
+
+def requirements(task: LeafTask) -> list[Requirement]:
+    """All requirements except those on space and sheets."""
+    spec, safety, stroke = task.spec, task.spec.safety, task.stroke
+    shorter = less("leaves.stroke", stroke, "m")
+    stiffest = safety.breakaway * (1 + safety.stiffness_tolerance)
+
+    def fatigue(mechanism: Mechanism) -> Any:
+        strength = np.where(np.isnan(mechanism.fatigue), np.inf, mechanism.fatigue)
+        swing = mechanism.stress_concentration * closed_forms.max_stress(mechanism, stroke) / strength
+        return RESERVE * safety.fatigue * (swing + load_stress(mechanism, task) / mechanism.yield_strength)
+
+    return [
+        Requirement(
+            BREAKAWAY,
+            (more("friction.static", task.friction, "N"), shorter),
+            lambda mechanism: stiffest * closed_forms.drive_stiffness(mechanism) * stroke / task.friction,
+        ),
+        Requirement(
+            "fatigue limit under stroke and load", (factor("safety.fatigue", safety.fatigue), shorter), fatigue
+        ),
+        Requirement(
+            "yield strength under stroke and load",
+            (factor("safety.strength", safety.strength),),
+            lambda mechanism: RESERVE * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength,
+        ),
+        Requirement(
+            "buckling under load",
+            (factor("safety.buckling", safety.buckling), *_lighter(task)),
+            lambda mechanism: (
+                RESERVE * safety.buckling * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
+            ),
+        ),
+        Requirement(
+            PARASITIC,
+            (factor("safety.parasitic", safety.parasitic),),
+            lambda mechanism: safety.parasitic * task.crossover / first_interfering(mechanism),
+        ),
+        *_support(spec, stroke),
+    ]
+
+
+def _lighter(task: LeafTask) -> tuple[Way, ...]:
+    """A smaller load along the leaves, if that is all there is; the weight of the stage stays."""
+    load = task.spec.load
+    force = float(load.force_x)
+    if not force or load.force_y or load.moment_y:
+        return ()
+
+    def needed(excess: float) -> float | None:
+        left = task.load / excess - (task.load - force)
+        return left if left >= 0 else None
+
+    return (Way("load.force_x", force, "N", needed),)
+
+
+def _support(spec: Spec, stroke: float) -> list[Requirement]:
+    """The stiffness wanted at full stroke."""
+    forms = {
+        "support_x": ("along the leaves", closed_forms.support_x),
+        "support_y": ("across them", closed_forms.support_y),
+    }
+    return [
+        Requirement(
+            f"stiffness {where} at full stroke",
+            (less(f"load.{key}", float(limit), "N/m"),),
+            lambda mechanism, limit=limit, form=form: limit / form(mechanism, stroke),
+        )
+        for key, (where, form) in forms.items()
+        if (limit := getattr(spec.load, key)) is not None
+    ]
+
+
+def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
+    """How much of what makes the leaves give way is there: the largest force along a leaf, as if it pressed on all,
+    over the `buckling` load [N], and the force across them over that at which they give way sideways."""
+    across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
+    return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
+
+
+def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
+    """The largest force along a leaf [N]: its share of the load, and what a moment about the width adds."""
+    outermost = mechanism.depth / 2 / mechanism.offset_squares
+    return task.load / mechanism.leaves + float(task.spec.load.moment_y) * outermost
+
+
+def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
+    """Largest stress at the clamps [Pa] at full stroke under all loads at once, with the concentration there."""
+    return mechanism.stress_concentration * closed_forms.max_stress(mechanism, task.stroke) + load_stress(
+        mechanism, task
+    )
+
+
+def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
+    """The part of that stress which the loads make [Pa]: a force across the leaf ends bends them in their plane as
+    cantilevers, since nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
+    load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
+    about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2
+    edgewise = (float(load.force_y) * mechanism.length + float(load.moment_z)) / mechanism.leaves + about_x
+    return mechanism.stress_concentration * (edgewise * middle + leaf_load(mechanism, task) / mechanism.area)

@@ -1,0 +1,185 @@
+"""The design tried: moves of machines drawn from the specification, its joint free, and locked for comparison."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from friso.design_method.population import Population, sampled
+from friso.design_method.spec import Spec
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.controllers.van_dijk import TUNED_MASS
+from friso.equations.motion import last_corner
+from friso.equations.structure import shared_structure
+from friso.hunting.criteria.run_outcome import CREEPS, FAILED, RESTS, SWINGS, outcomes
+from friso.hunting.measures import end_of, turns_of
+from friso.progress import Progress, silent
+from friso.stage import Stage
+
+MACHINES = 10_000
+"""Machines and moves that are drawn."""
+
+FOLLOWED, LONGER = 15.0, 10.0
+"""Time [s] for which a machine is followed after its move, as in the thesis's path; and how many times longer one that
+is not in position in the last quarter of it."""
+
+LAST = 0.25
+"""Share of the run, at its end, in which a machine has to stay in position."""
+
+THERE_AND_BACK = {
+    "kind": "there_and_back",
+    "acceleration": "1 m/s^2",
+    "acceleration_time": "0 s",
+    "return_at": "5 s",
+    "duration": "20 s",
+}
+"""A motion whose numbers are replaced by those of a machine."""
+
+RTOL = 1e-5
+"""Relative tolerance of these runs."""
+
+
+@dataclass(frozen=True)
+class MachineOutcomes:
+    """What became of the machines, arrays of shape (count,): what the run did at its end (`words`, of
+    `friso.hunting.criteria.run_outcome`, the band being the position window; a run rests that has been in it for the
+    last quarter; of those that do not, the words are of a run ten times as long), the time [s] after the last corner of
+    the reference from which on it stays in the window (NaN: it does not rest), and its swing, peak to peak, in the last
+    quarter [m]."""
+
+    words: np.ndarray
+    settling: np.ndarray
+    swing: np.ndarray
+
+    @property
+    def completed(self) -> np.ndarray:
+        """Which runs were completed, shape (count,)."""
+        return self.words != FAILED
+
+    @property
+    def restless(self) -> np.ndarray:
+        """Which machines swing or creep at the end, shape (count,)."""
+        return np.isin(self.words, (SWINGS, CREEPS))
+
+    @property
+    def tried(self) -> int:
+        """Moves that were simulated to their end."""
+        return int(self.completed.sum())
+
+    @property
+    def missed(self) -> int:
+        """Moves after which the stage does not come to rest in the window."""
+        return int(self.restless.sum())
+
+    @property
+    def swinging(self) -> int:
+        """Those of them after which it swings."""
+        return int(np.count_nonzero(self.words == SWINGS))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The range that holds the probability of not coming to rest with 95 % (Clopper and Pearson)."""
+        if not self.tried:
+            return 0.0, 1.0
+        proportion = binomtest(self.missed, self.tried).proportion_ci(0.95, method="exact")
+        return float(proportion.low), float(proportion.high)
+
+    def slower_than(self, share: float) -> float:
+        """The settling time [s] that is exceeded by a share of the moves; infinite where more of them do not settle."""
+        times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
+        return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
+
+    def followed(self, number: int) -> float:
+        """For how long [s] a machine was followed after its move."""
+        soon = self.settling[number] <= (1 - LAST) * FOLLOWED
+        return FOLLOWED if soon else LONGER * FOLLOWED
+
+    @property
+    def worst(self) -> int:
+        """The number of the move that does not come to rest and has the largest swing, or else rests last."""
+        rank = np.where(self.restless, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
+        return int(np.where(self.completed, rank, -np.inf).argmax())
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The machines and moves drawn, what became of them with the joint `free` and `locked`, and the `worst` of the free
+    ones as a stage."""
+
+    population: Population
+    free: MachineOutcomes
+    locked: MachineOutcomes
+    worst: Stage
+
+
+def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
+    """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
+    or none of it."""
+    flat = stage.flat()
+    machines = sampled(spec, flat, MACHINES, softening)
+    window = float(spec.position.window)
+    outcomes: list[MachineOutcomes] = []
+    for name, held in (("joint free", False), ("joint locked", True)):
+        keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
+        outcomes.append(tried(keys, machines.count, window, progress, name))
+    free, locked = outcomes
+    return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
+
+
+def tried(
+    flat: dict[str, Any],
+    count: int,
+    window: float,
+    progress: Progress = silent,
+    label: str = "moves",
+    patient: bool = True,
+) -> MachineOutcomes:
+    """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
+    again, for longer."""
+    first = _followed(flat, count, window, FOLLOWED, progress, label)
+    again = np.flatnonzero(first.restless & patient)
+    if again.size:
+        keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
+        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, silent, label)
+        better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
+        for name in ("words", "settling", "swing"):
+            getattr(first, name)[again[better]] = getattr(longer, name)[better]
+    return first
+
+
+def _followed(
+    flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
+) -> MachineOutcomes:
+    """The moves, each followed for a time [s] after its last corner."""
+    corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
+    keys = {**flat, "motion.duration": corner + time}
+    options = RunOptions(
+        rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=np.inf, least_swing=window / 4
+    )
+    outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
+    done = 0
+    for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
+        numbers, end = runs.numbers, end_of(runs, turns_of(runs), "inner")
+        words = outcomes(end, window, hold=LAST * end.ended)
+        outcome.words[numbers] = words
+        outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)
+        outcome.swing[numbers] = end.swing
+        done += len(numbers)
+        progress(done, count, label)
+    return outcome
+
+
+def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
+    """One of the machines with its move as a stage, followed for a time [s] after the move. Its joint is given by its
+    numbers: of which size of the leaves its stiffness is off is not told apart."""
+    flat = stage.flat()
+    follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
+    joint = {key: float(flat[key]) for key in (*follow, TUNED_MASS)}
+    moved = stage.replace({"motion": THERE_AND_BACK})
+    corner = float(last_corner({**flat, **moved.flat(), **keys}))
+    numbers = joint | keys | {"motion.duration": corner + time}
+    return moved.with_numbers(numbers, without=["flexure"])

@@ -1,0 +1,160 @@
+"""One estimate of a quantity from several, and how the combined ones hang together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2
+
+from friso.identification.estimate import Estimate
+from friso.identification.readings.common import Mean, by_t, t_value
+from friso.intervals import COVERAGE
+
+CHANCE = 0.01
+"""Probability below which a scatter as large as that of estimates which agree is taken for a disagreement."""
+
+Correlated = tuple[Sequence[Estimate], np.ndarray]
+"""What one experiment shows, each with an interval, and its correlation matrix, shape (estimates, estimates)."""
+
+
+def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
+    """One estimate per key from all those found, weighted by their intervals; and a sentence where they disagree.
+
+    Where some disagree, the interval allows for that. What one experiment shows counts, whatever another cannot show;
+    where none does, what all of them leave possible is left.
+    """
+    answers, sentences = [], []
+    for key in dict.fromkeys(estimate.name for estimate in estimates):
+        estimates_of_key = [estimate for estimate in estimates if estimate.name == key]
+        certain = [estimate for estimate in estimates_of_key if estimate.determined]
+        shown = with_interval(certain)
+        if len(shown) > 1:
+            answer, agrees = _mean(key, shown)
+        elif certain:
+            answer, agrees = (shown or certain)[0], True
+        else:
+            answer, agrees = _left(key, estimates_of_key)
+        answers.append(answer)
+        if not agrees:
+            sentences.append(
+                f"{key}: the experiments disagree, and the interval allows for it: {_texts(shown or estimates_of_key)}"
+            )
+        beyond = [
+            estimate
+            for estimate in estimates_of_key
+            if certain and not estimate.determined and (estimate.low > answer.high or estimate.high < answer.low)
+        ]
+        sentences += [f"{key}: {_text(answer)} is shown, but {_text(estimate)}" for estimate in beyond]
+    return answers, sentences
+
+
+def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
+    """The keys of the groups and their correlations once combined, shape (keys, keys).
+
+    `estimates` are those of all experiments. A combined value is a mean of single ones with weights a_i, and the
+    experiments are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one.
+    """
+    keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
+    precision = {
+        key: sum(_weight(estimate) for estimate in with_interval(estimates) if estimate.name == key) for key in keys
+    }
+    covariance = np.diag([1 / precision[key] for key in keys])
+    for group, matrix in groups:
+        shares = np.array(
+            [_weight(estimate) ** 0.5 / precision[estimate.name] for estimate in group]
+        )  # a_i times the deviation
+        places = [keys.index(estimate.name) for estimate in group]
+        covariance[np.ix_(places, places)] += (matrix - np.eye(len(group))) * np.outer(shares, shares)
+    size = np.sqrt(np.diag(covariance))
+    joint = covariance / np.outer(size, size)
+    return keys, (joint + joint.T) / 2
+
+
+def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """Those that are shown, with an interval, by which they can be weighted."""
+    return [estimate for estimate in estimates if estimate.determined]
+
+
+def _weight(estimate: Estimate) -> float:
+    return (COVERAGE / estimate.half_width) ** 2
+
+
+def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
+    """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
+
+    Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207), by Student's t of three and more,
+    where they scatter more than their own intervals say; what is systematic in these does not average out. Where the
+    test does not allow it, as for friction at several places, each counts with a scatter from place to place besides
+    its own (`_between`); of two, which hardly show a scatter, the interval spans both.
+    """
+    values, weights = (
+        np.array(column)
+        for column in zip(*((estimate.value, _weight(estimate)) for estimate in estimates), strict=True)
+    )
+    mean, freedom = float(np.average(values, weights=weights)), len(values) - 1
+    shared = float(np.average([estimate.systematic for estimate in estimates], weights=weights))
+    squares = float(np.sum(weights * (values - mean) ** 2))
+    method = ", ".join(dict.fromkeys(estimate.method for estimate in estimates))
+    if chi2.sf(squares, freedom) > CHANCE:
+        errors = np.array([(estimate.half_width - estimate.systematic) / COVERAGE for estimate in estimates])
+        error = float(np.linalg.norm(weights * errors)) / float(weights.sum())
+        ratio = (squares / freedom) ** 0.5
+        wider = ratio * t_value(freedom) if ratio > 1 and freedom > 1 else COVERAGE * max(ratio, 1.0)
+        half = wider * error + shared
+        return Estimate(key, estimates[0].unit, mean, mean - half, mean + half, method, systematic=shared), True
+    if freedom == 1:
+        low, high = min(estimate.low for estimate in estimates), max(estimate.high for estimate in estimates)
+        return Estimate(key, estimates[0].unit, (low + high) / 2, low, high, method), False
+    return by_t(key, estimates[0].unit, _between(values, 1 / weights), method, shared, shared), False
+
+
+def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
+    """The mean of values, shape (n,), that scatter by more than their variances: a variance from one to the next is
+    added with which they scatter as they do (Paule, Mandel 1982, doi:10.6028/jres.087.022). The degrees of freedom are
+    those of as many values as count equally: one that is hardly known says little about the scatter."""
+
+    def excess(added: float) -> float:
+        weights = 1 / (variances + added)
+        return float(np.sum(weights * (values - np.average(values, weights=weights)) ** 2)) - (len(values) - 1)
+
+    weights = 1 / (variances + brentq(excess, 0.0, float(np.ptp(values)) ** 2))
+    equal = weights.sum() ** 2 / (weights @ weights)
+    return Mean(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), max(float(equal) - 1, 1.0))
+
+
+def _left(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
+    """What several that do not show it leave possible: what they have in common, or the hull where that is nothing."""
+    bounding = [
+        estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
+    ] or estimates[:1]
+    low, high = max(estimate.low for estimate in bounding), min(estimate.high for estimate in bounding)
+    agrees = low <= high
+    if not agrees:
+        low, high = min(estimate.low for estimate in bounding), max(estimate.high for estimate in bounding)
+    method, reason = (
+        joint.join(dict.fromkeys(texts))
+        for joint, texts in (
+            (", ", [estimate.method for estimate in bounding]),
+            ("; ", [estimate.reason for estimate in bounding]),
+        )
+    )
+    return Estimate.unknown(key, estimates[0].unit, method, reason, low, high), agrees
+
+
+def _text(estimate: Estimate) -> str:
+    return f"{_value(estimate)} by {estimate.method}"
+
+
+def _texts(every: Sequence[Estimate]) -> str:
+    """The values by method."""
+    methods = dict.fromkeys(estimate.method for estimate in every)
+    values_of = ([_value(estimate) for estimate in every if estimate.method == method] for method in methods)
+    return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, values_of, strict=True))
+
+
+def _value(estimate: Estimate) -> str:
+    if estimate.determined:
+        return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g})"
+    return f"{estimate.low:.4g} to {estimate.high:.4g} is the possible range"

@@ -1,0 +1,128 @@
+"""What a file of logs holds, without identifying anything: channels, proposed roles and why, and what is still open."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from friso.errors import LogError
+from friso.identification.kind import Source
+from friso.identification.kinds import KINDS
+from friso.identification.logs.channel import Channel
+from friso.identification.logs.format import FORMATS
+from friso.identification.logs.gaps import GapsError
+from friso.identification.logs.mapping import Mapping, load
+from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response
+from friso.identification.logs.roles import AssignedRole, Proposal, propose
+from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
+from friso.identification.sources import named, unnamed
+
+BINS = 24
+"""Parts of a channel whose means make its small plot."""
+
+
+@dataclass(frozen=True)
+class ChannelContent:
+    """A channel as it stands in the file: its `values` of shape (n,) in its `unit` ("" for none), its instants [s],
+    shape (n,), or None, and its `role` ("" for none) with the reason for it."""
+
+    name: str
+    unit: str
+    values: np.ndarray
+    time: np.ndarray | None
+    role: str
+    reason: str
+
+    @property
+    def range(self) -> tuple[float, float] | None:
+        """The least and the greatest number; None without any."""
+        finite = self.values[np.isfinite(self.values)]
+        return (float(finite.min()), float(finite.max())) if finite.size else None
+
+    @property
+    def missing(self) -> int:
+        """How many samples are no numbers."""
+        return int(np.count_nonzero(~np.isfinite(self.values)))
+
+    @property
+    def sample_rate(self) -> float | None:
+        """The usual rate [Hz] of the samples; None without instants that increase."""
+        steps = np.diff(self.time) if self.time is not None else np.empty(0)
+        steps = steps[steps > 0]
+        return 1 / float(np.median(steps)) if steps.size else None
+
+    def course(self, bins: int = BINS) -> np.ndarray:
+        """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""
+        parts = np.array_split(self.values, min(bins, max(self.values.size, 1)))
+        finite = [part[np.isfinite(part)] for part in parts]
+        return np.array([part.mean() if part.size else np.nan for part in finite])
+
+
+@dataclass(frozen=True)
+class LogContent:
+    """What a file holds: the title of its format, its channels or its frequency response, the kind of experiment with
+    the reason ("" where it is open), lines that tell of the reading, warnings, and the `gaps` that have to be closed
+    before it can be identified."""
+
+    path: Path
+    title: str
+    channels: tuple[ChannelContent, ...]
+    response: MeasuredResponse | None
+    kind: str
+    reason: str
+    read: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+    gaps: tuple[LogError, ...] = ()
+
+
+def content_of(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
+    """What a file holds, mapped as the options say or as kept beside it or in `folder`. Raises LogError for what cannot
+    be read."""
+    name = file_format(path)
+    title = FORMATS[name].title
+    if is_frequency_response(path):
+        response = read_frequency_response(path)
+        kind = next(kind for kind in KINDS if KINDS[kind].responses)
+        return LogContent(path, title, (), response, kind, "the file holds a frequency response", response.read)
+    mapping = options.over(load(path, folder) or Mapping())
+    table = with_user_units(FORMATS[name].read(path), mapping, FORMATS[name].times, str(path))
+    reading = Reading(table, mapping, False, not FORMATS[name].units, str(path))
+    proposal = propose(table, mapping.roles, str(path))
+    channels = tuple(_content(channel, proposal, reading) for channel in table.channels)
+    try:
+        source, kind, reason = _recognised(path, mapping)
+    except LogError as error:
+        gaps = error.gaps if isinstance(error, GapsError) else (error,)
+        return LogContent(path, title, channels, None, "", "", table.read, gaps=gaps)
+    return LogContent(path, title, channels, None, kind, reason, source.read, getattr(source, "warnings", ()))
+
+
+def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
+    """The log as it would be identified, its kind, and why. Raises LogError, GapsError for what is open."""
+    if mapping.experiment is not None:
+        return named(path, mapping, mapping.experiment), mapping.experiment, "as specified"
+    return unnamed(path, mapping)
+
+
+def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelContent:
+    """A channel with its instants and its role."""
+    role, reason = "", ""
+    for choice in proposal.chosen.values():
+        if choice.channel is channel:
+            role, reason = choice.role, choice.reason
+    for name, rivals in proposal.rivals.items():
+        if any(rival is channel for rival in rivals):
+            reason = f"one of {len(rivals)} that could be the {name.replace('_', ' ')}"
+    return ChannelContent(channel.name, channel.unit, channel.values, _time(channel, proposal, reading), role, reason)
+
+
+def _time(channel: Channel, proposal: Proposal, reading: Reading) -> np.ndarray | None:
+    """The instants of a channel [s]; None where the file and the mapping do not tell them."""
+    clock = proposal.chosen.get("time")
+    try:
+        return instants(AssignedRole("", channel, "", False), clock, reading, Notes())
+    except LogError:
+        return None

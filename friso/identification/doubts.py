@@ -1,0 +1,69 @@
+"""How good a fit of moves is, and what speaks against believing it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from friso.identification.causes import UNKNOWN, causes
+from friso.identification.inverse_model import InverseModel
+from friso.identification.logs.log import Log
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.identifiable import explains
+from friso.identification.quality import Quality, halves, whole_error
+
+NOISY = 10.0
+"""A fit that leaves so many times the noise of the record lacks something, and says so."""
+
+POOR = 0.3
+"""Relative error of the force from which on a model does not describe the record."""
+
+CONTRADICTS, FINE = 1.5, 0.01
+"""A whole model whose steady friction leaves so many times what the inverse model leaves contradicts the record, unless
+that is less than this share of the force."""
+
+NONE_LEFT = 1e-3
+"""Share of the force below which Coulomb friction is no friction of a bearing."""
+
+WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
+"""What the inverse model identifies, in sentences."""
+
+
+def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float) -> Quality:
+    """How good a fit is, with what is wrong with it in sentences."""
+    counted = max(float(fit.problem.counted.sum()), 1.0)
+    left = float(np.sqrt(np.sum(fit.residual**2) / counted))
+    noise_left = noise * fit.problem.passes
+    flat, unit = fit.stage, log.unit("force")
+    plain = Quality(noise, left, noise_left, inverse.error, whole_error(flat, inverse))
+    if explains(fit, noise):
+        return plain
+    doubts, poor = [], inverse.error > POOR
+    reasons = causes(log, inverse, cart_share) if plain.ratio > NOISY or poor else []
+    worse = plain.whole_error > max(CONTRADICTS * inverse.error, FINE)
+    rejected = worse and plain.ratio > NOISY and not poor
+    if rejected:
+        doubts.append(
+            f"The whole model contradicts the record: on the moves it leaves {100 * plain.whole_error:.3g} % of the "
+            f"force, a plain mass with friction {100 * inverse.error:.3g} %. What follows is from the latter alone"
+        )
+    if poor:
+        why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN
+        doubts.append(f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained: {why}")
+    elif not rejected and plain.ratio > NOISY:
+        doubts.append(
+            f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "
+            f"lacks something, for which the intervals allow{''.join(f'; {cause.sentence}' for cause in reasons)}"
+        )
+    if inverse.value("coulomb") < NONE_LEFT * float(np.std(inverse.measured)):
+        doubts.append(
+            f"Coulomb friction comes out as {inverse.value('coulomb'):.2g} {unit}, next to nothing: no friction in "
+            "this force, a wrong --scale, or friction that a drive compensates"
+        )
+    for name, first, second in halves(inverse) if plain.ratio > NOISY else ():
+        of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == name)
+        doubts.append(f"The halves of the record differ in {WORDS[name]}: {first:.4g} and {second:.4g} {of_it}")
+    without = next((cause.without for cause in reasons if cause.without), None)
+    failed = poor and plain.whole_error > POOR
+    return replace(plain, doubts=tuple(doubts), rejected=rejected, failed=failed, without_cause=without)

@@ -1,0 +1,91 @@
+"""How far a simulated record is from the measured one, and the residual."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identification.inverse_model import SMOOTH, FilteredMotion, motion
+from friso.identification.logs.log import Log
+from friso.identification.output_error.problem import Simulated
+from friso.identification.spread import correlation_length
+
+BINS = 40
+"""Places along the rail, and speeds, in which the mean of the residual is taken."""
+
+
+@dataclass(frozen=True)
+class SimulationErrors:
+    """Norms of measured minus simulated over norms of the measured signal, of position, velocity, acceleration and
+    force; velocity and acceleration of both by the same filter and differences. Of a stage that was held to the log's
+    position only the force has one: what the model does not explain."""
+
+    position: float
+    velocity: float
+    acceleration: float
+    force: float
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What is left of the force [N]: root mean square and mean, the time [s] over which it stays correlated, and the
+    shares of its power that its mean over places along the rail, and over speeds, explains."""
+
+    rms: float
+    mean: float
+    correlation_time: float
+    by_position: float
+    by_velocity: float
+
+    @property
+    def white(self) -> bool:
+        """Whether neighbouring samples do not resemble each other."""
+        return self.correlation_time == 0.0
+
+
+def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
+    """The errors of a simulated record of some samples of a log; `bandwidth` [Hz] is that of the motion."""
+    measured = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth)
+    modelled = motion(simulated.position, log.sample_time, SMOOTH * bandwidth)
+    disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
+    return SimulationErrors(
+        _relative(log["position"][part], simulated.position),
+        _relative(measured.velocity, modelled.velocity),
+        _relative(measured.acceleration, modelled.acceleration),
+        _relative(log["force"][part], simulated.force + disturbance),
+    )
+
+
+def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
+    """The error of a stage that was held to the log's position, by the force that it took."""
+    share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
+    return SimulationErrors(np.nan, np.nan, np.nan, share)
+
+
+def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
+    """What is left of the force, shape (n,) [N], over a motion."""
+    alike = correlation_length(residual)
+    return Residual(
+        float(np.sqrt(np.mean(residual**2))),
+        float(residual.mean()),
+        0.0 if alike <= 1 else alike * sample_time,
+        _explained(residual, moved.position),
+        _explained(residual, moved.velocity),
+    )
+
+
+def _relative(measured: np.ndarray, simulated: np.ndarray) -> float:
+    return float(np.linalg.norm(measured - simulated) / np.linalg.norm(measured))
+
+
+def _explained(residual: np.ndarray, along: np.ndarray) -> float:
+    """The share of the residual's power in its means over the bins of another signal, corrected for their number."""
+    edges = np.linspace(along.min(), along.max(), BINS + 1)
+    bins = np.clip(np.digitize(along, edges) - 1, 0, BINS - 1)
+    count = np.bincount(bins, minlength=BINS)
+    means = np.bincount(bins, residual, minlength=BINS) / np.maximum(count, 1)
+    power = float(np.mean(residual**2))
+    independent = len(residual) / correlation_length(residual)
+    share = float(np.sum(count * means**2)) / len(residual) / power if power else 0.0
+    return max(0.0, share - min(1.0, np.count_nonzero(count) / independent))

@@ -1,0 +1,157 @@
+"""Force ramps from rest, each until the body moves off: static friction.
+
+The break-away force is that at which a body at rest begins to move; it falls with the force rate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import channel, low_pass, on_bearing, ways
+from friso.identification.readings.peaks import peak, smoothed
+from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
+from friso.identification.readings.slips import slips
+
+CUTOFF = 100.0
+"""Low-pass of force and velocity [Hz]."""
+
+SMEARED = 2.0
+"""Periods of the low-pass that the second half of a ramp must last for its break-away to be read."""
+
+
+SAMPLES = 5
+"""Samples of the second half of a ramp from which its rate is read."""
+
+BROAD = 40
+"""To see where its second half begins the push is smoothed over one in so many samples of the rest and the ramp."""
+
+LEAST = 20
+"""Samples of a segment that may hold a ramp."""
+
+
+FROM = 0.5
+"""Share of its force at the break-away from below which a ramp rises: our choice. A body that stops within a ramp and
+goes on has its bristles bent already."""
+
+FEW = 3
+"""Ramps that a log shows for static friction of its own."""
+
+
+@dataclass(frozen=True)
+class BreakAway:
+    """Static friction [N] in all and per direction, of break-away forces at rate 0. Per ramp, shape (n,): time [s],
+    place [m], direction, break-away force [N] in that direction, force rate [N/s], and by how much [N] noise and
+    smoothing may have moved that force to either side; the threshold [m/s] of the speed."""
+
+    static: Estimate
+    forward: Estimate
+    backward: Estimate
+    times: np.ndarray
+    places: np.ndarray
+    directions: np.ndarray
+    forces: np.ndarray
+    rates: np.ndarray
+    unsure: np.ndarray
+    threshold: float
+    warnings: tuple[str, ...]
+
+
+def static_from_ramps(
+    log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE_RATE, cutoff: float = CUTOFF
+) -> BreakAway:
+    """Break-away forces of the ramps in a log, each from rest of the body on the bearing, and static friction.
+
+    With the `mass` [kg] that moves, it is the greatest friction, force less inertia, as motion begins (the published
+    definition); without, the force where motion begins to be visible, which contains inertia. See `rate_effect` for the
+    static friction. Raises InputError for a missing channel.
+    """
+    force, body = channel(log, "force"), on_bearing(log)
+    rows: list[tuple[float, ...]] = []
+    threshold, quick, stops = 0.0, 0, 0
+    for part in log.segments:
+        if part.stop - part.start < LEAST:
+            continue
+        breaks = slips(body[part], log.sample_time, cutoff)
+        threshold = max(threshold, breaks.threshold)
+        pushed = low_pass(force[part], log.sample_time, cutoff)
+        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.directions, strict=True)
+        for onset, start, rest, direction in marks:
+            push = direction * force[part][rest : start + 1]
+            if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
+                stops += 1
+                continue
+            begin = rest + _half(push)
+            if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
+                quick += 1
+                continue
+            rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
+            at, level, unsure = onset, float(direction * pushed[onset]), 0.0
+            if mass and rising > 0:
+                signals = direction * force[part], direction * body[part]
+                top = peak(*signals, mass, log.sample_time, rising, (begin, start), cutoff)
+                at, level, unsure = top.at, top.level, top.unsure
+            first = part.start + at
+            rows.append((float(log.time[first]), float(body[first]), float(direction), level, float(rising), unsure))
+    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 6).T
+    notes = []
+    if quick:
+        notes.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
+    if stops:
+        notes.append(f"{stops} motions went on after a stop within a ramp and are left out: they began from no rest.")
+    if len(rows) > table.shape[1]:
+        notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
+    return _answer(table, bristle_rate, threshold, notes)
+
+
+def _lowest(push: np.ndarray) -> float:
+    """The least value of a push, shape (n,), over the rest before a motion, seen without noise."""
+    return float(smoothed(push, len(push) / BROAD).min())
+
+
+def _half(push: np.ndarray) -> int:
+    """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
+    smooth = smoothed(push, len(push) / BROAD)
+    return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])
+
+
+def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: list[str]) -> BreakAway:
+    times, places, directions, forces, rates, unsure = table
+
+    def static(chosen: np.ndarray) -> Estimate:
+        estimate = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
+        off = float(unsure[chosen].mean()) if chosen.any() else 0.0
+        ends = {"low": max(estimate.low - off, 0.0), "high": estimate.high + off}
+        estimate = replace(estimate, **ends, systematic=estimate.systematic + off)
+        return (
+            estimate
+            if estimate.determined
+            else replace(estimate, reason=" ".join([f"{estimate.reason}.", *notes]).rstrip("."))
+        )
+
+    forward, backward = (static(mask) for _, mask in ways(directions))
+    every = static(np.ones(len(forces), dtype=bool))
+    if forward.determined and backward.determined and (forward.low > backward.high or backward.low > forward.high):
+        notes.append(f"The directions differ: {forward.value:.3g} N forward, {backward.value:.3g} N backward.")
+    return BreakAway(
+        every, forward, backward, times, places, directions, forces, rates, unsure, threshold, tuple(notes)
+    )
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return static_from_ramps(log, sum(prior.masses(log)))
+
+
+KIND = ExperimentKind[BreakAway](
+    analyse=_analyse,
+    estimates=lambda result, stage: (replace(result.static, name="friction.static"),),
+    after=("frequency", "moves"),
+    partial=lambda log: len(static_from_ramps(log).times) < FEW,
+)

@@ -1,0 +1,63 @@
+"""Constant speeds there and back: Coulomb, viscous and static friction, Stribeck velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.equations.bandwidth import bandwidth
+from friso.identification.combine import Correlated
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
+from friso.identification.logs.log import Log
+from friso.identification.readings.friction_position import FrictionPosition, friction_position
+from friso.identification.readings.friction_velocity import STRAIGHT, FrictionVelocity, distinct, friction_velocity
+from friso.identification.readings.passes import passes
+from friso.stage import Stage
+
+
+@dataclass(frozen=True)
+class FrictionAtSpeeds:
+    """Friction against velocity and against position, of one log."""
+
+    velocity: FrictionVelocity
+    position: FrictionPosition
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
+    (log,) = logs
+    assert isinstance(log, Log)
+    mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
+    return FrictionAtSpeeds(friction_velocity(log, mass), friction_position(log, mass, crossover))
+
+
+def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Friction in both directions, in the order of its covariance."""
+    both = result.velocity.both
+    keys = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
+    keys["stribeck_velocity"] = both.stribeck_velocity
+    return tuple(replace(estimate, name=f"friction.{key}") for key, estimate in keys.items())
+
+
+def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Correlated:
+    """By the covariance of the fit."""
+    covariance = result.velocity.both.covariance
+    if not covariance.size:
+        return independent(result, estimates)
+    fitted = enumerate(estimates[: len(covariance)])
+    rows = [row for row, estimate in fitted if estimate.determined and estimate.half_width > 0]
+    size = np.sqrt(np.diag(covariance))
+    return [estimates[row] for row in rows], (covariance / np.outer(size, size))[np.ix_(rows, rows)]
+
+
+def _partial(log: Log) -> bool:
+    """Whether a log holds too few speeds for a curve of friction over speed."""
+    steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
+    return not steady or distinct(np.array(steady)) < STRAIGHT
+
+
+KIND = ExperimentKind[FrictionAtSpeeds](
+    _analyse, _estimates, _correlated, after=("frequency", "moves"), partial=_partial
+)

@@ -1,0 +1,116 @@
+"""Response to a multisine, noise or a sweep: masses, stiffness and damping of the joint."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friso.identification.combine import Correlated, with_interval
+from friso.identification.estimate import Estimate
+from friso.identification.kind import (
+    AnalysisSettings,
+    ExperimentKind,
+    Predictor,
+    Prior,
+    Source,
+    independent,
+)
+from friso.identification.logs.log import Log
+from friso.identification.readings.course import Course
+from friso.identification.response.analysis import Bench, analyse, predicted
+from friso.identification.response.two_mass import TwoMass
+from friso.identification.stage_keys import shared_masses
+from friso.stage import Stage
+
+FEW = 7.0
+"""Harmonics that an excitation has at least, and as many turns in each period: our choice. A multisine of 8 equal lines
+is one; moves have 1 to 7, or narrow peaks that turn less often than that."""
+
+RESTS = 0.1
+"""Share of the time for which the position rests at most under an excitation."""
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Bench:
+    (first, *_) = logs
+    if not isinstance(first, Log):
+        return analyse((), settings.band, measured=first)
+    return analyse([log for log in logs if isinstance(log, Log)], settings.band, settings.period)
+
+
+def _claims(course: Course) -> str | None:
+    """A periodic excitation moves a stage whose reference does not move; it hardly rests, holds many frequencies, and
+    turns often."""
+    repetition = None if course.reference_moves else course.repetition
+    if repetition is None or repetition.rests > RESTS:
+        return None
+    if repetition.harmonics < FEW or repetition.turns < repetition.harmonics:
+        return None
+    return f"{course.repeats}, with about {repetition.harmonics:.0f} harmonics"
+
+
+def _estimates(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Masses and joint from a two-mass model in newtons and metres; a mass line alone is the whole mass."""
+    units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
+    if units != ("N", "m"):
+        return ()
+    model = bench.two_masses
+    if model is not None and stage is not None and (mode := _parasitic(model, stage)):
+        why = f"the resonance at {mode:.3g} Hz is nearer the parasitic mode than the joint's: try --band below it"
+        return (Estimate.unknown("joint.stiffness", "N/m", model["joint stiffness"].method, why, 0.0),)
+    if model is not None and (stage is None or stage.joint) and bench.modes is not None and bench.modes.shape.modes:
+        pairs = {"masses.stage": "driven mass", "masses.cart": "other mass"}
+        pairs |= {"joint.stiffness": "joint stiffness", "joint.damping": "joint damping"}
+        return tuple(replace(model[name], name=key) for key, name in pairs.items())
+    if not bench.lines or stage is None:
+        return ()
+    line = bench.lines[0].value
+    return (replace(line, name="masses.stage"),) if _of_stage_alone(line.value, stage) else shared_masses(line, stage)
+
+
+def _of_stage_alone(mass: float, stage: Stage) -> bool:
+    """Whether a mass line [kg] is rather that of the stage above the mode of a free joint than that of all masses:
+    which of the two it is nearer to as they are believed to be."""
+    flat = stage.flat()
+    if stage.joint is None or flat["joint.locked"]:
+        return False
+    stage_mass, moving_mass = flat["masses.stage"], flat["masses.cart"] + flat["masses.stage"]
+    return bool(abs(np.log(mass / stage_mass)) < abs(np.log(mass / moving_mass)))
+
+
+def _parasitic(model: TwoMass, stage: Stage) -> float | None:
+    """The resonance [Hz] of a two-mass model that is rather the stage's parasitic mode than its joint's; else None."""
+    flat = stage.flat()
+    if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
+        return None
+    masses = (flat["masses.cart"], flat["masses.stage"])
+    joint = np.sqrt(flat["joint.stiffness"] * sum(masses) / np.prod(masses)) / (2 * np.pi)
+    resonance = model["resonance frequency"].value
+    away = [abs(np.log(resonance / frequency)) for frequency in (joint, flat["parasitic.frequency"])]
+    return resonance if away[1] < away[0] else None
+
+
+def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
+    """Masses that are shared out of one move together."""
+    certain = with_interval(estimates)
+    if all(estimate.name.startswith("masses.") for estimate in estimates):
+        return certain, np.ones((len(certain), len(certain)))
+    return independent(result, estimates)
+
+
+def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
+    """The relative errors of the outputs over the band, the driven mass's first."""
+    return predicted(result, log, settings.period)
+
+
+KIND = ExperimentKind[Bench](
+    _analyse,
+    _estimates,
+    _correlated,
+    si=False,
+    together=True,
+    responses=True,
+    claims=_claims,
+    predictor=Predictor("one of the bench beside frequency responses", _predict),
+)

@@ -1,0 +1,121 @@
+"""Moves, with a reference or without: mass, friction and constant force, and the joint where it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.combine import Correlated
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import inverse_model
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
+from friso.identification.logs.log import ROLES, Log
+from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
+from friso.identification.output_error.problem import why_continuous
+from friso.identification.readings.course import Course
+from friso.identification.stage_file import made_up
+from friso.stage import Stage
+
+FEW = 7.0
+"""Harmonics, and turns in each period, that moves which are repeated stay below: our choice."""
+
+WITHOUT_CONTROLLER = (
+    "without the machine's own controller the simulated stage follows the logged position; with it (--stage) the "
+    "intervals are narrower, and more is identified"
+)
+
+RESTS = 0.1
+"""Share of the time for which the position rests from which on what repeats is taken for moves."""
+
+
+def _claims(course: Course) -> str | None:
+    """A reference moves; or nothing repeats, the position rests in between, or the force turns seldom and holds few
+    frequencies."""
+    if course.reference_moves:
+        return "its reference moves"
+    repetition = course.repetition
+    if repetition is None:
+        standing = "reference" in course.log
+        return None if standing else f"the {course.signal} does not repeat, and there is no reference that moves"
+    if repetition.rests > RESTS:
+        return f"{course.repeats}, but the position rests in between"
+    if repetition.harmonics < FEW and repetition.turns < FEW:
+        return f"{course.repeats}, but rarely reverses and contains few frequencies"
+    return None
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
+    """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
+    (log,) = logs
+    assert isinstance(log, Log)
+    if prior.from_user:
+        check_roles(log, ("force",))
+    flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
+    start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
+    return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
+
+
+def _in_newtons(log: Log) -> bool:
+    return log.unit("force") == ROLES["force"]
+
+
+def _around(log: Log) -> Stage | None:
+    """A stage around a log whose force is in newtons."""
+    return made_up(log, inverse_model(log)) if _in_newtons(log) else None
+
+
+def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Keys of the stage file, which are in newtons."""
+    return result.estimates if _in_newtons(result.log) else ()
+
+
+def _correlated(result: IdentifiedMoves, estimates: Sequence[Estimate]) -> Correlated:
+    """Those that are shown, as the fit correlates them."""
+    return (result.correlated, result.correlation) if estimates else ((), np.zeros((0, 0)))
+
+
+def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
+    """Where the drive that was given is not the one simulated, and where no controller was."""
+    loops = [result for result in results if result.loop] if stage is not None else []
+    reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
+    followed = any(result.loop is None for result in results)
+    return [
+        *(sentence for sentence in dict.fromkeys(reasons) if sentence),
+        *([WITHOUT_CONTROLLER] if followed else []),
+    ]
+
+
+def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
+    if "reference" not in log or result.loop is None:
+        return None
+    return simulated_log(result, log, prior.flat(log) or None)
+
+
+def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
+    """Raises InputError where none of the logs will be simulated in the machine's own loop, or the other cannot be."""
+    check_roles(other, ("position", "force", "reference"))
+    prior.flat(other)
+    if not prior.from_user:
+        expected = "the machine's own controller, with which another record can be simulated"
+        raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", other.name)
+    if not any(isinstance(log, Log) and "reference" in log for log in logs):
+        actual = f"{', '.join(log.name for log in logs)}, without a reference"
+        expected = "a log of moves with its reference, in whose loop the machine is identified"
+        raise InputError("--predict", actual, expected, "--map reference=SetPos", other.name)
+
+
+KIND = ExperimentKind[IdentifiedMoves](
+    _analyse,
+    _estimates,
+    _correlated,
+    after=("frequency", "steps"),
+    claims=_claims,
+    foreign=("force", "disturbance"),
+    around=_around,
+    notes=_notes,
+    predictor=Predictor("a log with a reference beside moves", _predict, _check_prediction),
+    doubts=lambda result: result.quality.doubts,
+    failed=lambda result: result.quality.rejected or result.quality.failed,
+)

@@ -1,0 +1,246 @@
+"""Small motion about a place at which the bearing sticks: stiffness and damping of its bristles.
+
+The force on a body that sticks is F = m a + sigma_0 z + (sigma_1 dz/dt + sigma_2 v) + c, with the deflection of the
+bristles dz/dt = v (1 - q z sign v), q = sigma_0/F_s (LuGre; Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425):
+linear in all but q, once the motion is measured. Motion that is quick enough shows the damping beside the stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from friso.identification.combine import Correlated, with_interval
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.logs.log import Log
+from friso.identification.readings.at_bearing import (
+    DIRECT,
+    EXPLAINED,
+    HELD,
+    BearingRecord,
+    Between,
+    LowPass,
+    at_bearing,
+    believed_between,
+    cutoff_of,
+    rate_of,
+    record_of,
+    why_unseen,
+)
+from friso.identification.readings.common import (
+    BLOCKS,
+    LINEARITY,
+    Mean,
+    by_t,
+    correlation_of,
+    deflections,
+    jackknife,
+    solved,
+)
+from friso.identification.stage_keys import shared_masses
+from friso.stage import Stage
+
+CHECKED, MOTION = 0.7, 5.0
+"""Low-pass of a second fit by which the first one is checked, and of the motion, both over that of the first."""
+
+FINE, FEWEST = 40, 1000
+"""Samples per period of the low-pass that are enough; and of a record at least."""
+
+BENDING = (1e-6, 5.0)
+"""Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
+
+SPRING = 3.0
+"""Stiffness over that of the joint up to which it may well be the joint that is seen."""
+
+KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
+UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
+METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
+SLIDES = "the bearing slides, or noise is as large as the force"
+
+
+@dataclass(frozen=True)
+class Presliding:
+    """Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles, and the `correlation` of the three, shape
+    (3, 3). Over time [s], shape (n,): the position [m] of the body on the bearing, the force [N], low-passed, and that
+    of the model (empty where there is none); the share of the friction's standard deviation that it leaves
+    unexplained."""
+
+    mass: Estimate
+    damping: Estimate
+    stiffness: Estimate
+    correlation: np.ndarray
+    time: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    model: np.ndarray
+    unexplained: float
+    warnings: tuple[str, ...] = ()
+
+    def order(self, key: str) -> int:
+        """The row of a key of the stage file in the `correlation`."""
+        return KEYS.index(key) if key in KEYS else KEYS.index(MASS)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """Mass, damping and stiffness, shape (3,), and their covariance by the jackknife; by how much later [s] the force
+    comes than was taken; whether the bristles are at their end, and the share of the friction that is left; over time
+    [s], shape (n,), the position of the body on the bearing, its force and that of the model, low-passed."""
+
+    values: np.ndarray
+    covariance: np.ndarray
+    late: float
+    ends: bool
+    left: float
+    time: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    model: np.ndarray
+
+
+def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
+    """Bristles from a log of position and force whose motion is small beside their break-away. Of a log with gaps the
+    longest stretch is used.
+
+    A joint is held, or its deflection is measured. The intervals contain by how much the answer changes with a lower
+    low-pass and with the delay that fits best (which is taken where none is given), the doubt about the viscous
+    friction that is taken off the damping, and the share of the friction that is left unexplained: it falls with speed,
+    which the model leaves out. Where that share is large, nothing is shown. Raises InputError for missing channels.
+    """
+    record = record_of(log, log.longest, between)
+    if why := why_unseen(record, FEWEST):
+        return _nothing(why)
+    cutoff, looked_for = cutoff_of(record), between.delay is None
+    tried = [(cutoff, looked_for), (CHECKED * cutoff, looked_for), *([] if looked_for else [(cutoff, True)])]
+    best, *others = (_settled(_seen(record, top), between, top, late) for top, late in tried)
+    changes = np.array([other.values - best.values for other in others])
+    even = (best.left + LINEARITY) * np.abs(best.values)
+    even[KEYS.index(DAMPING)] += between.viscous[1]
+    systematic = np.abs(changes).sum(axis=0) + even
+    why = _no_bristles(best, between, record.bent is None)
+    mass, damping, stiffness = (
+        Estimate.unknown(key, UNITS[key], METHOD, why) if why else _estimate(key, *map(float, numbers))
+        for key, *numbers in zip(KEYS, best.values, np.diag(best.covariance) ** 0.5, systematic, strict=True)
+    )
+    correlation = correlation_of(best.covariance, changes, even)
+    notes = (HELD,) if record.bent is None and between.joint else ()
+    curves = (best.time, best.position, best.force, best.model)
+    return Presliding(mass, damping, stiffness, correlation, *curves, best.left, notes)
+
+
+def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
+    """With the motion that belongs to a low-pass [Hz], and no more samples than that needs."""
+    return record.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * record.interval)), 1))
+
+
+def _nothing(why: str) -> Presliding:
+    mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
+    none = np.empty(0)
+    return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
+
+
+def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
+    """Why the fit is not one of bristles; empty where it is."""
+    if fit.left > EXPLAINED:
+        return f"{fit.left:.0%} of the friction is not explained: {SLIDES}"
+    if fit.ends:
+        return f"the bristles yield: {SLIDES}"
+    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < SPRING * between.joint:
+        return "the stiffness is like that of the joint: is it held?"
+    return ""
+
+
+def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
+    estimate = by_t(key, UNITS[key], Mean(value, error, BLOCKS - 1), METHOD, systematic, systematic)
+    if estimate.low > 0:
+        return estimate
+    why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
+    return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
+
+
+def _settled(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
+    """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`), the
+    delay is that which fits best."""
+    fit = _fit(record, between, cutoff, between.mass, late)
+    delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
+    return _fit(record, delayed, cutoff, float(fit.values[0]), late)
+
+
+def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
+    """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
+    believed to move; with `late`, what a little more delay would do is among the columns."""
+    equation = _equation(record, between, cutoff, mass, late)
+    target, span = equation.target, float(np.ptp(equation.body))
+
+    def off(logarithm: float) -> float:
+        x = equation.columns(float(np.exp(logarithm)) / span)
+        return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
+
+    best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
+    bending = float(np.exp(best.x)) / span
+    x = equation.columns(bending)
+    solution = solved(x.T @ x, x.T @ target)
+    bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
+    covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
+    left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
+    ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
+    curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
+    return _Fit(solution[:3], covariance, more, ends, left, *curves)
+
+
+@dataclass(frozen=True)
+class _Equation:
+    """The low-pass; the position [m] of the body on the bearing, shape (n,); the force [N] and its columns that do not
+    depend on the bristles, at the low-pass, shape (m,) each."""
+
+    low_pass: LowPass
+    body: np.ndarray
+    target: np.ndarray
+    inertia: np.ndarray
+    rest: tuple[np.ndarray, ...]
+
+    def columns(self, bending: float) -> np.ndarray:
+        """Inertia, rate and deflection of bristles of a bending q [1/m], how a deflection at the start dies away, and
+        the rest, shape (m, p)."""
+        moves = np.diff(self.body)
+        z = deflections(moves, np.full(len(moves), 1 / bending))
+        path = np.concatenate(([0.0], np.cumsum(np.abs(moves))))
+        turned = map(self.low_pass, (rate_of(self.low_pass.time, z), z, np.exp(-bending * path)))
+        return np.stack([self.inertia, *turned, *self.rest], axis=1)
+
+
+def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
+    """The equation of a record. A mode of the structure, whose mass m moves on its own spring at a frequency w, adds
+    m/w^2 times the fourth derivative of the position: what of it `between` does not know is among the rest."""
+    time, low_pass = record.time, LowPass(record.time, cutoff)
+    body, force, inertia = at_bearing(record, between, mass)
+    target = force - between.viscous[0] * rate_of(time, body)
+    rest = [np.ones(len(time)), rate_of(time, rate_of(time, inertia)), *([rate_of(time, force)] if late else [])]
+    return _Equation(low_pass, body, low_pass(target), low_pass(inertia), tuple(map(low_pass, rest)))
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return bristles_from_presliding(log, believed_between(prior, log))
+
+
+def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
+    """The bristles, and the whole mass where there is a stage whose masses share it."""
+    masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
+    return (result.stiffness, result.damping, *masses)
+
+
+def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
+    """As the fit has it; masses are shares of one."""
+    certain = with_interval(estimates)
+    rows = [result.order(estimate.name) for estimate in certain]
+    return certain, result.correlation[np.ix_(rows, rows)]
+
+
+KIND = ExperimentKind[Presliding](_analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"))

@@ -1,0 +1,297 @@
+"""Slow motion that swings, or sticks and slips: Coulomb and static friction, Stribeck velocity.
+
+Where friction falls steeply no controller holds a constant speed, and `friction_velocity` has nothing to read. The
+motion itself goes through all those speeds: LuGre's bristles, dz/dt = v - sigma_0 |v| z / g(v) with
+g = F_c + (F_s - F_c) exp(-(v/v_s)^2) (Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425), follow from the motion
+that was measured, with no loop to be simulated, and F_c, F_s, v_s from the force they have to make up. Mass, stiffness
+and damping of the bristles come from other experiments, see `presliding`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from friso.identification.combine import Correlated, with_interval
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.logs.log import Log
+from friso.identification.readings.at_bearing import (
+    EXPLAINED,
+    HELD,
+    BearingRecord,
+    Between,
+    LowPass,
+    at_bearing,
+    believed_between,
+    cutoff_of,
+    rate_of,
+    record_of,
+    why_unseen,
+)
+from friso.identification.readings.common import (
+    BLOCKS,
+    LINEARITY,
+    Mean,
+    by_t,
+    correlation_of,
+    deflections,
+    jackknife,
+)
+
+BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
+"""Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
+one is checked, and of the motion, both over that of the first."""
+
+MOST, FEWEST = 60_000, 2000
+"""Samples that are used at most, and that are needed."""
+
+STARTS, BOUNDS = (0.2, 0.5), (0.01, 10.0)
+"""Stribeck velocities from which the fit starts, over the RMS velocity; and bounds of all that is fitted, over that and
+over the mean friction."""
+
+CLOSE = 1e-6
+"""Share of its squares, and of what is fitted, to which the fit comes: far within any interval."""
+
+STEP = 1e-3
+"""Of what is fitted, over its size, for derivatives."""
+
+FASTEST = 1.5
+"""Stribeck velocities which the motion has to go: at this one a tenth of the fall is left."""
+
+NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
+UNITS = ("N", "N", "m/s")
+METHOD = "LuGre in the motion of slow sliding"
+BRISTLES = "mass and bristles are needed: add a log of small motion before sliding, --as presliding"
+RIGID = "The structure is assumed rigid, as the stage file has no [parasitic]."
+DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --stage"
+
+
+@dataclass(frozen=True)
+class MassOnBristles:
+    """Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles as other experiments show them, each with
+    the half-width of its interval; the exponent of the Stribeck curve."""
+
+    mass: tuple[float, float]
+    stiffness: tuple[float, float]
+    damping: tuple[float, float]
+    exponent: float = 2.0
+
+
+@dataclass(frozen=True)
+class SlowSliding:
+    """Coulomb and static friction [N] and Stribeck velocity [m/s], and the `correlation` of the three, shape (3, 3).
+    Over time [s], shape (n,): the velocity [m/s] of the body on the bearing, its friction [N], low-passed, and that of
+    the model (empty where there is none); and the share of the friction's standard deviation that it leaves
+    unexplained; the exponent of its Stribeck curve."""
+
+    estimates: tuple[Estimate, ...]
+    correlation: np.ndarray
+    time: np.ndarray
+    velocity: np.ndarray
+    friction: np.ndarray
+    model: np.ndarray
+    unexplained: float
+    exponent: float = 2.0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Equation:
+    """The low-pass; the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s],
+    shape (n,); the friction [N] at the low-pass without the viscous, and what a later force does to it, per second,
+    shape (m,); what is known of the bristles; the `sizes` of what is fitted: of Coulomb friction, of what static
+    friction is more, of the Stribeck velocity, of the constant force and of that of the bristles at the start."""
+
+    low_pass: LowPass
+    moves: np.ndarray
+    velocity: np.ndarray
+    friction: np.ndarray
+    late: np.ndarray
+    contact: MassOnBristles
+    sizes: np.ndarray
+
+    def model(self, p: np.ndarray) -> np.ndarray:
+        """Friction [N] at the low-pass, shape (m,), of the logarithms of the first three over their `sizes`, and of the
+        other two over theirs."""
+        coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
+        stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
+        speed = np.abs(self.velocity)
+        ends = (coulomb + more * np.exp(-((speed / stribeck) ** self.contact.exponent))) / stiffness
+        z = deflections(self.moves, (ends[1:] + ends[:-1]) / 2, start / stiffness)
+        return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
+
+    def residual(self, p: np.ndarray) -> np.ndarray:
+        return self.model(p) - self.friction
+
+    def derivatives(self, p: np.ndarray) -> np.ndarray:
+        """Of the residual, shape (m, 5)."""
+        here = self.model(p)
+        return np.stack([(self.model(p + step) - here) / STEP for step in STEP * np.eye(len(p))], axis=1)
+
+
+def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
+    """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
+    slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
+
+    A joint is held, or its deflection is measured. The intervals contain what a lower low-pass changes, what the
+    intervals of the known mass, bristles and viscous friction do, what the delay does that fits best, and the share of
+    the friction that is left unexplained; contact, mode and exponent are taken as given. Raises InputError for missing
+    channels.
+    """
+    record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)
+    why = why_unseen(record, FEWEST) or (DELAY if between.delay is None else "")
+    if why or contact is None:
+        return _nothing(why or BRISTLES)
+    cutoff = cutoff_of(record)
+    cutoff = min(cutoff, BELOW_MODE * between.mode.frequency) if between.mode else cutoff
+    sizes = _sizes(record, cutoff)
+    equation = _equation(record, between, contact, cutoff, sizes)
+    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STARTS])
+    jacobian, residual = equation.derivatives(best), equation.residual(best)
+    lower = _fitted(_equation(record, between, contact, CHECKED * cutoff, sizes), [best])
+    shifts = [lower - best, _moved(np.column_stack([jacobian, equation.late]), residual)[:5]]
+    for other in _off(between, contact):
+        shifts.append(_moved(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
+    left = float(residual.std() / equation.friction.std())
+    covariance = jackknife(jacobian, -residual)[:3, :3]
+    estimates, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
+    inside = equation.low_pass.inside
+    curves = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
+    held = [HELD] if record.bent is None and between.joint else []
+    notes = (*held, *([] if between.mode else [RIGID]))
+    return SlowSliding(_judged(estimates, left, curves[1]), correlation, *curves, contact.exponent, notes)
+
+
+def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
+    """What is known, with each in turn at the end of its interval."""
+    doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
+    others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
+    return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
+
+
+def _moved(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """By how much a residual, shape (m,), moves what is fitted, whose derivatives are of shape (m, p)."""
+    return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
+
+
+def _nothing(why: str) -> SlowSliding:
+    none = np.empty(0)
+    return SlowSliding(_unknown(why), np.eye(3), none, none, none, none, np.nan)
+
+
+def _unknown(why: str) -> tuple[Estimate, ...]:
+    return tuple(Estimate.unknown(*key, METHOD, why) for key in zip(NAMES, UNITS, strict=True))
+
+
+def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
+    """Of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
+    level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
+    return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
+
+
+def _equation(
+    record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
+) -> _Equation:
+    """The equation of a record at a low-pass [Hz]."""
+    seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
+    body, force, inertia = at_bearing(seen, between, contact.mass[0])
+    velocity = rate_of(record.time, body)
+    friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
+    late = low_pass(rate_of(record.time, force))
+    return _Equation(low_pass, np.diff(body), velocity, low_pass(friction), late, contact, sizes)
+
+
+def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
+    """What fits best from any start, shape (5,)."""
+    least, most = BOUNDS
+    low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
+    scale = float(equation.friction.std())
+
+    def off(p: np.ndarray) -> np.ndarray:
+        return equation.residual(p) / scale
+
+    def derivatives(p: np.ndarray) -> np.ndarray:
+        return equation.derivatives(p) / scale
+
+    derived: Any = derivatives
+    complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
+    fits: Any = [
+        least_squares(off, start, jac=derived, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for start in complete
+    ]
+    return min(fits, key=lambda fit: fit.cost).x
+
+
+def _estimates(
+    best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray, left: float
+) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """The three quantities and their correlation, by the logarithms that were fitted, their covariance, shape (3, 3),
+    and `shifts` of them, shape (m, 3), and the share of the friction that is `left`."""
+    coulomb, more, stribeck = np.exp(best[:3])
+    values = (coulomb, coulomb + more, stribeck)
+    turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
+    covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
+    even, estimates = (left + LINEARITY) * np.array(values), []
+    for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
+        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)
+        systematic = float(np.abs(shifts[:, i]).sum() + even[i])
+        estimates.append(by_t(name, unit, mean, METHOD, systematic, systematic))
+    return tuple(estimates), correlation_of(covariance, shifts, even)
+
+
+def _judged(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
+    """The estimates as far as the motion determines them, whose model leaves a share of the friction unexplained."""
+    coulomb, static, stribeck = estimates
+    fastest = float(np.abs(velocity).max())
+    if left > EXPLAINED:
+        return _unknown(f"{left:.0%} of the friction is not explained by LuGre's bristles")
+    if not coulomb.low > 0:
+        return _unknown("the force shows no friction: does the bearing slide?")
+    if fastest < FASTEST * stribeck.value:
+        return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
+    if not (static.low > coulomb.value and stribeck.low > 0):
+        why = "no rise of friction towards rest shows"
+        return coulomb, *(
+            Estimate.unknown(estimate.name, estimate.unit, METHOD, why) for estimate in (static, stribeck)
+        )
+    return estimates
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return stribeck_from_slow_sliding(log, believed_between(prior, log), _bristles(prior, log))
+
+
+def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
+    """The mass and the bristles that other experiments show; None where they do not."""
+    flat = prior.flat(log)
+    masses = [key for key in flat if key.startswith("masses.")]
+    bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
+    if not masses or not all(key in prior.estimates for key in (*masses, *bristles)):
+        return None
+    mass = (
+        sum(prior.estimates[key].value for key in masses),
+        sum(prior.estimates[key].half_width for key in masses),
+    )
+    stiffness, damping = ((prior.estimates[key].value, prior.estimates[key].half_width) for key in bristles)
+    return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
+
+
+def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
+    """As the fit has it."""
+    certain = with_interval(estimates)
+    rows = [result.estimates.index(estimate) for estimate in certain]
+    return certain, result.correlation[np.ix_(rows, rows)]
+
+
+KIND = ExperimentKind[SlowSliding](
+    _analyse,
+    lambda result, stage: result.estimates,
+    _correlated,
+    after=("constant-speed", "frequency", "moves", "presliding"),
+)

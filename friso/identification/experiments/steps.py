@@ -1,0 +1,243 @@
+"""Position steps with the cart fixed: stiffness of the joint.
+
+Thesis, Sec. 4.2.2, Fig. 19. At rest the actuator holds the joint alone, so the differences of force over those of
+deflection are its stiffness, whatever constant force there is besides; and they are that even if the cart creeps, where
+the deflection is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import (
+    BLOCKS,
+    LINEARITY,
+    Mean,
+    block_mean,
+    by_t,
+    cart,
+    channel,
+    deflection,
+    low_pass,
+    runs,
+)
+from friso.stage import Stage
+
+CUTOFF = 25.0
+"""Low-pass of the force [Hz] (Sec. 4.2.2)."""
+
+SETTLED, CREEPING = 0.02, 0.1
+"""Share of a step by which, within a settled window, the force may still drift beyond what goes with the deflection,
+and by which the deflection may, where none drifts less: a slow integrator takes long to pull a spring all the way."""
+
+FIXED = 0.02
+"""Share of the steps of the position by which the cart may follow and still count as fixed."""
+
+STARTS = np.linspace(0.1, 0.7, 7)
+"""Shares of a plateau after which it may have settled, tried in turn."""
+
+KEY, UNIT = "joint.stiffness", "N/m"
+SOFT = "more deflection does not need more force: is the cart fixed?"
+METHOD = "differences of force over differences of deflection between settled position steps"
+
+
+@dataclass(frozen=True)
+class Window:
+    """A settled window: from `start` to `end` [s], mean deflection [m] and force [N], with the standard error of the
+    force at that deflection by block means, the rest of a drift included."""
+
+    start: float
+    end: float
+    position: float
+    force: float
+    force_error: float
+
+
+@dataclass(frozen=True)
+class StepStiffness:
+    """The stiffness [N/m], of all steps and of those up and down; `hysteresis` [N], by how much more force stands at a
+    deflection reached from below than from above; the settled `windows`; the force [N] low-passed, shape (n,); whether
+    the cart was fixed (None: not measured)."""
+
+    stiffness: Estimate
+    up: Estimate
+    down: Estimate
+    hysteresis: Estimate
+    windows: tuple[Window, ...]
+    time: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    cart_fixed: bool | None
+    warnings: tuple[str, ...]
+
+
+def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
+    """Stiffness from steps of the position with the cart fixed, the force low-passed at `cutoff` [Hz].
+
+    Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
+    windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
+    """
+    position, force = channel(log, "position"), channel(log, "force")
+    measured = deflection(log)
+    deflected = position if measured is None else measured
+    smooth = [
+        np.concatenate([low_pass(x[s], log.sample_time, cutoff) for s in log.segments]) for x in (force, deflected)
+    ]
+    spans = [s for part in log.segments for s in _plateaus(log, part, cutoff)]
+    scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
+    settled = [_settled(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
+    windows = tuple(w for w in settled if w is not None)
+    fixed, notes = _fixed(log, position, windows)
+    warnings = list(notes)
+    if len(windows) < len(spans):
+        warnings.append(f"{len(spans) - len(windows)} of {len(spans)} plateaus had not settled and are left out.")
+    steps = np.diff([[w.position, w.force] for w in windows], axis=0).reshape(-1, 2)
+    noise = np.array([np.hypot(a.force_error, b.force_error) for a, b in pairwise(windows)])
+    large = np.abs(steps[:, 0]) > 0.2 * scale
+    every, up, down = (
+        _slope(steps, noise, large & chosen, words, len(spans))
+        for chosen, words in ((steps[:, 0] != 0, ""), (steps[:, 0] > 0, ", upwards"), (steps[:, 0] < 0, ", downwards"))
+    )
+    curves = (log.time, deflected, smooth[0])
+    return StepStiffness(every, up, down, _hysteresis(windows), windows, *curves, fixed, tuple(warnings))
+
+
+def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
+    """Stretches of a segment over which the reference, else the position, keeps its level, long enough to average."""
+    least = int(np.ceil(4 / (cutoff * log.sample_time)))
+    if part.stop - part.start < 2 * least:
+        return []
+    if "reference" in log:
+        level = channel(log, "reference")[part]
+        change = np.abs(np.diff(level, prepend=level[0]))
+        steady = change <= 1e-3 * np.ptp(level)
+    else:
+        level = low_pass(channel(log, "position")[part], log.sample_time, cutoff)
+        half = max(least // 4, 1)
+        moved = np.abs(np.roll(level, -half) - np.roll(level, half))
+        moved[:half] = moved[-half:] = 0.0
+        steady = moved <= 0.02 * np.ptp(level)
+    spans = [slice(part.start + s.start, part.start + s.stop) for s in runs(steady)]
+    return [s for s in spans if s.stop - s.start >= least]
+
+
+def _scale(position: np.ndarray, spans: list[slice]) -> float:
+    """The size of the larger steps [m]: the median of those that are not small against the largest."""
+    levels = np.array([np.median(position[s][(s.stop - s.start) // 2 :]) for s in spans])
+    sizes = np.abs(np.diff(levels))
+    return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0
+
+
+def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
+    """About how much force [N/m] goes with the deflection, by the later half of each plateau; 0 without two of them."""
+    levels = np.array([[np.median(x[s][(s.stop - s.start) // 2 :]) for x in (position, force)] for s in spans])
+    if len(levels) < 2 or not np.ptp(levels[:, 0]) > 0:
+        return 0.0
+    return float(np.polyfit(levels[:, 0], levels[:, 1], 1)[0])
+
+
+def _settled(
+    log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float, secant: float
+) -> Window | None:
+    """The part of a plateau that has settled: the deflection hardly drifts, and the force drifts by no more than goes
+    with that, but for a share of a step or what noise explains."""
+    length = span.stop - span.start
+    margin = min(length // 10, int(1 / (CUTOFF * log.sample_time)))
+    for allowed, share in product((SETTLED, CREEPING), STARTS):
+        chosen = slice(span.start + int(share * length), span.stop - margin)
+        if chosen.stop - chosen.start < 2 * BLOCKS:
+            continue
+        bent, creep = _drifting(position[chosen])
+        beyond, drift = _drifting(force[chosen] - secant * position[chosen])
+        if creep <= allowed * scale and drift <= SETTLED * abs(_force_scale(force)):
+            time = log.time[[chosen.start, chosen.stop - 1]]
+            level = beyond.value + secant * bent.value
+            return Window(time[0], time[1], bent.value, level, float(np.hypot(beyond.error, drift / 12**0.5)))
+    return None
+
+
+def _force_scale(force: np.ndarray) -> float:
+    return float(np.subtract(*np.percentile(force, [95, 5])))
+
+
+def _drifting(values: np.ndarray) -> tuple[Mean, float]:
+    """The mean, and by how much the values drift over the window beyond what their scatter explains (two errors)."""
+    mean = block_mean(values)
+    shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
+    return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
+
+
+def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
+    """Least squares of the differences of force on those of deflection through the origin.
+
+    Neighbouring differences share a window: the variance is the larger of that of independent differences (a force that
+    wanders) and of differences of independent windows (noise), and no less than the noise within the windows says.
+    """
+    method = METHOD + words
+    count = int(chosen.sum())
+    if count < 2:
+        reason = f"{count} step{'s' * (count != 1)}{words} between settled windows ({plateaus} plateaus): 2 are needed"
+        return Estimate.unknown(KEY, UNIT, method, reason)
+    x, y = np.where(chosen, steps[:, 0], 0.0), np.where(chosen, steps[:, 1], 0.0)
+    slope = float(x @ y / (x @ x))
+    off = np.where(chosen, y - slope * x, 0.0)
+    spread = float(off @ off) / (count - 1)
+    shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
+    within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
+    variance = max(max(1.0, shared) * spread / float(x @ x), within)
+    linear = LINEARITY * abs(slope)
+    estimate = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
+    if estimate.low > 0:
+        return estimate
+    return Estimate.unknown(KEY, UNIT, method, SOFT, 0.0, estimate.high if estimate.high > 0 else np.inf)
+
+
+def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
+    """Force = offset + stiffness * deflection + half the hysteresis * direction of the step before."""
+    name, unit, method = "hysteresis", "N", "force at a deflection reached from below minus from above"
+    x, force = np.array([[w.position, w.force] for w in windows]).reshape(-1, 2).T
+    if len(x) < 5 or len(set(direction := np.sign(np.diff(x)))) < 2:
+        return Estimate.unknown(name, unit, method, "no deflections reached from both sides, over 5 windows or more")
+    x, force = x[1:], force[1:]
+    design = np.stack([np.ones_like(x), (x - x.mean()) / np.ptp(x), direction / 2], axis=1)
+    solution, rest, rank, _ = np.linalg.lstsq(design, force, rcond=1e-6)
+    if rank < 3 or len(x) == 3:
+        return Estimate.unknown(name, unit, method, "deflection and direction of the steps cannot be separated")
+    variance = float(np.sum(rest)) / (len(x) - 3) * np.linalg.inv(design.T @ design)[2, 2]
+    return by_t(name, unit, Mean(float(solution[2]), float(variance**0.5), len(x) - 3), method)
+
+
+def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
+    """Whether the cart stood still between the windows, and what to say of it."""
+    moved = cart(log)
+    if moved is None:
+        return None, ("The cart is assumed fixed: no channel shows whether it is.",)
+    if len(windows) < 2:
+        return None, ()
+    marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
+    followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
+    if followed <= FIXED * went:
+        return True, ()
+    finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
+    return False, (f"{finding}; the deflection of the joint was measured all the same.",)
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return stiffness_from_steps(log)
+
+
+def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
+    """The stiffness, but not for a stage that has no joint."""
+    return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
+
+
+KIND = ExperimentKind[StepStiffness](_analyse, _estimates)

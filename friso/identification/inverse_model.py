@@ -1,0 +1,252 @@
+"""Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, filtered and decimated in the same
+way.
+
+The filtering is that of Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark.org, 2019) and, for the method,
+Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697: position through a Butterworth filter of order 4 forward
+and back, at five times the bandwidth of the motion, derivatives by central differences, and all columns and the force
+decimated to 2.5 times that bandwidth by one more filter.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+from scipy.signal import butter, cheby1, sosfiltfilt, welch
+
+from friso.errors import InputError
+from friso.identification.estimate import Estimate
+from friso.identification.logs.log import ROLES, Log
+from friso.identification.readings.common import cart
+from friso.identification.spread import groups_of, spread_of
+
+SMOOTH, DECIMATE = 5.0, 2.0
+"""Cut-off frequencies, in units of the motion's bandwidth, of the filter of the position and of the decimation, which
+passes the share `PASS` of half the new sampling frequency."""
+
+PASS = 0.8
+ORDER, DECIMATION_ORDER, RIPPLE = 4, 8, 0.05
+"""Order of the Butterworth filter; order and ripple [dB] of the Chebyshev filter before decimation."""
+
+COARSE = 0.15
+"""Cut-off frequency times sample time from which on derivatives are those of a quintic spline: central differences lose
+some of the acceleration (1 % of it at this sampling), which would make the mass too large."""
+
+EDGE = 49
+"""Samples left out at the start, where the filters swing in."""
+
+ENERGY, ABOVE_NOISE, PIECES = 0.95, 4.0, 8
+"""Share of the power of the acceleration within the bandwidth of the motion, by how much the spectrum of the position
+stands above its noise where it counts, and into how many pieces a record is cut for it (Welch's method)."""
+
+ONE_WAY = 0.02
+"""Share of the way that a log goes in one direction at least, for the two directions to be distinguished."""
+
+SLIDING, REST = 0.01, 0.1
+"""Share of the highest speed below which a stage rests, and time [s] from which on a rest is left out of the fit: the
+sign of the velocity is noise then, and friction is what the controller makes it."""
+
+LEAST = 20
+"""Rows that a fit needs at least."""
+
+METHOD = "least squares on the inverse model"
+
+
+@dataclass(frozen=True)
+class InverseModel:
+    """The fit: `estimates` and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and
+    "... backward"), the `columns`, shape (rows, columns), and their `covariance`, times [s] and forces [N] of the rows,
+    measured and fitted, of shape (rows,), and the relative `error`, norm of the residual over that of the force.
+    `bandwidth` [Hz] is the motion's."""
+
+    estimates: tuple[Estimate, ...]
+    solution: Mapping[str, float]
+    columns: np.ndarray
+    covariance: np.ndarray
+    time: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+    bandwidth: float
+
+    @property
+    def error(self) -> float:
+        return float(np.linalg.norm(self.measured - self.fitted) / np.linalg.norm(self.measured))
+
+    def value(self, name: str) -> float:
+        """What least squares made of the column called so, whether the log shows it or not."""
+        return self.solution[name]
+
+
+@dataclass(frozen=True)
+class FilteredMotion:
+    """Position [m], velocity [m/s] and acceleration [m/s^2] without the noise beyond the cut-off frequency, (n,)."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+
+def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
+    """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
+    smooth, filtered = position, cutoff < 0.5 / sample_time
+    if filtered:
+        sections = butter(ORDER, 2 * cutoff * sample_time, output="sos")
+        smooth = sosfiltfilt(sections, position, padlen=min(3 * ORDER, len(position) - 1))
+    if cutoff * sample_time < COARSE:
+        velocity = np.gradient(smooth, sample_time)
+        return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
+    time = np.arange(len(smooth)) * sample_time
+    curve = make_interp_spline(time, smooth, k=5)
+    velocity, acceleration = (curve.derivative(order)(time) for order in (1, 2))
+    if filtered:
+        acceleration[[0, -1]] = acceleration[[1, -2]]  # the filter leaves a kink at the ends
+    return FilteredMotion(smooth, velocity, acceleration)
+
+
+def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
+    """The bandwidth [Hz] of a motion, shape (n,) [m]: that below which its acceleration has 95 % of its power, as far
+    as the position stands out of its noise. Raises InputError where it does nowhere."""
+    pieces = min(len(position), max(256, len(position) // PIECES))
+    frequency, power = welch(position, 1 / sample_time, nperseg=pieces, detrend="linear")
+    noise = np.median(power[3 * len(power) // 4 :])
+    below = np.flatnonzero(power < ABOVE_NOISE * noise)
+    passband = slice(0, below[0] if below.size else len(power))
+    share = np.cumsum((power - noise)[passband] * frequency[passband] ** 4)
+    if not share.size or not share[-1] > 0:
+        raise InputError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
+    return float(frequency[passband][np.searchsorted(share, ENERGY * share[-1])])
+
+
+def directions(position: np.ndarray) -> tuple[bool, bool]:
+    """Whether a motion, shape (n,) [m], goes forward, and whether it goes back."""
+    steps = np.diff(position)
+    ways = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
+    forward, back = ways > ONE_WAY * ways.sum()
+    return bool(forward), bool(back)
+
+
+def inverse_model(
+    log: Log, bandwidth: float | None = None, by_direction: bool = False, cart_share: float = 0.0
+) -> InverseModel:
+    """Mass, viscous and Coulomb friction and offset of a log with position and force.
+
+    With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
+    distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, read off the log
+    by default. Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does
+    friction. Raises InputError for a log too short."""
+    band = bandwidth or bandwidth_of(log["position"], log.sample_time)
+    longest = max(part.stop - part.start for part in log.segments) * log.sample_time
+    if band * longest < 1:
+        actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
+        raise InputError("--bandwidth", actual, expected, '--bandwidth "20 Hz"', log.name)
+    parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
+    time, columns, force, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
+    velocity = columns[:, 1] + columns[:, 3] if by_direction else columns[:, 1]
+    speed = np.abs(velocity)
+    slides = ~_rests(speed <= SLIDING * speed.max(initial=0.0), time)
+    time, columns, force, position, velocity = (rows[slides] for rows in (time, columns, force, position, velocity))
+    if len(force) < LEAST:
+        actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
+        raise InputError("position", actual, f"at least {LEAST} in motion after decimation", "a longer log")
+    both = all(directions(log["position"]))
+    if not both and not by_direction:
+        columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
+    solution = np.linalg.lstsq(columns, force, rcond=None)[0]
+    fitted = columns @ solution
+    covariance = spread_of(columns, force - fitted, groups_of(position, velocity, columns[:, 0]))
+    names = _NAMES[by_direction]
+    estimates = tuple(
+        _estimate(name, unit_of(unit, log), value, variance if both or name != "coulomb" else np.inf)
+        for (name, unit), value, variance in zip(names, solution, np.diag(covariance), strict=True)
+    )
+    if estimates[0].high < 0:
+        expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
+        actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
+        raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)
+    numbers = dict(zip((name for name, _ in names), map(float, solution), strict=True))
+    return InverseModel(estimates, numbers, columns, covariance, time, force, fitted, band)
+
+
+def _other_sign(log: Log) -> str:
+    """The scale with which the force of a log was read, with the other sign."""
+    scales = [re.search(r"; ([+-]?)(\d\S* \S+/[^,/]+)", line) for line in log.read if line.startswith("force:")]
+    scale = next((match for match in scales if match), None)
+    if scale is None:
+        return "-1 N/N" if log.unit("force") == ROLES["force"] else f"-NUMBER N/{log.unit('force')}"
+    return scale[2] if scale[1] == "-" else f"-{scale[2]}"
+
+
+def unit_of(unit: str, log: Log) -> str:
+    """The unit of a quantity of mechanics where the force of a log stands in the newton's place: with a force in volts
+    a mass is in V*s^2/m instead of kg."""
+    if log.unit("force") == ROLES["force"]:
+        return unit
+    return re.sub(r"\bN\b", log.unit("force"), unit.replace("kg", "N*s^2/m"))
+
+
+def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
+    if np.isfinite(variance):
+        return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
+    return Estimate.unknown(name, unit, METHOD, "the motion does not tell it from the others: it goes one way only")
+
+
+def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
+    rests = np.zeros(len(slow), bool)
+    for first, behind in zip(ends[::2], ends[1::2], strict=True):
+        rests[first:behind] = time[behind - 1] - time[first] >= REST
+    return rests
+
+
+_NAMES = {
+    False: (("mass", "kg"), ("viscous", "N*s/m"), ("coulomb", "N"), ("offset", "N")),
+    True: (
+        ("mass", "kg"),
+        ("viscous forward", "N*s/m"),
+        ("coulomb forward", "N"),
+        ("viscous backward", "N*s/m"),
+        ("coulomb backward", "N"),
+    ),
+}
+
+
+def _rows(
+    log: Log, part: slice, band: float, by_direction: bool, cart_share: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Times, columns of the inverse model, forces and positions of a segment, decimated."""
+    if part.stop - part.start < 2 * EDGE:
+        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]))), np.zeros(0), np.zeros(0)
+    moved = motion(log["position"][part], log.sample_time, SMOOTH * band)
+    v, a = moved.velocity, moved.acceleration
+    carried_position = cart(log) if cart_share else None
+    if carried_position is not None:
+        carried = motion(carried_position[part], log.sample_time, SMOOTH * band)
+        v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
+    sign = np.sign(v)
+    if by_direction:
+        forward, backward = (1 + sign) / 2, (1 - sign) / 2
+        columns = np.stack([a, v * forward, sign * forward, v * backward, sign * backward], axis=1)
+    else:
+        columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
+    every = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
+    arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part], moved.position)]
+    time, position = (array[_first(len(array), every) :: every] for array in (arrays[0], arrays[3]))
+    return time, _decimated(arrays[1], every), _decimated(arrays[2], every), position
+
+
+def _decimated(columns: np.ndarray, every: int) -> np.ndarray:
+    """Every so many-th row, after a filter forward and back that keeps what is beyond half the new frequency out."""
+    if every == 1:
+        return columns
+    sections = cheby1(DECIMATION_ORDER, RIPPLE, PASS / every, output="sos")
+    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * DECIMATION_ORDER)
+    return low[_first(len(columns), every) :: every]
+
+
+def _first(count: int, every: int) -> int:
+    """The first row kept, so that the last one is."""
+    return (count - 1) % every

@@ -1,0 +1,151 @@
+"""What a kind of experiment declares of itself: the logs it takes, how they are analysed, what they tell of a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.combine import Correlated, with_interval
+from friso.identification.estimate import Estimate
+from friso.identification.logs.joined import together
+from friso.identification.logs.log import Log
+from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.readings.course import Course
+from friso.progress import Progress, silent
+from friso.stage import Stage, parse_set
+from friso.stage.controllers import CONTROLLER
+
+Source = Log | MeasuredResponse
+"""What a file may hold: signals over time, or a frequency response as somebody measured it."""
+
+Result = TypeVar("Result")
+
+OF_ANY_FORM = ("kind", "force_limit", "anti_windup")
+"""Keys of a controller that stay where a log was taken with one of another form."""
+
+
+@dataclass(frozen=True)
+class AnalysisSettings:
+    """What the user chose: bandwidth of the moves [Hz] for the inverse model, band [Hz] and period [s] of frequency
+    responses; None where friso is to find them. `progress` is told how far an analysis is."""
+
+    bandwidth: float | None = None
+    band: tuple[float, float] | None = None
+    period: float | None = None
+    progress: Progress = silent
+
+
+NOTHING_CHOSEN = AnalysisSettings()
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether it
+    is the user's, so that its controller is the machine's, and the estimates of experiments analysed before, by key."""
+
+    stage: Stage | None = None
+    from_user: bool = False
+    estimates: Mapping[str, Estimate] = field(default_factory=dict)
+
+    def flat(self, log: Log) -> dict[str, Any]:
+        """The flat keys of the stage as it was set up for a log; none without a stage. Raises InputError."""
+        return {} if self.stage is None else as_set_up(self.stage, log)
+
+    def believed(self, log: Log) -> dict[str, Any]:
+        """The same, with the values that other experiments show. Raises InputError."""
+        return {**self.flat(log), **{key: estimate.value for key, estimate in self.estimates.items()}}
+
+    def masses(self, log: Log) -> tuple[float, float]:
+        """Mass [kg] of the cart and of the stage as believed, 0 for what is not known. Raises InputError."""
+        believed = self.believed(log)
+        return float(believed.get("masses.cart", 0.0)), float(believed.get("masses.stage", 0.0))
+
+
+def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
+    """The flat keys of the stage as it was set up for a log; what the stage does not have is left out (`left_out`),
+    but for a controller of another form, which replaces the stage's. Raises InputError."""
+    setup = {key: text for key, text in log.setup.items() if key not in left_out(stage, log)}
+    changes: dict[str, Any] = dict(parse_set(f"{key}={text}") for key, text in setup.items())
+    try:
+        return stage.replace(changes).flat()
+    except InputError as error:
+        reason = error
+    own = {f"{CONTROLLER}.{name}" for name in stage.as_written()[CONTROLLER] if name not in OF_ANY_FORM}
+    try:
+        return stage.replace({**dict.fromkeys(own - changes.keys()), **changes}).flat()
+    except InputError:
+        raise reason.found_in(f"{log.name}, [setup]") from None
+
+
+def left_out(stage: Stage, log: Log) -> list[str]:
+    """The keys in the set-up of a log that the stage does not have."""
+    return [key for key in log.setup if key not in stage.flat() and not key.startswith(f"{CONTROLLER}.")]
+
+
+def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
+    """Estimates that are independent of one another."""
+    certain = with_interval(estimates)
+    return certain, np.eye(len(certain))
+
+
+@dataclass(frozen=True)
+class Predictor(Generic[Result]):
+    """How a result predicts another log, with what is known of the machine: the prediction, or None for a log that
+    it cannot predict. `needs` is what there has to be, in words; `check` raises InputError where logs, to which
+    nothing has been fitted yet, will not be able to."""
+
+    needs: str
+    predict: Callable[[Result, Log, Prior, AnalysisSettings], Any]
+    check: Callable[[Sequence[Source], Log, Prior], None] = lambda logs, other, prior: None
+
+
+@dataclass(frozen=True)
+class ExperimentKind(Generic[Result]):
+    """A kind of experiment. Its name, the word of the command line, is that of its module; see `kinds`.
+
+    `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
+    about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
+    uses. `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the
+    last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts). `partial`: whether a log
+    shows too little for a result of its own, such as one event; logs like that count as one log with gaps. `together`:
+    all its logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured
+    them, too. `claims` says why a log without a stated kind may be of this one, or None; `around` makes
+    up a stage around a log where none is given. `notes` are what the engineer should know of all its results, the stage
+    being given or not; `doubts` what speaks against believing a result, in sentences, and `failed` whether its analysis
+    failed, whatever of it still holds. Functions raise InputError for logs that cannot be used."""
+
+    analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
+    estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
+    correlated: Callable[[Result, Sequence[Estimate]], Correlated] = independent
+    after: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ("position", "force")
+    si: bool = True
+    foreign: tuple[str, ...] = ()
+    partial: Callable[[Log], bool] = lambda log: False
+    together: bool = False
+    responses: bool = False
+    claims: Callable[[Course], str | None] | None = None
+    around: Callable[[Log], Stage | None] | None = None
+    notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
+    predictor: Predictor[Result] | None = None
+    doubts: Callable[[Result], Sequence[str]] = lambda result: ()
+    failed: Callable[[Result], bool] = lambda result: False
+
+    def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
+        """The roles that a log needs, where these are mapped."""
+        choices = [channels.split("|") for channels in self.roles]
+        return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
+
+    def groups(self, sources: Sequence[Source]) -> list[tuple[Source, ...]]:
+        """The logs of this kind, by experiment."""
+        times = tuple(source for source in sources if isinstance(source, Log))
+        responses = [(source,) for source in sources if not isinstance(source, Log)] if self.responses else []
+        if self.together:
+            return [*([times] if times else []), *responses]
+        partial = [log for log in times if len(times) > 1 and self.partial(log)]
+        whole = [log for log in times if log not in partial]
+        return [*((log,) for log in (*whole, *together(partial))), *responses]

@@ -1,0 +1,193 @@
+"""From a file and what the user said to a log: roles, units, one time base, checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from friso.errors import InputError, LogError
+from friso.identification.logs import checks, delays
+from friso.identification.logs.format import FORMATS
+from friso.identification.logs.gaps import check_gaps
+from friso.identification.logs.integrated import NOTE, integrated, is_needed
+from friso.identification.logs.log import ROLES, Log
+from friso.identification.logs.mapping import Mapping, option
+from friso.identification.logs.read import file_format
+from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
+from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
+from friso.identification.logs.time_base import Track, together, track
+from friso.quantities import quoted
+
+LEAST_SAMPLES = 50
+"""Fewer samples than this are refused (our choice: no interval on anything would be worth its name)."""
+
+
+def read_log(
+    path: Path | str,
+    mapping: Mapping | None = None,
+    strict: bool = True,
+    needed: Sequence[str] = ("position",),
+    foreign: Sequence[str] = (),
+) -> Log:
+    """The log in a file: signals by role, SI, on one time base; with what was read and what is doubtful, line by line.
+
+    With `strict`, every signal must be in the SI unit of its role, but those of the `foreign` roles, which may be in
+    another unit of their own; without, all are kept as they are, and listed in `Log.units`. `needed` are the roles that
+    must be there; a position may be the integral of the velocity. Raises LogError (one message) for what cannot be read
+    or used.
+    """
+    path, mapping = Path(path), mapping or Mapping()
+    form = FORMATS[file_format(path)]
+    table = with_user_units(form.read(path), mapping, form.times, str(path))
+    reading = Reading(table, mapping, strict, not form.units, str(path), tuple(foreign))
+    proposal = propose(table, mapping.roles, str(path))
+    by_velocity = is_needed(table, proposal, needed)
+    if by_velocity:
+        needed = [*(role for role in needed if role != "position"), "velocity"]
+    check_gaps(reading, proposal, needed)
+    chosen = proposal.chosen
+    unused(mapping, chosen, str(path))
+    notes = Notes(list(table.read), _undecided(proposal))
+    try:
+        tracks = _tracks(chosen, reading, notes, needed)
+        base, signals = together(tracks)
+        notes.read += base.read
+        notes.warnings += base.warnings
+        _check(base, signals, needed)
+        if by_velocity:
+            signals["position"] = integrated(signals["velocity"], base.period, base.segments)
+            notes.warnings.append(NOTE)
+            if "velocity" in notes.units:
+                notes.units["position"] = notes.units["velocity"].removesuffix("/s")
+    except InputError as error:
+        raise error.found_in(str(path)) from None
+    notes.warnings += _doubts(base, signals, notes)
+    notes.read.append(_spans(base))
+    return Log(
+        path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
+        tuple(notes.read), tuple(notes.warnings), dict(mapping.setup),
+    )  # fmt: skip
+
+
+def _undecided(proposal: Proposal) -> list[str]:
+    """A line for each role that no channel has since several could."""
+    return [
+        f"{role}: left out, since {' and '.join(channel.name for channel in channels)} could be it; to use one: "
+        f"{option('--map', role, channels[0].name)}"
+        for role, channels in proposal.rivals.items()
+    ]
+
+
+def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:
+    """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
+    needs is left out, with a warning, where it has no instants or no unit; others raise LogError."""
+    clock = chosen.get("time")
+    tracks: dict[str, Track] = {}
+    sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.by_user]
+    for role in [role for role in ROLES if role in chosen]:
+        choice = chosen[role]
+        optional = not choice.by_user and role not in needed
+        time = instants(choice, clock, reading, notes)
+        foreign = reading.mapping.sample_time is not None and choice.channel.values.size not in sizes
+        if optional and (time is None or foreign):
+            notes.warnings.append(
+                f"{role}: {choice.channel.name} left out: its length differs, or it has no time stamps"
+            )
+            continue
+        if time is None:
+            raise no_time(choice.channel, reading)
+        try:
+            values = signal(choice, reading, notes)
+        except InputError as error:
+            if not optional or role == "force":
+                raise
+            notes.warnings.append(f"{role}: {error.actual} left out; to use it: {error.example}")
+            continue
+        if time.size != values.size:
+            raise LogError(
+                role,
+                f"{values.size} values for {time.size} time stamps",
+                "one value per time stamp",
+                "",
+                reading.origin,
+            )
+        tracks[role] = _track(role, choice, time, values, notes)
+    notes.read += _clocks(clock, reading)
+    return tracks
+
+
+def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
+    """Where the instants come from, in words."""
+    if reading.mapping.sample_time is not None:
+        return [
+            f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
+            "used"
+        ]
+    if clock is not None:
+        return [f"time: {clock.channel.name} ({clock.channel.source}), {clock.reason}"]
+    columns = [c for c in reading.table.channels if c.unit and (role_of(c.name) or ("",))[0] == "time"]
+    return [f"time: {c.name} ({c.source}), in {c.unit}" for c in columns] or ["time: as stored with the signals"]
+
+
+def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
+    """One track, with its lines added to the notes."""
+    channel_track = track(role, time, values)
+    notes.read += channel_track.read
+    notes.warnings += channel_track.warnings
+    n = checks.held(values)
+    if n > 1:
+        notes.warnings.append(
+            f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
+        )
+    return channel_track
+
+
+def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
+    """Raises LogError for a log that is too short and for a signal that does not change and should."""
+    if base.time.size < LEAST_SAMPLES:
+        raise LogError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
+    if not 1e-9 <= base.period <= 3600:
+        expected = "1 ns to 1 h between samples: is the time in another unit?"
+        raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
+    for role in {*needed, "position", "force"} & set(signals):
+        if checks.constant(role, signals[role]):
+            value = quoted(float(signals[role][0]))
+            raise LogError(
+                role, f"a constant signal, {value} throughout", "a signal that changes", f'--map {role}="CHANNEL"'
+            )
+
+
+def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
+    """What the engineer should know of the signals before believing them."""
+    lines, parts, period = [], base.segments, base.period
+    for role, values in signals.items():
+        if checks.constant(role, values):
+            lines.append(f"{role}: constant throughout")
+        share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
+        if share > checks.CLIPPED:
+            lines.append(f"{role}: {share:.2%} of the samples lie on flat tops at its extremes: saturated or clipped")
+    position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
+    same_kind = ("position" in notes.units) == ("velocity" in notes.units)
+    if position is not None and velocity is not None and same_kind:
+        lines.append(checks.velocity_warning(position, velocity, period, parts))
+        lines.append(delays.velocity_line(position, velocity, period, parts))
+    if position is not None and force is not None:
+        lines.append(delays.force_line(position, force, period, parts))
+    return [line for line in lines if line]
+
+
+def _spans(base: Track) -> str:
+    """The segments in words."""
+    parts = base.segments
+    listed = ", ".join(f"{_instant(base, p.start)} to {_instant(base, p.stop - 1)}" for p in parts[:6])
+    more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
+    count = "1 segment" if len(parts) == 1 else f"{len(parts)} segments"
+    return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {count}: {listed}{more}"
+
+
+def _instant(base: Track, number: int) -> str:
+    """The instant of a sample; what rounding leaves of the beginning is 0."""
+    time = float(base.time[number])
+    return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

@@ -1,0 +1,220 @@
+"""The program in which binary logs are read, by the libraries of their formats; `friso.identification.logs.confined`
+runs it.
+
+It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY``, the memory in bytes (0 for
+no limit). On standard output, pickled: what the file holds as plain dicts, lists, texts, numbers and NumPy arrays, and
+the message of the error.
+"""
+
+from __future__ import annotations
+
+import logging
+import pickle
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+OBJECT = "\0object"
+"""Key of what stands for an object whose content only MATLAB can read (timeseries, Dataset, tf): its class."""
+
+HDF5 = b"\x89HDF\r\n\x1a\n"
+"""The first bytes of a file of HDF5."""
+
+
+def is_hdf5(head: bytes) -> bool:
+    """Whether the first 520 bytes are those of HDF5, before which MATLAB puts a block."""
+    return HDF5 in (head[:8], head[512:520])
+
+
+def read_mat(path: Path) -> dict[str, Any]:
+    """The tree of a MAT file, by the names of its variables."""
+    with path.open("rb") as file:
+        head = file.read(520)
+    return _read_hdf5(path) if is_hdf5(head) else _read_old(path)
+
+
+def _object(kind: str) -> dict[str, str]:
+    return {OBJECT: kind}
+
+
+def _read_old(path: Path) -> dict[str, Any]:
+    """The tree of a file up to version 7."""
+    from scipy.io import loadmat
+
+    tree: dict[str, Any] = {}
+    for name, value in loadmat(path, squeeze_me=True, struct_as_record=False).items():
+        node = _from_scipy(value)
+        if str(name) == "None" and isinstance(node, dict) and OBJECT in node:  # scipy before 1.18 lost their names
+            name = value[0]["s0"].decode() if isinstance(value[0]["s0"], bytes) else "object"
+        if not str(name).startswith("__"):
+            tree[str(name)] = node
+    return tree
+
+
+def _from_scipy(value: Any) -> Any:
+    """What scipy read, as a tree of dict, list, array and str."""
+    from scipy.sparse import issparse
+
+    if hasattr(value, "_fieldnames"):
+        return {key: _from_scipy(getattr(value, key)) for key in value._fieldnames}
+    if type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
+        named = {*(value.dtype.names or ())} & {"s2", "_Class"}  # of scipy before 1.18, and since
+        kind = value[0][named.pop()] if named else "function"
+        return _object(kind.decode() if isinstance(kind, bytes) else str(kind))
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return [_from_scipy(item) for item in value.ravel()]
+    if isinstance(value, np.ndarray) and value.dtype.kind in "US":
+        return str(value) if value.ndim == 0 else "".join(map(str, value.ravel()))
+    if issparse(value):
+        return value.toarray()  # pyright: ignore[reportAttributeAccessIssue]
+    return value if isinstance(value, str | np.ndarray) else np.asarray(value)
+
+
+def _read_hdf5(path: Path) -> dict[str, Any]:
+    """The tree of a file of version 7.3."""
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        return {str(name): _from_hdf5(_own(file, name), file) for name in file if not str(name).startswith("#")}
+
+
+def _own(group: Any, name: Any) -> Any:
+    """An item of a group. Raises ValueError for one that lies in another file, which the log would show as its own: a
+    link may name any file of the system."""
+    import h5py
+
+    if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+        raise ValueError(f"{name} is a link to another file")
+    return group[name]
+
+
+def _from_hdf5(item: Any, file: Any) -> Any:
+    """A group or data set as a tree of dict, list, array and str. MATLAB's arrays stand transposed."""
+    import h5py
+
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references lead to any data set
+        raise ValueError(f"the values of {item.name} lie in another file")
+    kind = item.attrs.get("MATLAB_class", b"")
+    kind = kind.decode() if isinstance(kind, bytes) else str(kind)
+    if "MATLAB_object_decode" in item.attrs or kind in ("function_handle", "table", "timeseries"):
+        return _object(kind or "object")
+    if isinstance(item, h5py.Group):
+        children = {str(name): _from_hdf5(_own(item, name), file) for name in item}
+        return _structures(item, children)
+    if item.dtype == h5py.ref_dtype:
+        return [_from_hdf5(file[reference], file) for reference in np.ravel(item[()], order="F")]
+    if item.attrs.get("MATLAB_empty", 0):
+        return "" if kind == "char" else np.empty(0)
+    values = np.asarray(item[()])
+    if kind == "char":
+        return "".join(map(chr, values.ravel(order="F")))
+    return np.squeeze(values.T) if values.dtype.kind in "buifc" else _object(kind or str(values.dtype))
+
+
+def _structures(item: Any, children: dict[str, Any]) -> Any:
+    """A structure, or the structure array whose fields are lists of references."""
+    import h5py
+
+    references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]
+    classes = [item[name].attrs.get("MATLAB_class") for name in item]
+    if (
+        children and all(references) and all(array_class is None for array_class in classes)
+    ):  # a cell array has its class
+        length = min(len(array) for array in children.values())
+        return [{name: array[i] for name, array in children.items()} for i in range(length)]
+    return children
+
+
+def read_uff(path: Path) -> dict[str, Any]:
+    """The datasets 58 of a universal file, and the codes of its units."""
+    import pyuff
+
+    file: Any = pyuff.UFF(str(path))
+    kinds = list(file.get_set_types())
+    sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+    return {"sets": sets, "units": [file.read_sets(i)["units_code"] for i, kind in enumerate(kinds) if kind == 164]}
+
+
+def read_lvm(path: Path) -> dict[str, Any]:
+    """The content of a measurement text of LabVIEW."""
+    import lvm_read
+
+    return {str(key): part for key, part in lvm_read.read(str(path), read_from_pickle=False, dump_file=False).items()}
+
+
+def read_tdms(path: Path) -> dict[str, Any]:
+    """The channels of a TDMS file, and what the library said: a file that ends early is read as far as it goes."""
+    import nptdms
+
+    heard, logger = _Heard(), logging.getLogger("nptdms")
+    logger.handlers = [heard]
+    channels = [
+        {
+            "group": group.name,
+            "name": item.name,
+            "values": values if (values := np.asarray(item[:])).dtype.kind in "buif" else None,
+            "step": float(item.properties.get("wf_increment", 0)),
+            "start": float(item.properties.get("wf_start_offset", 0.0)),
+            "unit": str(item.properties.get("unit_string") or item.properties.get("NI_UnitDescription") or ""),
+        }
+        for group in nptdms.TdmsFile.read(path).groups()
+        for item in group.channels()
+    ]
+    return {"channels": channels, "heard": heard.lines}
+
+
+class _Heard(logging.Handler):
+    """What a library logs, kept as lines."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.lines: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Keep a line."""
+        self.lines.append(record.getMessage()[:120])
+
+
+READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
+    "MAT": read_mat,
+    "UFF": read_uff,
+    "LVM": read_lvm,
+    "TDMS": read_tdms,
+}
+
+
+def _plain(node: Any) -> Any:
+    """The same of plain types: what a library derives from them would have to be trusted when it is read again."""
+    if isinstance(node, dict):
+        return {str(key): _plain(value) for key, value in node.items()}
+    if isinstance(node, list | tuple):
+        return [_plain(value) for value in node]
+    if isinstance(node, np.ndarray | np.generic):
+        values = np.asarray(node)
+        return np.ascontiguousarray(values) if values.dtype.kind in "buifc" else str(node)
+    return node if node is None or type(node) in (bool, int, float, str) else str(node)
+
+
+def main(kind: str, path: Path, memory: int) -> None:
+    """Read a file within so much memory [B]."""
+    if memory and sys.platform != "win32":
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+    content, message = None, ""
+    try:
+        content = _plain(READERS[kind](path))
+    except MemoryError:
+        message = "it needs too much memory"
+    except RecursionError:
+        message = "it is nested too deeply"
+    except Exception as error:  # the libraries let through whatever a broken file makes them stumble over
+        message = str(error)[:500] or type(error).__name__
+    pickle.dump((content, message), sys.stdout.buffer, protocol=5)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))

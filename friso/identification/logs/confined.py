@@ -1,0 +1,66 @@
+"""Binary logs, read in a process of their own: a damaged or hostile file may crash or exhaust the library of its
+format, which is then an error of that file and of nothing else."""
+
+from __future__ import annotations
+
+import io
+import os
+import pickle
+import subprocess
+import sys
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from friso.errors import LogError
+from friso.identification.logs import binary
+from friso.system import LIMITS_MEMORY
+
+MEMORY, PER_BYTE = 1 << 30, 12
+"""Memory [B] that reading may take, besides a multiple of the size of the file."""
+
+SECONDS, BYTES_A_SECOND = 10.0, 5e6
+"""Time [s] that reading may take, besides that for the size of the file."""
+
+
+def content(kind: str, path: Path) -> dict[str, Any]:
+    """What a file of a `kind` of `friso.identification.logs.binary` holds. Raises LogError where it cannot be read
+    within bounds of time, and of memory where the system keeps such (`LIMITS_MEMORY`)."""
+    status = path.stat()
+    return _content(kind, path.resolve(), status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
+def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
+    memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
+    command = [sys.executable, "-P", binary.__file__, kind, str(path), str(memory)]
+    environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
+    seconds = SECONDS + size / BYTES_A_SECOND
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=seconds, check=False, env=environ)
+    except subprocess.TimeoutExpired:
+        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path) from None
+    try:
+        read, message = _PlainUnpickler(io.BytesIO(done.stdout)).load()
+    except Exception:  # whatever is wrong with what came, it is not what the reader writes
+        errors = done.stderr.decode(errors="replace")
+        why = "it needs too much memory" if "MemoryError" in errors else "it makes the library crash"
+        raise broken(kind, why, path) from None
+    if read is None:
+        raise broken(kind, message, path)
+    return read
+
+
+class _PlainUnpickler(pickle.Unpickler):
+    """Reads plain types and NumPy arrays, and refuses anything else."""
+
+    def find_class(self, module: str, name: str) -> Any:
+        """What an array of numbers is made of."""
+        if module.partition(".")[0] == "numpy" and name in ("ndarray", "dtype", "_reconstruct", "_frombuffer"):
+            return super().find_class(module, name)
+        raise pickle.UnpicklingError(f"{module}.{name}")
+
+
+def broken(kind: str, why: str, path: Path) -> LogError:
+    """The error for a file that cannot be read."""
+    return LogError("log", f"a {kind} file that cannot be read ({why})", f"a complete {kind} file", "", str(path))

@@ -1,0 +1,53 @@
+"""What a format of logs declares of itself, and the registry of these."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from friso.errors import LogError
+from friso.identification.logs.channel import ChannelTable
+from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.logs.sniff import decoded_head
+from friso.registry import Registry
+
+
+@dataclass(frozen=True)
+class FileHead:
+    """What a file is recognised by: where it lies, and its first 520 bytes."""
+
+    path: Path
+    start: bytes
+
+    @cached_property
+    def lines(self) -> list[str]:
+        """Its first lines; none where it is no text."""
+        try:
+            return decoded_head(self.path)[1]
+        except LogError:
+            return []
+
+
+@dataclass(frozen=True)
+class LogFormat:
+    """A format of logs: its `title`, whether a file is one, and the reader of its channels, which raises LogError.
+
+    Formats are asked by rank: 0 for those recognised by their first bytes, 1 for those recognised by their first lines,
+    2 for any text. `units`: it can hold units; `times`: its channels come with their instants, which no column of it
+    has to tell. A file that `holds_response` holds a frequency response instead of signals over time, which
+    `read_response` reads."""
+
+    title: str
+    recognise: Callable[[FileHead], bool]
+    read: Callable[[Path], ChannelTable]
+    rank: int = 0
+    units: bool = True
+    times: bool = True
+    holds_response: Callable[[Path], bool] = lambda path: False
+    read_response: Callable[[Path], MeasuredResponse] | None = None
+
+
+FORMATS: Registry[LogFormat] = Registry("friso.identification.logs.formats", "FORMAT")
+"""Every module of `friso/identification/logs/formats/` declares one."""

@@ -1,0 +1,60 @@
+"""LVM, the measurement text of LabVIEW."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.format import FileHead, LogFormat
+from friso.identification.logs.libraries import content_by, named_table
+from friso.identification.logs.units import split_heading
+
+
+def read_lvm(path: Path) -> ChannelTable:
+    """LabVIEW measurement text. Raises LogError."""
+    file = content_by("lvm_read", "LVM", path)
+    segments = range(int(file["Segments"]))
+    channels = [channel for k in segments for channel in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
+    return named_table("LVM", channels, [], path)
+
+
+def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[Channel]:
+    """The channels of a segment: values over an X column in seconds (the first, or one per channel). What the header
+    states of a channel stands above its column, the first column being that of the keys."""
+    names, data = segment["Channel names"], np.asarray(segment["data"], dtype=float)
+    each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"
+    above = 0 if none else -1  # the reader leaves out the empty first column of files without X values
+    out, time = [], None
+    for i, name in enumerate(names):
+        if name == "Comment" or i >= data.shape[1]:
+            continue
+        if not none and (i == 0 or (each_own and name == "X_Value")):
+            time = data[:, i]
+            continue
+        start, step, unit_above = (_above(segment, key, i + above) for key in ("X0", "Delta_X", "Y_Unit_Label"))
+        clock = time if time is not None else _even(start, step, len(data))
+        heading, unit = split_heading(name)
+        present = ~np.isnan(data[:, i])
+        times = None if clock is None else clock[present]
+        out.append(Channel(heading, unit_above or unit, data[present, i], times, source))
+    return out
+
+
+def _above(segment: dict[str, Any], key: str, column: int) -> Any:
+    """What the header says of a column, None for nothing."""
+    row = segment.get(key, [])
+    return row[column] if 0 <= column < len(row) else None
+
+
+def _even(start: float | None, step: float | None, n: int) -> np.ndarray | None:
+    return start + step * np.arange(n) if start is not None and step is not None and step > 0 else None
+
+
+def _recognise(head: FileHead) -> bool:
+    return head.start.lstrip(b"\xef\xbb\xbf").startswith(b"LabVIEW Measurement")
+
+
+FORMAT = LogFormat("LVM", _recognise, read_lvm)

@@ -1,0 +1,116 @@
+"""What a log does not tell, all of it at once: channels for roles, units, the sample time; and the options that do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from friso.errors import InputError, LogError
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.log import ROLES
+from friso.identification.logs.mapping import option
+from friso.identification.logs.roles import AssignedRole, Proposal, listing, role_of, words
+from friso.identification.logs.signals import Notes, Reading, instants, no_time, unit_gap
+from friso.identification.logs.units import OTHERS, factor
+from friso.quantities import quoted
+
+OPTIONAL = ("velocity", "acceleration")
+"""Roles that no analysis needs: where several channels could be one, none is."""
+
+_INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "fuivmk", "disturbance": "d"}
+"""Letters with which channels of a role often begin, to choose the example of a message."""
+
+
+class GapsError(LogError):
+    """What logs do not tell: the errors of which any one would stop the reading, each with the option that mends it as
+    its example; and the channels `proposed` for roles, by role."""
+
+    def __init__(self, gaps: Sequence[LogError], proposed: Mapping[str, str] | None = None) -> None:
+        self.gaps, self.proposed = tuple(gaps), dict(proposed or {})
+        (first, *more) = self.gaps
+        if not more:
+            super().__init__(first.key, first.actual, first.expected, first.example, first.origin)
+            return
+        sentences = [f"{gap.key}: {gap.expected}; given: {gap.actual}" for gap in self.gaps]
+        origins = dict.fromkeys(gap.origin for gap in self.gaps)
+        lines = [
+            sentence if len(origins) == 1 else f"{gap.origin}: {sentence}"
+            for gap, sentence in zip(self.gaps, sentences, strict=True)
+        ]
+        super().__init__(
+            "", f"a log that leaves {len(lines)} things open", "".join(f"\n    {line}" for line in lines),
+            " ".join(self.options), ", ".join(origins),
+        )  # fmt: skip
+
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The options that tell all of it, each once, as a shell takes them."""
+        return tuple(dict.fromkeys(gap.example for gap in self.gaps if gap.example))
+
+
+def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> None:
+    """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
+    table, origin = reading.table, reading.origin
+    chosen = {role: choice for role, choice in proposal.chosen.items() if role in (*needed, "force")}
+    gaps: list[LogError] = []
+    for role, channels in proposal.rivals.items():
+        if role in OPTIONAL and role not in needed:
+            continue
+        names = " and ".join(quoted(channel.name) for channel in channels)
+        example = option("--map", role, channels[0].name)
+        gaps.append(LogError(role, f"{len(channels)} candidates: {names}", "one channel", example, origin))
+        if role in needed:
+            chosen[role] = AssignedRole(role, channels[0], "", True)
+    for role in [role for role in needed if role not in chosen]:
+        likely = likeliest(role, table, [choice.channel for choice in (*proposal.chosen.values(), *chosen.values())])
+        example = option("--map", role, likely.name) if likely else ""
+        gaps.append(LogError(role, "no channel whose name suggests it", listing(table), example, origin))
+        if likely:
+            chosen[role] = AssignedRole(role, likely, "", True)
+    gaps += _of_time(reading, proposal, [chosen[role] for role in needed if role in chosen])
+    units = {role: unit_gap(choice, reading) for role, choice in chosen.items()}
+    reference = proposal.chosen.get("reference")
+    if units.get("position") and reference is not None and not reference.channel.unit and "reference" not in units:
+        units["reference"] = unit_gap(reference, reading)
+    gaps += [gap for gap in units.values() if gap is not None]
+    if gaps:
+        proposed = {role: choice.channel.name for role, choice in chosen.items() if role not in proposal.chosen}
+        raise GapsError(gaps, proposed)
+
+
+def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Channel | None:
+    """The channel that fits a role best by unit and first letter, of those that change and have no other role; None
+    without any."""
+    used = {id(channel) for channel in taken}
+    free = [
+        channel
+        for channel in table.channels
+        if id(channel) not in used and (role_of(channel.name) or ("",))[0] in ("", role)
+    ]
+    fits = [(channel, _fit(role, channel)) for channel in free]
+    return max(fits, key=lambda pair: pair[1])[0] if fits else None
+
+
+def _fit(role: str, channel: Channel) -> tuple[bool, int, bool]:
+    """How well a channel fits a role: whether it changes, its unit, its first letter."""
+    finite = channel.values[np.isfinite(channel.values)]
+    changes = bool(finite.size and np.ptp(finite) > 0)
+    kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))
+    unit = 1 if not channel.unit else 2 if any(factor(channel.unit, kind) is not None for kind in kinds) else 0
+    first = next(iter(words(channel.name)), " ")[0]
+    return changes, unit, first in _INITIALS.get(role, "")
+
+
+def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
+    """Whether channels have instants."""
+    if "time" in proposal.rivals:
+        return []
+    for choice in choices:
+        try:
+            time = instants(choice, proposal.chosen.get("time"), reading, Notes())
+        except InputError as error:
+            return [LogError.of(error)]
+        if time is None:
+            return [no_time(choice.channel, reading)]
+    return []

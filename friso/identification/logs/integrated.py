@@ -1,0 +1,48 @@
+"""The position of a log that holds the velocity alone: its integral."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.roles import Proposal, role_of
+from friso.identification.logs.units import factor
+
+NOTE = (
+    "position: the integral of the velocity, since no channel holds one; where the log begins counts as 0, after a gap "
+    "as well, an offset of the velocity becomes a drift, and the first micrometres of a motion are not resolved"
+)
+"""What to know of such a position."""
+
+LENGTHS = ("m", "rad")
+"""Units of which that of a position is."""
+
+
+def is_needed(table: ChannelTable, proposal: Proposal, needed: Sequence[str]) -> bool:
+    """Whether the position that is needed has to be the integral of the velocity: no channel has that role or could
+    have it, unless the user assigned the velocity and no position."""
+    velocity = proposal.chosen.get("velocity")
+    if velocity is None or "position" not in needed or "position" in {*proposal.chosen, *proposal.rivals}:
+        return False
+    taken = {id(choice.channel) for choice in proposal.chosen.values()}
+    others = [channel for channel in table.channels if id(channel) not in taken]
+    return velocity.by_user or not any(map(_may_be_a_position, others))
+
+
+def _may_be_a_position(channel: Channel) -> bool:
+    """Whether a channel without a role has the unit of a position, or none at all, and changes."""
+    finite = channel.values[np.isfinite(channel.values)]
+    if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None:
+        return False
+    return not channel.unit or any(factor(channel.unit, unit) is not None for unit in LENGTHS)
+
+
+def integrated(velocity: np.ndarray, sample_time: float, segments: Sequence[slice]) -> np.ndarray:
+    """The integral [m] of a velocity [m/s], shape (n,), over each of the segments, by the trapezoidal rule."""
+    position = np.zeros(len(velocity))
+    for part in segments:
+        position[part] = cumulative_trapezoid(velocity[part], dx=sample_time, initial=0.0)
+    return position

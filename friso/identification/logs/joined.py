@@ -1,0 +1,53 @@
+"""Several logs of one event each as one log with gaps between them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.identification.logs.log import Log
+
+SAME = 1e-3
+"""Share by which the sample times of logs that are joined may differ."""
+
+
+def joinable(one: Log, other: Log) -> bool:
+    """Whether two logs have the same roles in the same units, sample time and set-up."""
+    same = one.signals.keys() == other.signals.keys() and dict(one.units) == dict(other.units)
+    return same and dict(one.setup) == dict(other.setup) and abs(one.sample_time / other.sample_time - 1) <= SAME
+
+
+def joined(logs: Sequence[Log]) -> Log:
+    """Logs that are `joinable` as one, each after a gap of a second behind the one before."""
+    first = logs[0]
+    times, segments, start, end = [], [], 0, 0.0
+    for log in logs:
+        times.append(log.time - log.time[0] + end)
+        segments += [slice(part.start + start, part.stop + start) for part in log.segments]
+        start += log.time.size
+        end = float(times[-1][-1]) + 1.0
+    return Log(
+        ", ".join(log.name for log in logs),
+        np.concatenate(times),
+        first.sample_time,
+        {role: np.concatenate([log[role] for log in logs]) for role in first.signals},
+        tuple(segments),
+        first.units,
+        first.scalars,
+        tuple(dict.fromkeys(line for log in logs for line in log.read)),
+        tuple(dict.fromkeys(line for log in logs for line in log.warnings)),
+        first.setup,
+    )
+
+
+def together(logs: Sequence[Log]) -> list[Log]:
+    """The logs, those that are alike joined."""
+    groups: list[list[Log]] = []
+    for log in logs:
+        alike = next((group for group in groups if joinable(group[0], log)), None)
+        if alike is None:
+            groups.append([log])
+        else:
+            alike.append(log)
+    return [group[0] if len(group) == 1 else joined(group) for group in groups]

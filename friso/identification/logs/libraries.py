@@ -1,0 +1,35 @@
+"""Formats that are read by libraries installed on demand: what their readers share."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from friso.errors import LogError
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.confined import content
+from friso.identification.logs.text import unique
+
+
+def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
+    """What a library reads from a file of a kind. Raises LogError, which says how to install the library if it is not
+    there."""
+    try:
+        there = find_spec(library) is not None
+    except ValueError:
+        there = False
+    if not there:
+        actual = f"a {kind} file, and the library {library} is not installed"
+        raise LogError("log", actual, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
+    return content(kind, path)
+
+
+def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
+    """The channels under names of their own. Raises LogError for none."""
+    filled = [channel for channel in channels if channel.values.size]
+    if not filled:
+        raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
+    names = unique([channel.name for channel in filled])
+    renamed = tuple(Channel(name, c.unit, c.values, c.time, c.source) for name, c in zip(names, filled, strict=True))
+    return ChannelTable(renamed, {}, (f"format: {kind}", f"{len(renamed)} channels", *notes))

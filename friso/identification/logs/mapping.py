@@ -1,0 +1,166 @@
+"""What the user said of a log: which channel is what, in which unit; kept in a file beside the log."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import stat
+from collections.abc import Iterable
+from collections.abc import Mapping as Table
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from friso.errors import InputError, LogError
+from friso.identification.logs.log import ROLES
+from friso.quantities import Bound, Quantity, as_toml, quoted
+from friso.stage.files import parsed, text_of
+
+SUFFIX = ".friso.toml"
+MAPPABLE = ("time", *ROLES)
+"""What a channel can be mapped to."""
+TABLES = ("roles", "units", "scales", "setup")
+_INTERVALS = Bound("1 ns to 1 h", lambda value: (value >= 1e-9) & (value <= 3600))
+_SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """Roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time [s]
+    where the file states none, and the kind of experiment where the user named it; and how the stage was set up for
+    this log, otherwise than in its file ({dotted key: "8 mm"})."""
+
+    roles: Table[str, str] = field(default_factory=dict)
+    units: Table[str, str] = field(default_factory=dict)
+    scales: Table[str, str] = field(default_factory=dict)
+    sample_time: float | None = None
+    experiment: str | None = None
+    setup: Table[str, str] = field(default_factory=dict)
+
+    def over(self, older: Mapping) -> Mapping:
+        """This mapping, and what an older one says where this one is silent."""
+        return Mapping(
+            {**older.roles, **self.roles},
+            {**older.units, **self.units},
+            {**older.scales, **self.scales},
+            older.sample_time if self.sample_time is None else self.sample_time,
+            older.experiment if self.experiment is None else self.experiment,
+            {**older.setup, **self.setup},
+        )
+
+
+def from_options(
+    maps: Iterable[str] = (),
+    units: Iterable[str] = (),
+    scales: Iterable[str] = (),
+    dt: str | None = None,
+    experiment: str | None = None,
+) -> Mapping:
+    """From the texts of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`.
+    Raises LogError."""
+    roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
+    channel_units = dict(_pair(text, "--unit", 'Axis1.ActPos="mm"', last=True) for text in units)
+    factors = dict(_pair(text, "--scale", 'force="35.1507 N/V"', tuple(ROLES)) for text in scales)
+    try:
+        sample_time = None if dt is None else float(_SAMPLE_TIME.read(dt))
+    except InputError as error:
+        raise error.found_in("--dt") from None
+    return Mapping(roles, channel_units, factors, sample_time, experiment)
+
+
+def _pair(
+    text: str, option: str, example: str, left: tuple[str, ...] | None = None, last: bool = False
+) -> tuple[str, str]:
+    """What stands left and right of the first (or last) equals sign. Raises LogError."""
+    first, sign, second = text.rpartition("=") if last else text.partition("=")
+    first, second = first.strip(), second.strip().strip('"')
+    if not sign or not first or not second:
+        raise LogError(option, quoted(text), "two texts separated by =", f"{option} {example}")
+    if left is not None and first not in left:
+        raise LogError(option, quoted(first), f"one of {', '.join(left)}", f"{option} {example}")
+    return first, second
+
+
+def option(name: str, left: str, right: str) -> str:
+    """An option LEFT=RIGHT as a shell takes it."""
+    text = f"{left}={right}"
+    if re.fullmatch(r"[\w.,:/=@%+-]+", text):
+        return f"{name} {text}"
+    if set('"$`\\!') & set(text):
+        return f"{name} {shlex.quote(text)}"
+    return f'{name} {left}="{right}"' if re.fullmatch(r"\w+", left) else f'{name} "{text}"'
+
+
+def sidecar(log: Path, folder: Path | None = None) -> Path:
+    """Where the mapping of a log is kept: beside it, or in the folder given."""
+    return (log.parent if folder is None else folder) / f"{log.name}{SUFFIX}"
+
+
+def mapping_text(mapping: Mapping) -> str:
+    """The mapping as it is kept beside a log."""
+    lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
+    if mapping.sample_time is not None:
+        lines.append(f'sample_time = "{mapping.sample_time!r} s"')
+    if mapping.experiment is not None:
+        lines.append(f"experiment = {as_toml(mapping.experiment)}")
+    for name in TABLES:
+        table = getattr(mapping, name)
+        rows = [f"{as_toml(key)} = {as_toml(value)}" for key, value in table.items()]
+        lines += ["", f"[{name}]", *rows] if rows else []
+    return "\n".join(lines) + "\n"
+
+
+def place_for(log: Path, folder: Path) -> Path:
+    """Where the mapping of a log can be kept: beside it, or in the folder where that cannot be written. A folder that
+    is write-protected stays so for a superuser."""
+    beside = sidecar(log)
+    writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
+    return beside if writable else sidecar(log, folder)
+
+
+def load(log: Path, folder: Path | None = None) -> Mapping | None:
+    """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises LogError
+    for a file that is not one."""
+    for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
+        if place.is_file():
+            return _parsed(place)
+    return None
+
+
+_KEPT = "a mapping kept by friso; delete the file to map again"
+
+
+def _parsed(place: Path) -> Mapping:
+    """The mapping in a file. Raises LogError."""
+    try:
+        document = parsed(text_of(place, _KEPT), _KEPT)
+    except InputError as error:
+        raise LogError("", error.actual, _KEPT, "", str(place)) from None
+    experiment = document.get("experiment")
+    if not isinstance(experiment, str | None):
+        raise LogError("experiment", quoted(experiment), "the name of a kind of experiment", "", str(place))
+    names = {entry.name for entry in fields(Mapping)}
+    for key, value in document.items():
+        if key not in names or (key in TABLES) != isinstance(value, dict):
+            raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
+    texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
+    try:
+        options = from_options(dt=document.get("sample_time"), experiment=experiment)
+        for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
+            for key in texts[group]:
+                if key not in allowed:
+                    raise LogError(group, quoted(key), f"one of {', '.join(allowed)}")
+    except InputError as error:
+        raise error.found_in(str(place)) from None
+    return replace(options, **texts)
+
+
+def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
+    """A table of texts; the set-up may have plain numbers and truths as well. Raises LogError."""
+    if key == "setup":
+        table = {name: as_toml(value) if isinstance(value, int | float) else value for name, value in table.items()}
+    for name, value in table.items():
+        if not isinstance(value, str):
+            raise LogError(f"{key}.{name}", quoted(value), "a text", "", str(place))
+    return table

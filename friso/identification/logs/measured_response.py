@@ -1,0 +1,137 @@
+"""Frequency responses as somebody else measured them, and how columns of a table are one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from friso.errors import LogError
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.roles import words
+from friso.identification.logs.units import factor, spelled
+from friso.quantities import Quantity, any_sign
+
+_KEYS = {
+    "frequency": frozenset(["f", "freq", "frequency", "frequenz", "w", "omega"]),
+    "magnitude": frozenset(["mag", "magnitude", "gain", "amplitude", "amp", "abs", "modulus", "db"]),
+    "phase": frozenset(["phase", "phi", "ph", "arg", "angle"]),
+    "real": frozenset(["re", "real"]),
+    "imaginary": frozenset(["im", "imag", "imaginary"]),
+    "coherence": frozenset(["coh", "coherence"]),
+}
+"""Words in a heading that tell what a column is."""
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """A response at rising frequencies [Hz]: complex values, and coherence or None, all of shape (n,). `unit` is what
+    the values are in, SI where the file states a unit, "" where it states none."""
+
+    frequency: np.ndarray
+    response: np.ndarray
+    coherence: np.ndarray | None
+    name: str
+    read: tuple[str, ...] = ()
+    unit: str = ""
+
+
+def kind_of(name: str) -> str | None:
+    """What a heading says that its column is; None for nothing of a response."""
+    parts = set(words(name))
+    order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
+    return next((kind for kind in order if parts & _KEYS[kind]), None)
+
+
+def is_response(names: Iterable[str]) -> bool:
+    """Whether headings hold a frequency with magnitude and phase, or with real and imaginary part."""
+    kinds = {kind_of(name) for name in names}
+    return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
+
+
+def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
+    """The response in the columns of a table. Raises LogError."""
+    by_kind: dict[str, list[Channel]] = {}
+    for channel in table.channels:
+        if kind_of(channel.name) is not None:
+            by_kind.setdefault(str(kind_of(channel.name)), []).append(channel)
+    for kind, channels in by_kind.items():
+        if len(channels) > 1:
+            names = ", ".join(channel.name for channel in channels)
+            raise LogError(kind, f"{len(channels)} columns: {names}", "one column", "", str(path))
+    if not is_response(channel.name for channel in table.channels):
+        names = ", ".join(channel.name for channel in table.channels)
+        expected = "frequency, and magnitude and phase or real and imaginary part"
+        raise LogError("log", names, expected, "f [Hz];magnitude [dB];phase [deg]", str(path))
+    columns = {kind: channels[0] for kind, channels in by_kind.items()}
+    if len({channel.values.size for channel in columns.values()}) > 1:
+        actual = ", ".join(f"{channel.values.size} of {channel.name}" for channel in columns.values())
+        raise LogError("log", f"columns of different lengths: {actual}", "a value in every cell", "", str(path))
+    frequency = _frequency(columns["frequency"], path)
+    if {"real", "imaginary"} <= set(columns):
+        response = columns["real"].values + 1j * columns["imaginary"].values
+        scale, unit, quantities = response_unit(columns["real"].unit)
+        quantities = f"real and imaginary part {quantities}"
+    else:
+        response, scale, unit, quantities = _polar(columns["magnitude"], columns["phase"], path)
+    coherence = columns["coherence"].values if "coherence" in columns else None
+    read = (*table.read, quantities, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
+    with np.errstate(all="ignore"):  # what is no number is told below
+        response = response * scale
+    return checked(MeasuredResponse(frequency, response, coherence, path.stem, read, unit), path)
+
+
+def _frequency(column: Channel, path: Path) -> np.ndarray:
+    """Frequencies in Hz. Raises LogError for a column without a unit."""
+    value = factor(column.unit, "Hz") if column.unit else None
+    if value is None:
+        actual = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
+        raise LogError("frequency", actual, "Hz or rad/s in the heading", "f [Hz]", str(path))
+    return column.values * value
+
+
+def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
+    """Response from magnitude and phase; its scale, unit and words. Raises LogError for a phase without a unit."""
+    turn = factor(phase.unit, "rad") if phase.unit else None
+    if turn is None:
+        raise LogError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
+    angle = np.exp(1j * turn * phase.values)
+    unit = spelled(magnitude.unit)
+    if unit.lower().startswith("db") or "db" in words(magnitude.name):
+        with np.errstate(over="ignore"):
+            return 10 ** (magnitude.values / 20) * angle, 1.0, "", f"magnitude in dB, phase in {phase.unit}"
+    scale, si, unit_in_words = response_unit(magnitude.unit)
+    return magnitude.values * angle, scale, si, f"magnitude {unit_in_words}, phase in {phase.unit}"
+
+
+def response_unit(text: str) -> tuple[float, str, str]:
+    """Factor to SI, the SI unit, and both in words; a unit of a kind not known here stays as it is."""
+    text = spelled(text)
+    for si in ("m/N", "m/s/N", "m/s^2/N", "m/V", "m/A", "m/s^2/A", "m/s^2/V", "rad/s^2/A", "rad/A", "rad/s/A", "rad/V",
+               "rad/(N*m)", "m"):  # fmt: skip
+        if text and factor(text, si) is not None:
+            return Quantity(si, any_sign, "").factor(text), si, f"in {text}"
+    return 1.0, text, f"in {text}" if text else "without a unit"
+
+
+def checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
+    """The response without its line at 0 Hz, checked. Raises LogError for too few or falling frequencies and NaN."""
+    positive = measured.frequency > 0
+    if not positive.all():
+        arrays = [a if a is None else a[positive] for a in (measured.frequency, measured.response, measured.coherence)]
+        read = (*measured.read, f"left out: {np.count_nonzero(~positive)} lines at 0 Hz or below")
+        measured = replace(measured, frequency=arrays[0], response=arrays[1], coherence=arrays[2], read=read)
+    frequency = measured.frequency
+    if frequency.size < 3:
+        raise LogError("log", f"{frequency.size} frequencies", "at least 3", "", str(path))
+    for name, values in (("frequency", frequency), ("response", measured.response), ("coherence", measured.coherence)):
+        if values is not None and not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values))[0]) + 1
+            raise LogError(name, f"no number in row {row}", "finite numbers in every row", "", str(path))
+    falling = np.flatnonzero(np.diff(frequency) <= 0)
+    if falling.size:
+        actual = f"{frequency[falling[0] + 1]:g} Hz after {frequency[falling[0]]:g} Hz"
+        raise LogError("frequency", actual, "rising frequencies", "", str(path))
+    return measured

@@ -1,0 +1,97 @@
+"""What the lines above a table tell of it: the sampling interval, and the units of its columns."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from friso.identification.logs.units import factor, is_unit, split_heading
+
+RATES = frozenset(
+    {"fs", "fsample", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "abtastrate",
+     "abtastfrequenz"}
+)  # fmt: skip
+STEPS = frozenset(
+    {"dt", "ts", "tsample", "sampletime", "samplingtime", "sampleinterval", "samplinginterval", "sampleperiod",
+     "samplingperiod", "interval", "timestep", "timeincrement", "deltat", "abtastzeit", "abtastintervall"}
+)  # fmt: skip
+"""What a sample rate and a sample time are called, in small letters without what stands between them."""
+_PAIR = re.compile(r"[\s#%*/\"]*(?P<key>[^:=;,\t\"]+?)\"?\s*[:=;,\t]\s*(?P<value>\S.*?)[\s;,\"]*")
+_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
+"""Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
+_OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class Preamble:
+    """The sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by the
+    name of the column; and what was read, a line each."""
+
+    interval: float | None = None
+    scalars: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    read: tuple[str, ...] = ()
+
+
+def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
+    """What the lines above a table with columns of these names tell. Intervals that contradict each other are none."""
+    lines = [line for line in lines if line.strip()]
+    pairs = [match for line in lines if (match := _PAIR.fullmatch(line))]
+    units = _row_of_units(lines, names, delimiter) or _units_by_name(pairs, names)
+    read = [f"units from the lines above the table: {', '.join(units.values())}"] if units else []
+    intervals, scalars = {}, {}
+    for pair in pairs:
+        name, unit = split_heading(pair["key"].strip())
+        key = re.sub(r"[\W\d_]+", "", name.lower())
+        amount = _AMOUNT.fullmatch(pair["value"]) if key in RATES | STEPS else None
+        if amount is None:
+            continue
+        if _GROUPED.fullmatch(amount["number"]):
+            continue
+        number = float(amount["number"].replace(",", "."))
+        seconds = _seconds(number, amount["unit"].strip("[]()") or unit)
+        if seconds is not None:
+            intervals[pair.group().strip()] = seconds
+        else:
+            scalars[name] = number
+    if intervals and max(intervals.values()) <= min(intervals.values()) * (1 + 1e-9):
+        line, interval = next(iter(intervals.items()))
+        return Preamble(interval, scalars, units, (*read, f"sample time {interval:g} s, from the line {line!r}"))
+    return Preamble(None, scalars, units, tuple(read))
+
+
+def _seconds(number: float, unit: str) -> float | None:
+    """A sample time or rate in seconds; None without a unit of either, or for what is not positive."""
+    for si, power in (("s", 1), ("Hz", -1)):
+        if number > 0 and unit and (size := factor(unit, si)) is not None:
+            return (number * size) ** power
+    return None
+
+
+def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) -> dict[str, str]:
+    """The units of columns where a line lists them, with or without a word for units in front."""
+    for line in lines:
+        pair = _PAIR.fullmatch(line)
+        listed = pair is not None and pair["key"].strip().lower() in ("unit", "units", "einheit", "einheiten")
+        cells = re.split(r"[;,\t]|\s+", pair["value"]) if pair and listed else line.lstrip("#% ").split(delimiter)
+        cells = [cell for cell in cells if cell] if listed and len(cells) != len(names) else cells
+        units = [cell.strip(' []()"') for cell in cells]
+        stated = [unit for unit in units if unit and unit != "-"]
+        if len(units) == len(names) and stated and all(is_unit(unit) for unit in stated):
+            return {name: unit for name, unit in zip(names, units, strict=True) if unit and unit != "-"}
+    return {}
+
+
+def _units_by_name(pairs: Iterable[re.Match[str]], names: Sequence[str]) -> dict[str, str]:
+    """The units of columns where lines tell them one by one: "position unit: mm", or "position: mm"."""
+    plain = {name.lower(): name for name in names if name}
+    units = {}
+    for pair in pairs:
+        key, unit = pair["key"].strip(), pair["value"].strip("[]() ")
+        of_unit = _OF_UNIT.fullmatch(key)
+        column = (of_unit["after"] or of_unit["before"]) if of_unit else key
+        if column.lower() in plain and is_unit(unit):
+            units[plain[column.lower()]] = unit
+    return units

@@ -1,0 +1,62 @@
+"""Reading a file by what is in it, not by its name: every format ends in the same table of channels."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from friso.errors import LogError
+from friso.identification.logs.channel import ChannelTable
+from friso.identification.logs.format import FORMATS, FileHead
+from friso.identification.logs.measured_response import MeasuredResponse
+
+MOST_BYTES = 2 << 30
+"""Largest file that is read, 2 GiB: all its channels are held in memory at once, about as large again."""
+
+
+def file_format(path: Path) -> str:
+    """The format of a file by its content, a name of `FORMATS`.
+
+    Raises LogError for what cannot be read: missing, a folder, empty, too large, no text and no known format.
+    """
+    try:
+        if path.is_dir():
+            raise LogError("log", "a folder", "a file", "friso identify log.csv", str(path))
+        if path.exists() and not path.is_file():  # a device or a pipe may never end, or never begin
+            raise LogError("log", "a device, pipe or socket", "a file", "friso identify log.csv", str(path))
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = FileHead(path, file.read(520))
+    except OSError as error:
+        raise LogError("log", f"a file that cannot be opened ({error.strerror})", "a log", "", str(path)) from None
+    if size == 0:
+        raise LogError("log", "an empty file (0 bytes)", "a heading and rows of numbers", "", str(path))
+    if size > MOST_BYTES:
+        expected = f"at most {MOST_BYTES / 2**30:.3g} GiB: cut the log, or save only the channels needed"
+        raise LogError("log", f"a file of {size / 2**30:.3g} GiB", expected, "", str(path))
+    for name in sorted(FORMATS, key=lambda name: FORMATS[name].rank):
+        if FORMATS[name].recognise(head):
+            return name
+    titles = ", ".join(FORMATS[name].title for name in FORMATS)
+    raise LogError("log", f"{size} bytes that are neither text nor a known format", titles, "", str(path))
+
+
+def read_table(path: Path | str) -> ChannelTable:
+    """The channels of a log of any format. Raises LogError."""
+    path = Path(path)
+    return FORMATS[file_format(path)].read(path)
+
+
+def is_frequency_response(path: Path | str) -> bool:
+    """Whether a file holds a frequency response instead of signals over time. Raises LogError as `file_format`."""
+    path = Path(path)
+    return FORMATS[file_format(path)].holds_response(path)
+
+
+def read_frequency_response(path: Path | str) -> MeasuredResponse:
+    """The frequency response in a file of a format that can hold one. Raises LogError."""
+    path = Path(path)
+    form = FORMATS[file_format(path)]
+    if form.read_response is None:
+        expected = "a format that holds frequency responses"
+        raise LogError("log", f"a file of format {form.title}", expected, "", str(path))
+    return form.read_response(path)

@@ -1,0 +1,168 @@
+"""Which channel is what: as the user says, else proposed by name with a reason, never guessed between two."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping as Names
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from friso.errors import LogError
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.units import split_heading
+from friso.quantities import quoted
+
+_SET = frozenset(
+    ["ref", "reference", "set", "setpoint", "desired", "target", "cmd", "command", "commanded", "demand", "soll"]
+)
+_NOT_MEASURED = frozenset(
+    ["err", "error", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable"]
+)
+_CART = frozenset(["cart", "carriage", "slider"])
+_RELATIVE = frozenset(["rel", "relative"])
+_KEYS = {
+    "time": frozenset(["t", "time", "timestamp", "tout", "zeit", "tempo", "temps", "tiempo", "tijd"]),
+    "position": frozenset(
+        [
+            "pos",
+            "position",
+            "lage",
+            "enc",
+            "encoder",
+            "displacement",
+            "angle",
+            "winkel",
+            "angulo",
+            "angolo",
+            "posizione",
+            "posicion",
+        ]
+    ),
+    "velocity": frozenset(["vel", "velo", "velocity", "speed", "geschwindigkeit", "vitesse", "velocidad"]),
+    "acceleration": frozenset(["acc", "accel", "acceleration"]),
+    "force": frozenset(["force", "torque", "current", "iq", "kraft", "strom", "drehmoment", "forza", "fuerza"]),
+    "disturbance": frozenset(["disturbance", "injected", "injection"]),
+}
+"""Words in a name that tell what a channel is."""
+
+_GERMAN = re.compile(r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?")
+"""Names that begin with what is wanted or what is, or end with it: Sollposition, Istposition, Lagesollwert."""
+
+
+@dataclass(frozen=True)
+class AssignedRole:
+    """A channel for a role and why; `by_user` where the user assigned it."""
+
+    role: str
+    channel: Channel
+    reason: str
+    by_user: bool
+
+
+def words(name: str) -> list[str]:
+    """Lower-case words of the last part of a dotted name: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
+    last = name.rstrip(". ").rsplit(".", 1)[-1]
+    last = re.sub(r"([a-z])([A-Z])", r"\1 \2", last)
+    parts = [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
+    return [word for part in parts for word in _compound(part)]
+
+
+def _compound(word: str) -> list[str]:
+    """The parts of a German compound, or the word alone."""
+    match = _GERMAN.fullmatch(word)
+    return [word] if match is None else [part for part in match.groups() if part]
+
+
+def role_of(name: str) -> tuple[str, str] | None:
+    """Role that a name stands for, and the word that shows it; None for a name that shows none."""
+    parts = words(name)
+    name_words = set(parts)
+    if name_words & _NOT_MEASURED:
+        return None
+    key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
+    if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
+        return "time", key["time"]
+    if name_words & _SET or "setpos" in name_words:
+        others = key["velocity"] or key["acceleration"] or key["force"] or key["disturbance"]
+        return None if others else ("reference", next(part for part in parts if part in _SET or part == "setpos"))
+    if key["position"] or "actpos" in name_words:
+        word = key["position"] or "actpos"
+        kind = "relative_position" if name_words & _RELATIVE else "cart_position" if name_words & _CART else "position"
+        return kind, word
+    return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
+
+
+def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel:
+    """The channel of this name, with or without its unit in brackets. Raises LogError that lists the channels."""
+    plain = split_heading(name)[0]
+    for matches in ([c for c in table.channels if c.name == name], [c for c in table.channels if c.name == plain]):
+        if len(matches) == 1:
+            return matches[0]
+    names = [channel.name for channel in table.channels]
+    near = difflib.get_close_matches(name, names, 1, 0.6)
+    example = f'--map {role}="{near[0] if near else names[0]}"'
+    raise LogError(role, f"{quoted(name)}, which the log does not contain", listing(table), example, origin)
+
+
+def listing(table: ChannelTable) -> str:
+    """The channels there are, for a message; and what was left out as objects."""
+    labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels]
+    text = ", ".join(labels[:40]) + (f" and {len(labels) - 40} more" if len(labels) > 40 else "")
+    objects = "".join(f"; {line}" for line in table.read if "structure with time" in line)
+    return f"one of the channels {text}{objects}"
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """Roles with their channels, and the `rivals` for those of which several channels could be one."""
+
+    chosen: dict[str, AssignedRole]
+    rivals: dict[str, tuple[Channel, ...]]
+
+
+def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
+    """Roles with their channels: first what the user assigned, then what the names show. Of several channels whose
+    names show a role, the one whose name is nothing else has it. Raises LogError for a name that is not there."""
+    chosen = {
+        role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
+        for role, name in assigned.items()
+    }
+    by_user = {id(choice.channel) for choice in chosen.values()}
+    candidates: dict[str, list[tuple[Channel, str]]] = {}
+    for channel in table.channels:
+        role = role_of(channel.name)
+        if role is not None and role[0] not in assigned and id(channel) not in by_user:
+            candidates.setdefault(role[0], []).append((channel, role[1]))
+    rivals = {}
+    for role, matches in candidates.items():
+        if role == "time" and _own_times(table):
+            continue
+        exact = _exact(role, matches)
+        if exact is not None:
+            chosen[role] = AssignedRole(role, exact[0], f'the name is "{exact[0].name}"', False)
+        elif len(matches) > 1:
+            rivals[role] = tuple(channel for channel, _ in matches)
+        else:
+            channel, word = matches[0]
+            chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
+    return Proposal(chosen, rivals)
+
+
+def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
+    """Of several candidates the only one whose name is that of the role, or else the word alone that shows it."""
+    if len(matches) < 2:
+        return None
+    for alone in (
+        [match for match in matches if match[0].name.strip().lower().replace(" ", "_") == role],
+        [match for match in matches if match[0].name.strip().lower() == match[1]],
+    ):
+        if len(alone) == 1:
+            return alone[0]
+    return None
+
+
+def _own_times(table: ChannelTable) -> bool:
+    """Whether the channels that are not times themselves have their instants from the file."""
+    others = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
+    return any(channel.time is not None for channel in others)

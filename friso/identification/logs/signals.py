@@ -1,0 +1,224 @@
+"""A channel that has a role: its instants in seconds and its values in the unit of the role."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping as Roles
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from friso.errors import InputError, LogError
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.checks import unwrapped
+from friso.identification.logs.log import ROLES
+from friso.identification.logs.mapping import Mapping, option
+from friso.identification.logs.preamble import RATES, STEPS
+from friso.identification.logs.roles import AssignedRole, find
+from friso.identification.logs.text import with_times
+from friso.identification.logs.units import FOREIGN, factor, in_si, is_unit, read_scale
+from friso.quantities import quoted
+
+LARGEST = 1e30
+"""No instrument measures more in any unit; beyond it, squares of squares overflow."""
+
+
+@dataclass
+class Notes:
+    """Lines gathered on the way to a log, and the units that are not those of the roles."""
+
+    read: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How channels are read: the table, what the user said, whether only the units of the roles will do, whether the
+    file is of a kind that cannot hold units, where it lies, and the roles that may have a `foreign` unit all the same
+    (a force in volts)."""
+
+    table: ChannelTable
+    mapping: Mapping
+    strict: bool
+    bare: bool
+    origin: str
+    foreign: tuple[str, ...] = ()
+
+    def takes(self, role: str, si: str) -> bool:
+        """Whether a signal of a role may stand in a unit that is not the role's."""
+        return si == ROLES[role] or not self.strict or (role in self.foreign and si in FOREIGN)
+
+
+def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
+    """The table with the user's units, and with the times that follow from them where the format has no `times` of its
+    own. Raises LogError."""
+    if not mapping.units:
+        return table
+    units = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
+    for name, unit in mapping.units.items():
+        if not is_unit(unit):
+            raise LogError(
+                "unit", quoted(unit), "a unit such as mm, um, rad, V, A or counts", option("--unit", name, "mm"), origin
+            )
+    channels = [replace(channel, unit=units.get(id(channel), channel.unit)) for channel in table.channels]
+    if not times:  # they come from its columns
+        channels = [replace(channel, time=None) for channel in channels]
+    timed = zip(channels, with_times(channels), strict=True)
+    timed_channels = tuple(new if old.time is None else old for old, new in timed)
+    return replace(table, channels=timed_channels)
+
+
+def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
+    """Values of a channel in the unit of its role, with notes on what was done to them. Raises LogError."""
+    channel, role = choice.channel, choice.role
+    values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
+    if bits:
+        notes.warnings.append(f"{role}: {channel.name} treated as a {bits}-bit counter that overflows: unwrapped")
+    scale = reading.mapping.scales.get(role)
+    unit = channel.unit
+    if scale is not None:
+        value, implied = _scaled(role, scale, unit, reading.origin)
+        line = f"{scale}" + ("" if unit else f", its values taken to be in {implied} as the scale implies")
+    elif _taken_as_si(choice, reading):
+        value, line = 1.0, f"no unit in the file: assumed to be in {ROLES[role]}"
+        notes.warnings.append(
+            f"{role}: {channel.name} has no unit (this format has none): assumed to be in {ROLES[role]}"
+        )
+    else:
+        value, si = in_si(unit, ROLES[role])
+        line = f"in {unit}" if unit else "without a unit"
+        if si != ROLES[role]:
+            if not reading.takes(role, si):
+                raise _wrong_unit(choice, unit, si, reading)
+            notes.units[role] = si
+    notes.read.append(f"{role}: {channel.name} ({channel.source}), {choice.reason}; {line}")
+    with np.errstate(all="ignore"):  # what is no number stays so, and is the business of the time base
+        values = values * value
+        most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    if most > LARGEST:
+        actual = f"values up to {most:.3g} {notes.units.get(role, ROLES[role])}"
+        raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
+    return values
+
+
+def _scaled(role: str, scale: str, unit: str, origin: str) -> tuple[float, str]:
+    try:
+        return read_scale(role, scale, unit)
+    except InputError as error:
+        raise error.found_in(origin) from None
+
+
+def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
+    """What has to be told of the unit of a channel before it has that of its role; None for nothing. Raises LogError
+    for a scale that does not fit."""
+    si = in_si(choice.channel.unit, ROLES[choice.role])[1]
+    scale = reading.mapping.scales.get(choice.role)
+    if scale is not None:
+        _scaled(choice.role, scale, choice.channel.unit, reading.origin)
+    if scale is not None or reading.takes(choice.role, si) or _taken_as_si(choice, reading):
+        return None
+    return _wrong_unit(choice, choice.channel.unit, si, reading)
+
+
+def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
+    """Whether a channel without a unit counts as one in SI: the user assigned it, and the format holds no units."""
+    return not choice.channel.unit and reading.strict and choice.by_user and reading.bare
+
+
+def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> LogError:
+    """The error for a channel whose unit is none of the role's kind, or that has none."""
+    role, name = choice.role, choice.channel.name
+    if not unit:
+        usual = _likely_length(choice.channel) if ROLES[role] == "m" else ROLES[role]
+        actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
+        expected = f"a unit convertible to {ROLES[role]}"
+        if role == "force":
+            expected += f", or a scale such as {option('--scale', role, '35 N/V')}"
+        return LogError(role, actual, expected, option("--unit", name, usual), reading.origin)
+    number = "35.1507" if role in ("force", "disturbance") else "1.5"
+    scale = f"{ROLES[role]}/{si}"
+    expected = f'a scale to {ROLES[role]}, such as --scale {role}="{number} {scale}"'
+    example = f'--scale {role}="NUMBER {scale}"'  # nobody should copy one that is made up
+    return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
+
+
+def _likely_length(place: Channel) -> str:
+    """The unit of length in which the travel of a position is between 0.5 mm and 0.5 m, or nearest to that."""
+    finite = place.values[np.isfinite(place.values)]
+    travel = float(np.ptp(finite)) if finite.size else 0.0
+    return "m" if travel <= 0.5 else "mm" if travel <= 500 else "um"
+
+
+def _span(values: np.ndarray) -> str:
+    """Between which values a channel runs, in words."""
+    finite = values[np.isfinite(values)]
+    return f" and runs from {finite.min():.4g} to {finite.max():.4g}" if finite.size else ""
+
+
+def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
+    """Instants of a channel [s]: from the sample time that the user said, the time channel, or the file; None where
+    there are none. Raises LogError."""
+    channel = choice.channel
+    if reading.mapping.sample_time is not None:
+        return reading.mapping.sample_time * np.arange(channel.values.size)
+    if (
+        clock is not None
+        and (clock.by_user or channel.time is None)
+        and clock.channel.values.size == channel.values.size
+    ):
+        return clock.channel.values * _seconds(clock, reading, notes)
+    return channel.time
+
+
+def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
+    """Seconds in the unit of the time channel. Raises LogError for none."""
+    name, unit = clock.channel.name, clock.channel.unit
+    if not unit and clock.by_user and reading.bare:
+        line = f"time: {name} has no unit (this format has none): assumed to be in s"
+        notes.warnings += [line] if line not in notes.warnings else []
+        return 1.0
+    value = factor(unit, "s") if unit else None
+    if value is None:
+        actual = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
+        expected = "; or ".join(text for text in ("a unit convertible to s", _offers(reading.table)) if text)
+        raise LogError("time", actual, expected, option("--unit", name, _likely_unit(clock.channel)), reading.origin)
+    return value
+
+
+def _likely_unit(clock: Channel) -> str:
+    """The unit in which the steps of a time are like those of a log, between 0.1 ms and 100 ms."""
+    steps = np.diff(clock.values)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    return "s" if step <= 0.1 else "ms" if step <= 100 else "us"
+
+
+def no_time(channel: Channel, reading: Reading) -> LogError:
+    """The error for a channel without instants."""
+    offers = _offers(reading.table)
+    expected = "; or ".join(text for text in ("a time channel or a sample time", offers) if text)
+    example = re.match(r'--dt "[^"]*"', offers)
+    return LogError(
+        "time", f"no time stamps for {quoted(channel.name)}", expected, example[0] if example else '--dt "1 ms"',
+        reading.origin,
+    )  # fmt: skip
+
+
+def _offers(table: ChannelTable) -> str:
+    """What single numbers in the file could mean for the sample time: offered, not used."""
+    offers = []
+    for name, value in table.scalars.items():
+        plain = name.rpartition(".")[2].lower().replace("_", "")
+        if plain in RATES and value > 0:
+            offers.append(f'--dt "{1e3 / value:.9g} ms", if {name} = {value:g} in the file is the sample rate in Hz')
+        if plain in STEPS and value > 0:
+            offers.append(f'--dt "{value:.9g} s", if {name} = {value:g} in the file is the sample time in s')
+    return "; ".join(offers)
+
+
+def unused(mapping: Mapping, chosen: Roles[str, AssignedRole], origin: str) -> None:
+    """Raises LogError for a scale of a role that has no channel."""
+    for role in mapping.scales:
+        if role not in chosen:
+            raise LogError("scale", f"a scale for {role}, which has no channel", "a channel for it",
+                             f'--map {role}="CHANNEL"', origin)  # fmt: skip

@@ -1,0 +1,180 @@
+"""How a text file is written, found in its first lines: encoding, delimiter, decimal sign, where the numbers begin."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import re
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+from friso.errors import LogError
+from friso.identification.logs.units import is_unit, split_heading
+
+HEAD_BYTES = 1 << 18
+"""How much of a file is looked at to find how it is written."""
+HEAD_LINES = 1000
+"""How many lines of it are tried with each delimiter."""
+_BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+_CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
+"""Delimiter and decimal sign; of two that fit equally well the first is taken."""
+_DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
+_NUMBER = re.compile(rf"[+-]?{_DIGITS}|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
+_CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+DOS_END = "\x1a"
+"""Ctrl-Z, with which programs of DOS end a text."""
+STAMP = re.compile(rf"(?:\d{{4}}-\d{{2}}-\d{{2}}(?:[T ]{_CLOCK}(?:Z|[+-]\d{{2}}:?\d{{2}})?)?|{_CLOCK})")
+"""A date and time as in ISO 8601, or a time of day."""
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """How a text is written. `first` counts the lines before the numbers, `above`; `names` and `units` are per column;
+    `exact`: every delimiter ends a cell, so that several spaces are empty cells."""
+
+    encoding: str
+    delimiter: str
+    decimal: str
+    first: int
+    columns: int
+    names: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    above: tuple[str, ...] = ()
+    certain: bool = True
+    exact: bool = False
+
+    @property
+    def in_words(self) -> str:
+        """The layout in words."""
+        names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
+        return (
+            f"delimiter {names[self.delimiter]}, decimal {'comma' if self.decimal == ',' else 'point'}, "
+            f"encoding {self.encoding}, {self.first} line{'' if self.first == 1 else 's'} before the numbers"
+        )
+
+
+def decoded_head(path: Path) -> tuple[str, list[str]]:
+    """Encoding and the first lines of a text file. Raises LogError for what is no text."""
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    encoding = next((name for mark, name in _BYTE_ORDER_MARKS if head.startswith(mark)), "")
+    if not encoding and b"\0" in head:
+        even, odd = head[0:4000:2].count(0), head[1:4000:2].count(0)
+        if max(even, odd) < len(head[:4000]) // 4 or min(even, odd) > 0:  # Latin text in UTF-16 has a 0 in each pair
+            raise _no_text(path)
+        encoding = "utf-16-le" if odd > even else "utf-16-be"
+    if not encoding:
+        encoding = "utf-8"
+        try:
+            codecs.getincrementaldecoder("utf-8")().decode(head)  # the last character may be cut
+        except UnicodeDecodeError:
+            encoding = "cp1252"
+    text = codecs.getincrementaldecoder(encoding)("replace").decode(head).replace(DOS_END, "")
+    odd = sum(not (character.isprintable() or character in "\t\r\n\f") for character in text)
+    if odd > 0.02 * len(text):
+        raise _no_text(path)
+    lines = re.split(r"\r\n|\n|\r", text)
+    return encoding, lines[:-1] if len(head) == HEAD_BYTES or not lines[-1] else lines
+
+
+def _no_text(path: Path) -> LogError:
+    return LogError(
+        "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
+        "a text", "", str(path),
+    )  # fmt: skip
+
+
+def split_line(line: str, delimiter: str) -> list[str]:
+    """The cells of a line, without quotes and blanks around; spaces inside brackets do not split."""
+    if delimiter == " ":
+        if '"' not in line:
+            line = re.sub(r"\s+(?=[\[(])", "\0", line.strip())  # "Time (s)" is one heading
+            return [cell.replace("\0", " ") for cell in line.split()]
+        return [cell for cell in next(csv.reader([line.strip()], delimiter=" ", skipinitialspace=True)) if cell]
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell is a number with this decimal sign."""
+    if decimal == ",":
+        cell = cell.replace(".", "?").replace(",", ".")
+    return _NUMBER.fullmatch(cell) is not None
+
+
+def _is_row(cells: list[str], decimal: str, words: bool) -> bool:
+    """Whether cells are a row of values: numbers, gaps and time stamps, with `words` also a few words (a state)."""
+    numbers = sum(is_number(cell, decimal) for cell in cells)
+    rest = [cell for cell in cells if cell and not is_number(cell, decimal)]
+    if words:
+        return numbers >= 2 and len(rest) <= numbers
+    return numbers > 0 and len(rest) <= 0.5 * numbers + 1 and all(STAMP.fullmatch(cell) for cell in rest)
+
+
+def layout(path: Path) -> TextLayout:
+    """How a text with one table of numbers is written. Raises LogError where there is none."""
+    encoding, lines = decoded_head(path)
+    lines = lines[:HEAD_LINES]
+    for words in (False, True):
+        layouts = [_fit(lines, encoding, *candidate, words) for candidate in _CANDIDATES]
+        fits = [fit for fit in layouts if fit is not None]
+        if fits:
+            return max(fits, key=lambda fit: fit[0])[1]
+    actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
+    raise LogError("log", actual, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
+
+
+def _fit(
+    lines: list[str], encoding: str, delimiter: str, decimal: str, words: bool
+) -> tuple[tuple[int, bool, int], TextLayout] | None:
+    """The layout with this delimiter and decimal sign, and how well it fits: rows of numbers, a heading as long as they
+    are, columns. None for no fit."""
+    rows = [split_line(line, delimiter) for line in lines]
+    is_row = [_is_row(cells, decimal, words) for cells in rows]
+    if not any(is_row):
+        return None
+    first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))
+    columns = Counter(len(cells) for cells in rows[first : first + 50] if any(cells)).most_common(1)[0][0]
+    names, units = _headings(lines, first, columns, delimiter)
+    certain = decimal == "," or any("." in cell for cells in rows[first:] for cell in cells)
+    score = sum(is_row[first:]), all(names) and bool(names), columns
+    return score, TextLayout(encoding, delimiter, decimal, first, columns, names, units, tuple(lines[:first]), certain)
+
+
+def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
+    """Whether a row of numbers is followed by one as long (a single number in the lines before is no table)."""
+    following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
+    if following is None or not any(is_row[i + 1 :]):
+        return True
+    return is_row[following] and len(_filled(rows[following])) == len(_filled(rows[i]))
+
+
+def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names and units per column, from the one or two lines above the numbers that are as long; () for none."""
+    above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
+    heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]
+    heads = [head[:columns] + _filled(head[columns:]) for head in heads]  # a line may end with a delimiter
+    heads = [head + [""] * (columns - len(head)) for head in heads if columns >= len(head) >= max(1, columns - 1)]
+    if not heads:
+        return (), ()
+    last = heads[-1]
+    bare = [cell.strip("[]()") for cell in last]
+    cells = [cell for cell in bare if cell and cell != "-"]
+    if len(heads) == 2 and cells and sum(is_unit(cell) for cell in cells) >= 0.5 * len(cells):
+        return tuple(heads[0]), tuple(bare)
+    names, units = zip(*(split_heading(cell) for cell in last), strict=True)
+    return tuple(names), tuple(units)
+
+
+def _filled(cells: list[str]) -> list[str]:
+    """The cells up to the last that is not empty."""
+    return cells[: max((i + 1 for i, cell in enumerate(cells) if cell), default=0)]
+
+
+def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
+    """The headings in a line; between spaces also names of several words, where each ends with its unit in brackets."""
+    cells = split_line(line, delimiter)
+    if delimiter == " " and len(cells) != columns:
+        named = re.findall(r"[^\[\]()]+[\[(][^\])]*[\])]", line)
+        return [name.strip() for name in named] if len(named) == columns else cells
+    return cells

@@ -1,0 +1,226 @@
+"""CSV, TSV and TXT with one table of numbers: any delimiter, decimal sign and encoding; lines before the table."""
+
+from __future__ import annotations
+
+import mmap
+import warnings
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+import pandas as pd
+
+from friso.errors import LogError
+from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.preamble import preamble
+from friso.identification.logs.roles import role_of
+from friso.identification.logs.sniff import DOS_END, STAMP, TextLayout, layout, split_line
+from friso.identification.logs.units import factor
+from friso.quantities import quoted
+
+
+def read_text(path: Path) -> ChannelTable:
+    """The table of a text file. Raises LogError for ragged rows and for a text among the numbers, with its line."""
+    form = layout(path)
+    if not form.certain and form.delimiter != "," and _has_comma(path, form):
+        form = replace(form, decimal=",")
+    frame = read_frame(path, form)
+    names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
+    heading = preamble(form.above, names, form.delimiter)
+    units = [
+        unit or heading.units.get(name, "") for unit, name in zip(form.units or [""] * len(names), names, strict=True)
+    ]
+    notes, columns = list(heading.read), []
+    _no_short_rows(path, form, frame)
+    blank = frame.isna().all(axis=1).to_numpy()
+    frame, blanks = (frame[~blank], int(blank.sum())) if blank.any() else (frame, 0)
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
+        cells = frame.iloc[:, i]
+        values = _numbers(path, form, cells, name)
+        if values is None and not name and cells.isna().all():
+            continue  # each row ends with a delimiter
+        if values is None:
+            notes += [f"left out: column {i + 1} ({name or 'no name'}), which holds no numbers"]
+        else:
+            columns.append(Channel(name or f"column {i + 1}", unit or values[1], values[0], None, f"column {i + 1}"))
+    if blanks:
+        notes.append(f"{blanks} empty lines left out")
+    channels = with_times(_same_ends(path, form, columns, frame))
+    if heading.interval is not None and all(channel.time is None for channel in channels):
+        channels = tuple(replace(c, time=heading.interval * np.arange(c.values.size)) for c in channels)
+    return ChannelTable(
+        channels,
+        heading.scalars,
+        (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes),
+    )
+
+
+def read_frame(path: Path, form: TextLayout) -> Any:
+    """All cells from the first row of numbers on; columns without text are floats. Raises LogError.
+
+    The lines before are skipped here, not by pandas, which would take a lone quotation mark in them for an open one.
+    """
+    options: dict[str, Any] = {
+        "header": None, "decimal": form.decimal,
+        "skip_blank_lines": False, "low_memory": False, "names": range(form.columns + 1),
+        "index_col": False, "sep": form.delimiter, "skipinitialspace": not form.exact,
+    }  # fmt: skip
+    if form.delimiter == " " and not form.exact:
+        options["sep"] = r"\s+"
+    try:
+        with path.open(encoding=form.encoding, errors="replace", newline="") as file:
+            for _ in range(form.first):
+                file.readline()
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", pd.errors.ParserWarning)  # that cells are dropped
+                frame = pd.read_csv(_WithoutDosEnd(file), **options, on_bad_lines="error")  # pyright: ignore
+    except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
+        raise ragged(path, form, str(error)) from None
+    if frame.iloc[:, -1].notna().any():  # one more than there are columns: a row may end with a delimiter
+        raise ragged(path, form)
+    return frame.iloc[:, :-1]
+
+
+class _WithoutDosEnd:
+    """A text without the mark with which programs of DOS end it."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def read(self, size: int = -1) -> str:
+        return self._file.read(size).replace(DOS_END, "")
+
+    def __iter__(self) -> Iterator[str]:
+        return (line.replace(DOS_END, "") for line in self._file)
+
+
+def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
+    """The error for the first line with more cells than columns; the parser's own words where there is none."""
+    with path.open(encoding=form.encoding, errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
+            if len(cells) > form.columns and any(cells[form.columns :]):
+                actual = f"{len(cells)} cells in line {number}"
+                return LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
+    return LogError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
+
+
+def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
+    """Raises LogError for a row with fewer cells than columns above others that have them all."""
+    present = frame.iloc[:, -1].notna().to_numpy()
+    missing = np.flatnonzero(~present[: int(np.flatnonzero(present)[-1])]) if present.any() else np.empty(0, dtype=int)
+    if not missing.size:
+        return
+    suspects = set((missing + form.first + 1).tolist())
+    with path.open(encoding=form.encoding, errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            cells = split_line(line.rstrip("\r\n"), form.delimiter) if number in suspects and line.strip() else []
+            if 0 < len(cells) < form.columns:
+                actual = f"{len(cells)} cells in line {number}"
+                raise LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
+
+
+def _has_comma(path: Path, form: TextLayout) -> bool:
+    """Whether a comma stands anywhere after the first numbers (the head showed whole numbers only)."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
+        at = 0
+        for _ in range(form.first):
+            at = bytes_.find(b"\n", at) + 1
+        return bytes_.find(b",", at) >= 0
+
+
+def unique(names: list[str]) -> list[str]:
+    """Names, with a number where they are the same."""
+    counts: dict[str, int] = {}
+    out = []
+    for name in names:
+        counts[name] = counts.get(name, 0) + 1
+        out.append(name if counts[name] == 1 or not name else f"{name} #{counts[name]}")
+    return out
+
+
+def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
+    """Values of a column, with "s" for the unit of time stamps; None for a column of texts.
+    Raises LogError for a text among numbers."""
+    if cells.dtype == bool or pd.api.types.is_numeric_dtype(cells.dtype):
+        values = cells.to_numpy(dtype=float)
+        return None if np.isnan(values).all() else (values, "")
+    texts = cells.astype(str).str.strip()
+    present = cells.notna() & (texts != "")
+    if texts[present].str.fullmatch(STAMP.pattern).all() and present.any():
+        return _stamped(path, texts, present, form), "s"
+    texts = texts.where(~texts.str.lower().isin(("true", "false")), texts.str.lower().map({"true": "1", "false": "0"}))
+    points = texts.str.replace(",", ".", regex=False) if form.decimal == "," else texts
+    values = as_numbers(points.where(present))
+    wrong = present.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
+    if wrong.sum() > 0.5 * present.sum():
+        return None
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        line = form.first + 1 + int(cells.index[row])
+        actual = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
+        raise LogError("log", actual, "numbers in every row", "", str(path))
+    return values, ""
+
+
+def as_numbers(texts: Any) -> np.ndarray:
+    """Texts as floats, NaN for what is no number."""
+    numbers: Any = pd.to_numeric(texts, errors="coerce")
+    return numbers.to_numpy(dtype=float)
+
+
+def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
+    """Seconds since the first of these time stamps; a time of day that steps back goes on the next day."""
+    texts = texts.str.replace(",", ".", regex=False)
+    try:
+        stamps: Any
+        if texts[present].str.match(r"\d{4}-").all():
+            stamps = pd.to_datetime(texts.where(present), format="ISO8601", utc=True)
+            seconds = (stamps - stamps[present].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
+        else:
+            durations = texts.where(texts.str.count(":") == 2, texts + ":00").where(present)
+            stamps = pd.to_timedelta(durations)
+            seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
+            seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
+    except ValueError as error:
+        raise LogError(
+            "log", str(error), "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)
+        ) from None
+    return seconds - seconds[int(np.flatnonzero(present)[0])]
+
+
+def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
+    """The columns without the empty cells below their last value. A cell that is missing at the end of a single row
+    stays and is a NaN, which the checks report."""
+    out = []
+    for column in columns:
+        last = int(np.flatnonzero(~np.isnan(column.values))[-1]) + 1
+        out.append(replace(column, values=column.values[:last]))
+    if len({len(column.values) for column in out}) > 1 and sum(role_of(c.name) == ("time", "time") for c in out) < 2:
+        shortest = min(out, key=lambda column: len(column.values))
+        missing = len(frame) - len(shortest.values)
+        if missing <= 2 and missing < 0.01 * len(frame):
+            line = form.first + 1 + int(frame.index[len(shortest.values)])
+            actual = f"a row in line {line} that ends before {shortest.name}"
+            raise LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
+    return out
+
+
+def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
+    """Each column with the instants of the time column to its left that is as long (a file may have one per channel);
+    where none stands to its left, of the only one there is. A time column is one that says so and has its unit."""
+    clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name) or ("",))[0] == "time"]
+    clocks = [(i, c, factor(c.unit, "s")) for i, c in clocks if c.unit]
+    out = []
+    for i, column in enumerate(columns):
+        fitting = [clock for clock in clocks if clock[2] is not None and len(clock[1].values) == len(column.values)]
+        left = [clock for clock in fitting if clock[0] < i] or (fitting if len(fitting) == 1 else [])
+        is_clock = any(i == clock[0] for clock in clocks)
+        if left and not is_clock:
+            _, clock, seconds = left[-1]
+            out.append(replace(column, time=clock.values * (seconds or 1.0)))
+        else:
+            out.append(column)
+    return tuple(out)

@@ -1,0 +1,171 @@
+"""Instants of a channel: cleaned, split at gaps, even within each segment; channels of several rates on one base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from friso.errors import LogError
+from friso.identification.logs.checks import repeated_stamps
+
+GAP = 1.5
+"""A step of time above this many sample times is a gap: at least one sample is missing (one missing makes 2)."""
+MOST_GAPS = 0.1
+"""More gaps than this share of the samples is no even sampling."""
+EVEN = 0.01
+"""Time stamps that scatter (rms) by less than this share of a sample time are taken as even: interpolation would change
+a signal by less than 1 % of what it changes per sample."""
+SHORTEST = 10
+"""Segments of fewer samples are left out: no filter of ours settles within."""
+
+
+@dataclass
+class Track:
+    """A channel with even instants within each segment: `time` [s] and `values` of shape (n,); what was done to it."""
+
+    time: np.ndarray
+    values: np.ndarray
+    period: float
+    segments: list[slice]
+    read: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
+    """A channel cleaned of what is no number and of repeated stamps [s], split at gaps, on even instants.
+
+    Raises LogError for too little, for time that decreases, for stamps that are repeated with other values, and for
+    sampling that is not even.
+    """
+    read: list[str] = []
+    time, values, missing = _numbers_only(name, time, values)
+    if missing:
+        read.append(f"{name}: {missing} samples that are not numbers left out; the record is split there")
+    time, values, repeated = repeated_stamps(name, time, values)
+    if repeated:
+        read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
+    steps = np.diff(time)
+    gaps = steps > GAP * np.median(steps)
+    if gaps.mean() > MOST_GAPS:
+        actual = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
+        raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
+    period = float(steps[~gaps].mean())
+    edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
+    segments = [slice(a, b) for a, b in pairwise(edges)]
+    return _evened(name, Track(time, values, period, segments, read))
+
+
+def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
+    there = np.isfinite(time) & np.isfinite(values)
+    if there.sum() < max(2, 0.5 * there.size):
+        actual = f"{there.size - there.sum()} of {there.size} samples that are not numbers (NaN)"
+        raise LogError(name, actual, "at least half of the samples", "")
+    inside = np.flatnonzero(there)
+    return time[there], values[there], int(np.count_nonzero(~there[inside[0] : inside[-1]]))
+
+
+def _evened(name: str, raw: Track) -> Track:
+    """The track on even instants: its own where the stamps scatter little, else interpolated, which the notes say."""
+    time, scatter = np.empty_like(raw.time), 0.0
+    for part in raw.segments:
+        steps = raw.period * np.arange(part.stop - part.start)
+        time[part] = steps + np.mean(raw.time[part] - steps)
+        scatter += float(np.sum((raw.time[part] - time[part]) ** 2))
+    jitter = np.sqrt(scatter / time.size) / raw.period
+    raw.read.append(
+        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {100 * jitter:.2g} % of a step"
+    )
+    if jitter <= EVEN:
+        raw.time = time
+        return raw
+    raw.warnings.append(
+        f"{name}: time stamps scatter by {jitter:.2g} of a sample time: interpolated onto uniform time stamps; if the "
+        f'sampling was uniform and only the time stamps were not, use --dt "{raw.period * 1e3:.6g} ms"'
+    )
+    times, values, segments, start = [], [], [], 0
+    for part in raw.segments:
+        count = int((raw.time[part.stop - 1] - raw.time[part.start]) / raw.period + 1e-6) + 1
+        grid = raw.time[part.start] + raw.period * np.arange(count)
+        times.append(grid)
+        values.append(np.interp(grid, raw.time[part], raw.values[part]))
+        segments.append(slice(start, start + count))
+        start += count
+    raw.time, raw.values, raw.segments = np.concatenate(times), np.concatenate(values), segments
+    return raw
+
+
+def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
+    """All tracks at the instants of the coarsest one that all of them cover: these instants as a track, and the values
+    by name. Others are interpolated linearly within their own segments only. Raises LogError where nothing is
+    covered by all."""
+    base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
+    base = tracks[base_name]
+    read, warnings, values = [], [], {}
+    for name, single in tracks.items():
+        if _same_instants(single, base):
+            values[name] = single.values
+            continue
+        values[name] = _at(base, single)
+        if not _coincident(base, single):
+            read.append(
+                f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
+                f"instants of {base_name}"
+            )
+        if single.period < base.period / GAP:
+            warnings.append(
+                f"{name}: sampled at {1 / single.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
+                "anti-aliasing filter"
+            )
+    covered = np.all([np.isfinite(value) for value in values.values()], axis=0)
+    segments = [run for part in base.segments for run in _runs(covered, part)]
+    short = [run for run in segments if run.stop - run.start < SHORTEST]
+    segments = [run for run in segments if run.stop - run.start >= SHORTEST]
+    if not segments:
+        spans = ", ".join(f"{name} {trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" for name, trace in tracks.items())
+        raise LogError(
+            "log", f"no {SHORTEST} consecutive samples that all channels share: {spans}", "a common span", ""
+        )
+    if short:
+        read.append(f"{len(short)} segments shorter than {SHORTEST} samples left out")
+    parts, start = [], 0
+    for run in segments:
+        parts.append(slice(start, start + run.stop - run.start))
+        start = parts[-1].stop
+    pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
+    track = Track(base.time[pick], base.values[pick], base.period, parts, read, warnings)
+    return track, {name: value[pick] for name, value in values.items()}
+
+
+def _same_instants(first: Track, second: Track) -> bool:
+    """Whether two tracks have the same instants, to a hundredth of a sample time."""
+    same = first.time.size == second.time.size and first.segments == second.segments
+    return same and bool(np.all(np.abs(first.time - second.time) <= EVEN * second.period))
+
+
+def _coincident(base: Track, other: Track) -> bool:
+    """Whether the instants of the base within the other's first segment are instants of the other as well."""
+    part = other.segments[0]
+    inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
+    steps = (inside - other.time[part.start]) / other.period
+    return bool(np.all(np.abs(steps - np.round(steps)) <= EVEN))
+
+
+def _at(base: Track, other: Track) -> np.ndarray:
+    """Values of a track at the instants of the base, NaN outside of its segments."""
+    values = np.full(base.time.size, np.nan)
+    slack = EVEN * other.period
+    for part in other.segments:
+        time = other.time[part]
+        a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))
+        values[a:b] = np.interp(base.time[a:b], time, other.values[part])
+    return values
+
+
+def _runs(covered: np.ndarray, part: slice) -> list[slice]:
+    """The stretches of a segment where all is covered."""
+    edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
+    return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

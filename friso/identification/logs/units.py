@@ -1,0 +1,173 @@
+"""Unit texts of files and options, turned into SI where they can be."""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+
+from friso.errors import InputError, LogError
+from friso.identification.logs.log import ROLES
+from friso.quantities import Quantity, any_sign, quoted
+
+COUNTS = frozenset({"count", "counts", "cnt", "cnts", "inc", "incs", "increments", "lsb", "digit", "digits", "ticks"})
+"""Texts that mean the steps of a sensor."""
+OTHERS = {
+    "m": ("rad",),
+    "m/s": ("rad/s",),
+    "m/s^2": ("rad/s^2",),
+    "N": ("A", "V", "N*m"),
+}
+"""What may stand in place of the SI unit of a role where the caller allows it: turned into these units."""
+FOREIGN = (*OTHERS["N"], "count")
+"""Units in which a force may stand where estimates per such a unit are an answer."""
+_SPELLINGS = {
+    "sec": "s",
+    "secs": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "msecs": "ms",
+    "usec": "us",
+    "usecs": "us",
+    "nsec": "ns",
+    "Sec": "s",
+    "Nm": "N*m",
+    "°": "deg",
+    "degs": "deg",
+    "Volt": "V",
+    "Volts": "V",
+    "volts": "V",
+    "Amp": "A",
+    "Amps": "A",
+    "amps": "A",
+    "Ampere": "A",
+    "Newton": "N",
+    "hz": "Hz",
+}
+_BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
+
+
+_GLUED = re.compile(
+    r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
+    r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
+)
+_RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
+"""Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
+_MEASURED_IN = {
+    "s": {"t", "time", "zeit", "tempo", "temps", "tiempo"},
+    "m": {"pos", "position", "x", "ref", "reference", "displacement"},
+    "N": {"force", "f", "kraft", "friction"},
+    "A": {"current", "iq", "i", "strom"},
+    "V": {"voltage", "u", "command"},
+}
+"""Words in a name that tell what is measured in these letters."""
+
+
+def spelled(text: str) -> str:
+    """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none."""
+    text = re.sub(r"(?:\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
+    text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
+    text = "" if text.lower() in ("none", "-", "n/a") else text
+    parts = re.split(r"([*/· ])", text)
+    parts = [_SPELLINGS.get(part, part) for part in parts]
+    return "".join(re.sub(r"^([A-Za-z]+)([2-4])$", r"\1^\2", part) for part in parts)
+
+
+@lru_cache(maxsize=1024)
+def factor(unit: str, si_unit: str) -> float | None:
+    """SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
+    try:
+        return Quantity(si_unit, any_sign, "").factor(spelled(unit))
+    except InputError:
+        return None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that a log could have."""
+    text = spelled(text)
+    return text.lower() in COUNTS or text in ("dB", "%") or any(factor(text, unit) is not None for unit in _KINDS)
+
+
+_KINDS = (
+    "s",
+    "Hz",
+    *dict.fromkeys(ROLES.values()),
+    "rad",
+    "rad/s",
+    "rad/s^2",
+    "A",
+    "V",
+    "N*m",
+    "N/V",
+    "m/N",
+    "V/m",
+    "K",
+)
+
+
+def split_heading(heading: str) -> tuple[str, str]:
+    """Name and unit of a heading: "Position (mm)" is ("Position", "mm"). A text in square brackets is always a unit
+    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none). Without
+    brackets a name may end with its unit, and keeps it: "angle_deg"."""
+    heading = heading.strip()
+    match = _BRACKETS.fullmatch(heading)
+    if match is None or not match["name"]:
+        return heading, _last_part(heading)
+    square = match["square"]
+    if square is not None and not re.fullmatch(r"[\d:, ]*", square):
+        return match["name"], square.strip()
+    if match["round"] is not None and is_unit(match["round"]):
+        return match["name"], match["round"].strip()
+    return heading, ""
+
+
+def _last_part(name: str) -> str:
+    """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. A single letter is
+    one where the name says what is measured in it: "force_N", but not "pos_s"."""
+    if rate := _RATE.fullmatch(name):
+        return f"{rate['length']}/{rate['time'].replace('^', '')}"
+    match = _GLUED.fullmatch(name)
+    if match is None:
+        return ""
+    words = {*re.split(r"[^a-z]+", match["stem"].lower())}
+    return match["unit"] or (match["letter"] if words & _MEASURED_IN[match["letter"]] else "")
+
+
+def in_si(unit: str, role_unit: str) -> tuple[float, str]:
+    """Factor, and the unit that values have with it: that of the role where possible, else one of `OTHERS`, else the
+    unit as it stands with factor 1 ("1" for no unit)."""
+    for target in (role_unit, *OTHERS.get(role_unit, ())):
+        value = factor(unit, target) if unit else None
+        if value is not None:
+            return value, target
+    text = spelled(unit)
+    return 1.0, "count" if text.lower() in COUNTS else text or "1"
+
+
+def read_scale(role: str, text: str, channel_unit: str) -> tuple[float, str]:
+    """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role; and what was
+    taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises LogError."""
+    match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*([^/]+)\s*", text)
+    role_unit, example = ROLES[role], f'--scale {role}="35.1507 {ROLES[role]}/V"'
+    if match is None:
+        raise LogError("scale", quoted(text), f"number and unit, {role_unit} over the unit of the channel", example)
+    below = spelled(match[3].strip("() "))
+    above = _scale_part(f"{match[1]} {match[2]}", role_unit, text, example)
+    unit = spelled(channel_unit) or below
+    if below.lower() in COUNTS and unit.lower() in COUNTS:
+        return above, "count"
+    for kind in ("m", "rad", "A", "V", "N*m", "N", "m/s", "rad/s", "m/s^2"):
+        of_unit, of_scale = factor(unit, kind), factor(below, kind)
+        if of_unit is not None and of_scale is not None:
+            return above * of_unit / of_scale, unit
+    if unit == below:
+        return above, unit
+    actual = f"{quoted(text)}, and the channel is in {unit}"
+    raise LogError("scale", actual, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
+
+
+def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
+    """The SI value above the stroke. Raises LogError."""
+    try:
+        return float(Quantity(role_unit, any_sign, "").read(text))
+    except InputError:
+        raise LogError("scale", quoted(scale), f"number and unit, {role_unit} over a unit", example) from None

@@ -1,0 +1,204 @@
+"""From logs of several experiments to one stage: each analysed in its way, and what they agree on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.combine import combined, correlations
+from friso.identification.estimate import Estimate
+from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
+from friso.identification.kinds import KINDS, in_order
+from friso.identification.logs.log import Log
+from friso.identification.stage_file import identified, origins
+from friso.identification.stage_keys import Fitting, fitting
+from friso.progress import Progress, share_of, silent
+from friso.stage import Stage
+from friso.stage.correlations import Correlations
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment of a kind with its logs, its result, and the estimates of keys of the stage file."""
+
+    kind: str
+    logs: tuple[Source, ...]
+    result: Any
+    estimates: tuple[Estimate, ...]
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The stage with its uncertain keys (None: neither a stage was given, nor a log around which one could be made up,
+    or nothing was identified), the correlations of these, the experiments behind it, the `estimates` that went into it
+    (one per key), and what the engineer should know (`warnings`).
+
+    `doubts` are sentences that speak against believing it, and `failed` is whether an analysis failed, whatever of it
+    still holds. `origins` says of each key of the stage where it comes from."""
+
+    stage: Stage | None
+    correlations: Correlations
+    experiments: tuple[Experiment, ...]
+    estimates: tuple[Estimate, ...]
+    warnings: tuple[str, ...]
+    doubts: tuple[str, ...] = ()
+    failed: bool = False
+    origins: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Another log as an experiment of this kind predicts it; the `result` is the kind's own affair."""
+
+    log: Log
+    kind: str
+    result: Any
+
+
+def identify(
+    logs: Sequence[tuple[Source, str]],
+    base: Stage | None = None,
+    settings: AnalysisSettings = NOTHING_CHOSEN,
+    progress: Progress = silent,
+) -> Identification:
+    """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`.
+
+    With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
+    InputError for logs that cannot be used.
+    """
+    groups = _groups(logs)
+    stage = base or _around(logs)
+    experiments: list[Experiment] = []
+    for number, (kind, group) in enumerate(groups):
+        part = share_of(progress, number, len(groups))
+        part(0, 0, f"{kind}: {', '.join(log.name for log in group)}")
+        best = combined(_every_estimate(experiments))[0]
+        prior = Prior(stage, base is not None, {estimate.name: estimate for estimate in best if estimate.determined})
+        result = KINDS[kind].analyse(group, prior, replace(settings, progress=part))
+        experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
+    estimates, warnings = combined(_every_estimate(experiments))
+    doubts = tuple(doubt for experiment in experiments for doubt in KINDS[experiment.kind].doubts(experiment.result))
+    failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
+    if stage is None or (failed and not any(estimate.determined for estimate in estimates)):
+        return Identification(
+            None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings), doubts, failed
+        )
+    warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
+    fits = fitting(stage, estimates)
+    fitted = identified(stage, fits.estimates, [log.name for log, _ in logs])
+    return Identification(
+        fitted,
+        _correlations(experiments, estimates, fits, fitted),
+        tuple(experiments),
+        tuple(estimates),
+        (*warnings, *fits.notes),
+        doubts,
+        failed,
+        origins(fitted, fits.estimates, fits.follows, base is not None),
+    )
+
+
+def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log], base: Stage | None) -> None:
+    """Raises InputError for another log that none of the logs, each with its kind, will be able to predict: before
+    anything is fitted to these."""
+    prior = Prior(base, base is not None)
+    predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
+    for other in others:
+        reasons: list[InputError] = []
+        for kind, predictor in predictors.items():
+            try:
+                predictor.check([log for log, name in logs if name == kind], other, prior)
+            except InputError as error:
+                reasons.append(error)
+        if not predictors:
+            raise _unpredictable(other)
+        if len(reasons) == len(predictors):
+            raise reasons[0]
+
+
+def predict(
+    identification: Identification, log: Log, settings: AnalysisSettings, base: Stage | None = None
+) -> Prediction:
+    """Another log of the same machine, predicted by the first experiment that can, kinds that rest on others first: the
+    stage as its log alone shows it, not as combined, so that the errors are those of one record on another. The
+    controller is that of `base`, or of the log's own set-up. Raises InputError where none can."""
+    prior = Prior(base, base is not None)
+    predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
+    for kind, predictor in predictors.items():
+        for experiment in identification.experiments:
+            result = predictor.predict(experiment.result, log, prior, settings) if experiment.kind == kind else None
+            if result is not None:
+                return Prediction(log, kind, result)
+    raise _unpredictable(log)
+
+
+def _unpredictable(log: Log) -> InputError:
+    """The error for a log that no kind of experiment at hand predicts."""
+    needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
+    expected = ", or ".join(needs)
+    return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+
+
+def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
+    """A sentence for each log whose set-up has keys that the stage does not have."""
+    several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
+    return [
+        f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
+        for name, keys in several.items()
+        if keys
+    ]
+
+
+def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:
+    """The logs by experiment, in the order of analysis."""
+    return [
+        (name, group)
+        for name in in_order()
+        for group in KINDS[name].groups([log for log, kind in logs if kind == name])
+    ]
+
+
+def _around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
+    """A stage around the first log that shows enough of a machine; None without one."""
+    for log, kind in logs:
+        around = KINDS[kind].around
+        if around is not None and isinstance(log, Log) and (stage := around(log)) is not None:
+            return stage
+    return None
+
+
+def _every_estimate(experiments: Sequence[Experiment]) -> list[Estimate]:
+    return [estimate for experiment in experiments for estimate in experiment.estimates]
+
+
+def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
+    """What to know of the results, kind by kind."""
+    results: dict[str, list[Any]] = {}
+    for experiment in experiments:
+        results.setdefault(experiment.kind, []).append(experiment.result)
+    return [note for kind, several in results.items() for note in KINDS[kind].notes(several, base)]
+
+
+def _correlations(
+    experiments: Sequence[Experiment], estimates: Sequence[Estimate], fits: Fitting, stage: Stage
+) -> Correlations:
+    """Those of the keys that the stage file has as they were estimated, and of what moves along with one of these."""
+    keys, matrix = correlations(
+        _every_estimate(experiments),
+        [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],
+    )
+    uncertain = stage.uncertain()
+    leads = {
+        estimate.name: estimate.name for estimate in fits.estimates if estimate.name in keys and estimate in estimates
+    } | {**fits.follows}
+    leading = [key for key, lead in leads.items() if key in uncertain and lead in keys]
+    places = [keys.index(leads[key]) for key in leading]
+    part = matrix[np.ix_(places, places)]
+    alone = np.abs(part - np.eye(len(leading))).max(axis=1, initial=0.0) == 0
+    return Correlations(tuple(leading), part).among(
+        [key for key, single in zip(leading, alone, strict=True) if not single]
+    )

@@ -1,0 +1,115 @@
+"""What the whole model lacks, in the intervals of its estimates; and the inverse model's estimates in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import InverseModel
+from friso.identification.output_error.parameters import is_free
+from friso.identification.quality import Quality
+
+
+def _of_inverse(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
+    """The quantity of the inverse model behind a key, and the key over it."""
+    bodies = [key for key in ("masses.cart", "masses.stage") if key in flat]
+    total = sum(flat[key] for key in bodies)
+    bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
+    shares = {key: ("mass", flat[key] / total) for key in bodies}
+    return {
+        **shares,
+        "friction.coulomb": ("coulomb", 1.0),
+        "friction.viscous": ("viscous", 1.0),
+        bias: ("offset", -1.0),
+    }
+
+
+def all_with_model_error(
+    estimates: Sequence[Estimate], inverse: InverseModel, flat: Mapping[str, Any], quality: Quality
+) -> tuple[Estimate, ...]:
+    """The estimates of a rigid stage with intervals that allow for what the model lacks."""
+    if is_free(flat):
+        return tuple(estimates)
+    sources, plain = _of_inverse(flat), {estimate.name: estimate for estimate in inverse.estimates}
+    plainly_left = float(np.sqrt(np.mean((inverse.measured - inverse.fitted) ** 2)))
+    alike = min(1.0, quality.left / plainly_left) if plainly_left > 0 else 1.0
+    return tuple(
+        with_model_error(estimate, plain[sources[estimate.name][0]], sources[estimate.name][1], quality.lacking, alike)
+        if estimate.name in sources
+        else estimate
+        for estimate in estimates
+    )
+
+
+def with_causes(estimates: Sequence[Estimate], flat: Mapping[str, Any], quality: Quality) -> tuple[Estimate, ...]:
+    """The estimates with intervals that reach as far as what the log says once it is rid of what may be wrong."""
+    if quality.without_cause is None or is_free(flat):
+        return tuple(estimates)
+    sources, without = _of_inverse(flat), {estimate.name: estimate for estimate in quality.without_cause.estimates}
+    return tuple(
+        spanning(estimate, without[sources[estimate.name][0]], sources[estimate.name][1])
+        if estimate.name in sources
+        else estimate
+        for estimate in estimates
+    )
+
+
+def spanning(estimate: Estimate, other: Estimate, scale: float) -> Estimate:
+    """An estimate whose interval reaches as far as that of another one, times `scale`: of two that differ by a cause
+    that nobody has settled."""
+    if not (estimate.determined and other.determined):
+        return estimate
+    low, high = sorted((scale * other.low, scale * other.high))
+    return replace(estimate, low=min(estimate.low, low), high=max(estimate.high, high))
+
+
+def not_described(estimates: Sequence[Estimate]) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """Nothing of what a fit to a record says that no model describes."""
+    answers = (Estimate.unknown(one.name, one.unit, one.method, NOT_DESCRIBED) for one in estimates)
+    return tuple(answers), np.zeros((0, 0))
+
+
+def of_inverse_model(
+    inverse: InverseModel, flat: Mapping[str, Any], estimates: Sequence[Estimate]
+) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """What the inverse model shows, where the whole model contradicts the record; all else is not shown."""
+    sources, plain = _of_inverse(flat), {estimate.name: estimate for estimate in inverse.estimates}
+    answers = []
+    for estimate in estimates:
+        name, scale = sources.get(estimate.name, ("", 1.0))
+        if name and not (is_free(flat) and estimate.name.startswith("masses.")):
+            one = plain[name]
+            ends = sorted((scale * one.low, scale * one.high))
+            answers.append(
+                replace(one, name=estimate.name, unit=estimate.unit, value=scale * one.value, low=ends[0], high=ends[1])
+            )
+        else:
+            answers.append(Estimate.unknown(estimate.name, estimate.unit, estimate.method, CONTRADICTED))
+    certain = [answer for answer in answers if answer.determined]
+    return tuple(answers), np.eye(len(certain))
+
+
+NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
+"""Why nothing at all is taken from a fit."""
+
+CONTRADICTED = "the whole model contradicts the record"
+"""Why nothing but what the inverse model shows is taken from a fit."""
+
+
+def with_model_error(
+    estimate: Estimate, inverse: Estimate, scale: float, lacking: float, alike: float = 1.0
+) -> Estimate:
+    """An estimate of the whole model whose interval allows for what the model lacks, by the share of what is left that
+    is not noise (`lacking`): as much wider as it lies outside of the inverse model's interval, and no narrower than
+    that where both models leave `alike` much, 1 for as much as the inverse model: what both lack moves both. `scale` is
+    the key over the inverse model's quantity."""
+    if not (estimate.determined and inverse.determined):
+        return estimate
+    half = abs(scale) * inverse.half_width
+    beyond = abs(estimate.value - scale * inverse.value) - half
+    more = lacking * max(0.0, beyond) + max(0.0, lacking * alike * half - estimate.half_width)
+    return replace(estimate, low=estimate.low - more, high=estimate.high + more, systematic=estimate.systematic + more)

@@ -1,0 +1,191 @@
+"""The analysis of moves: the inverse model by least squares, then the whole model by its output error; and another log
+of the same machine, simulated with what they show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.doubts import quality_of
+from friso.identification.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
+from friso.identification.logs.log import Log
+from friso.identification.model_error import all_with_model_error, not_described, of_inverse_model, with_causes
+from friso.identification.output_error.answers import estimates_of
+from friso.identification.output_error.coverage import Coverage, coverage
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.identifiable import fit_identifiable
+from friso.identification.output_error.parameters import MASS, is_free, keys_of, parameters_of
+from friso.identification.output_error.problem import Problem, Simulated, closed_loop, tracking
+from friso.identification.output_error.profile import Profile
+from friso.identification.quality import Quality, noise_of
+from friso.progress import Progress, silent
+from friso.stage.controllers import CONTROLLER
+
+
+@dataclass(frozen=True)
+class IdentifiedMoves:
+    """What was found: both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name,
+    the estimates by key of the stage file with the `correlation` of the shown ones, what the motion covers, the
+    simulated record of the fit and its errors, and `part`, the samples of the log used.
+
+    `loop` is the machine's own closed loop, which was simulated; without it (None) the stage followed the log, and the
+    simulated force is what it took to hold it there, which the model does not explain."""
+
+    log: Log
+    part: slice
+    inverse: InverseModel
+    by_direction: InverseModel
+    fit: OutputErrorFit
+    profiles: Mapping[str, Profile]
+    estimates: tuple[Estimate, ...]
+    correlation: np.ndarray
+    covered: Coverage
+    simulated: Simulated
+    errors: SimulationErrors
+    residual: Residual
+    loop: Problem | None
+    quality: Quality
+
+    @property
+    def correlated(self) -> tuple[Estimate, ...]:
+        """The estimates that the rows of `correlation` stand for."""
+        return tuple(estimate for estimate in self.estimates if estimate.determined)
+
+    @property
+    def force_unit(self) -> str:
+        """The unit of the force, which estimates hold in the newton's place."""
+        return self.log.unit("force")
+
+    @property
+    def flat(self) -> dict[str, Any]:
+        """The stage as fitted, as flat keys; what the record does not show is as in the stage given."""
+        return self.fit.stage
+
+
+def identify_moves(
+    log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None, progress: Progress = silent
+) -> IdentifiedMoves:
+    """Mass, friction and what else the moves of a log show of a stage given as flat keys.
+
+    With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
+    else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default. Where
+    the force is not in newtons, which no loop of a machine allows, estimates are per unit of it. Raises InputError for
+    a log without position or force.
+    """
+    check_roles(log, ("position", "force", *(("reference",) if own_loop else ())), () if own_loop else ("force",))
+    part = log.longest
+    share = _cart_share(log, flat)
+    inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
+    follows, loop = _problems(log, part, flat, inverse, own_loop)
+    moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
+    starts = {parameter.name: parameter.start for parameter in follows.parameters}
+    mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
+    covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
+    noise = noise_of(log["force"][part])
+    answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, progress)
+    estimates, correlation = estimates_of(answer, covered)
+    fit = answer.fit
+    quality = quality_of(log, inverse, fit, noise, share)
+    if quality.failed:
+        estimates, correlation = not_described(estimates)
+    elif quality.rejected:
+        estimates, correlation = of_inverse_model(inverse, flat, estimates)
+    else:
+        estimates = all_with_model_error(estimates, inverse, flat, quality)
+    estimates = with_causes(estimates, flat, quality)
+    simulated = (loop or follows).record(fit.inner)
+    return IdentifiedMoves(
+        log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
+        errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
+        residual_of(fit.residual, moved, log.sample_time), loop, quality,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SimulatedLog:
+    """Another log of the same axis, simulated: the samples used, the record, and its errors."""
+
+    part: slice
+    simulated: Simulated
+    errors: SimulationErrors
+
+
+def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
+    """Another log of the same axis simulated with the estimates; `set_up` are the flat keys of the stage as it was
+    set up for that log, whose controller and changed keys count.
+
+    Raises InputError where the machine's own loop is not known.
+    """
+    if moves.loop is None:
+        expected = "the machine's own controller, with which another record can be simulated"
+        raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
+    part = log.longest
+    problem = _same_kind(moves.loop, log, part, set_up, {*log.setup, *moves.log.setup})
+    simulated = problem.record(moves.fit.inner)
+    return SimulatedLog(part, simulated, errors_of(log, part, simulated, moves.inverse.bandwidth))
+
+
+def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:
+    """The same stage and parameters on another log, with the controller and the `changed` keys of its set-up."""
+    check_roles(log, ("position", "force", "reference"))
+    flat = dict(problem.flat)
+    if set_up is not None:
+        flat = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
+        flat |= {key: value for key, value in set_up.items() if key.startswith(f"{CONTROLLER}.") or key in changed}
+    return closed_loop(flat, log, part, problem.parameters)
+
+
+def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> None:
+    """Raises InputError for a role that a log does not have, or in another unit than SI, but for the `foreign`."""
+    for role in roles:
+        if role not in log:
+            actual = f"a log with {', '.join(log.signals) or 'no signals'}"
+            raise InputError(role, actual, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
+        if role in log.units and role not in foreign:
+            example = f'--scale {role}="35 {"N" if role == "force" else "mm"}/{log.unit(role)}"'
+            raise InputError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
+
+
+def _problems(
+    log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
+) -> tuple[Problem, Problem | None]:
+    """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
+    speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
+    levels = _levels(log, flat, inverse)
+    position = log["position"][part]
+    every = parameters_of(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
+    parameters = [replace(parameter, unit=unit_of(parameter.unit, log)) for parameter in every]
+    full = {**flat, **keys_of(flat, {parameter.name: parameter.start for parameter in parameters})}
+    follows = tracking(full, log, part, parameters, inverse.bandwidth)
+    return follows, closed_loop(full, log, part, parameters) if own_loop else None
+
+
+def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
+    """The share of the mass that moves with the cart, where that is measured apart from a stage on a free joint."""
+    if not is_free(flat) or not ("cart_position" in log or "relative_position" in log):
+        return 0.0
+    return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
+
+
+def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
+    """Where the fit starts: at the inverse model's values, as far as it shows them and is one of this stage.
+
+    It knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free joint whose
+    cart is not measured starts at the stage given.
+    """
+    if is_free(flat) and not _cart_share(log, flat):
+        mass = flat["masses.cart"] + flat["masses.stage"]
+        return {"mass": mass, "coulomb": flat["friction.coulomb"], "viscous": flat["friction.viscous"], "offset": 0.0}
+    levels = {"offset": inverse.value("offset")}
+    for estimate in inverse.estimates:
+        if estimate.name in ("mass", "viscous", "coulomb"):
+            value = inverse.value(estimate.name)
+            levels[estimate.name] = value if value > 0 and not estimate.low <= 0 else max(estimate.high / 2, 1e-6)
+            levels[estimate.name] = levels[estimate.name] if np.isfinite(levels[estimate.name]) else max(value, 1e-6)
+    return levels

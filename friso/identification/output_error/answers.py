@@ -1,0 +1,124 @@
+"""From fitted numbers to keys of the stage file, with their intervals or what is left possible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.output_error.coverage import Coverage
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.identifiable import Identified, reason
+from friso.identification.output_error.parameters import MASS, RATIO, SHARE, keys_of
+from friso.identification.output_error.profile import Profile
+from friso.identification.readings.common import LINEARITY
+from friso.intervals import COVERAGE
+
+METHOD = "output error"
+
+FOLLOWED = 0.05
+"""Share by which static friction may be off where the stage follows the log instead of its reference: it comes out too
+high, by 3 to 6 % in those of 21 machines of known truth that a narrower interval missed (docs/identify.md)."""
+
+MOST = 1.0
+"""Half of a 95 % interval, of the logarithm, from which on a record does not bound a quantity."""
+
+
+def estimates_of(identified: Identified, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """The keys of the stage file with their intervals, and the correlation of those shown."""
+    fit = identified.fit
+    parameters = fit.problem.parameters
+    spread = np.zeros((len(parameters), len(parameters)))
+    finite_variance = np.isfinite(np.diag(fit.covariance))
+    places = [number for number, finite in zip(fit.free, finite_variance, strict=True) if finite]
+    spread[np.ix_(places, places)] = _no_narrower(fit, identified.profiles)[np.ix_(finite_variance, finite_variance)]
+    keys, slopes = _slopes(fit)
+    covariance = slopes @ spread @ slopes.T
+    values = _keys_at(fit, fit.inner)
+    shares = [FOLLOWED if key == "friction.static" and not fit.problem.closed else LINEARITY for key in keys]
+    linear = np.array(shares) * np.abs([values[key] for key in keys]) / COVERAGE
+    deviation = np.hypot(np.sqrt(np.diag(covariance)), linear)
+    unknown = _reasons(identified, covered)
+    estimates = []
+    for i, key in enumerate(keys):
+        owner = _OWNERS.get(key, key)
+        like = "friction.coulomb" if key == "friction.static" else owner
+        unit = next((parameter.unit for parameter in parameters if parameter.name in (key, like)), "")
+        if key in unknown or owner in unknown:
+            low, high = (-np.inf, np.inf) if key in unknown and owner != key else _range(fit, owner)
+            estimates.append(Estimate.unknown(key, unit, METHOD, unknown.get(key) or unknown[owner], low, high))
+        else:
+            estimates.append(Estimate.normal(key, unit, values[key], deviation[i], METHOD))
+    certain = [i for i, estimate in enumerate(estimates) if estimate.determined]
+    part = covariance[np.ix_(certain, certain)] / np.outer(deviation[certain], deviation[certain])
+    np.fill_diagonal(part, 1.0)
+    return tuple(estimates), (part + part.T) / 2
+
+
+_OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
+"""The parameter behind a key that has another name."""
+
+
+def _reasons(identified: Identified, covered: Coverage) -> dict[str, str]:
+    """Why parameters, or keys that hang on them, are not shown."""
+    fit = identified.fit
+    parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
+    unknown = {
+        name: reason(name, covered)
+        for name, parameter in parameters.items()
+        if name not in identified.shown and not parameter.core
+    }
+    for number, deviation in zip(fit.free, np.sqrt(np.diag(fit.covariance)), strict=True):
+        parameter = fit.problem.parameters[number]
+        most = MOST if parameter.logarithmic else (parameter.high - parameter.low) / 2
+        if not COVERAGE * deviation < most:
+            unknown.setdefault(parameter.name, "the log does not bound it")
+    if SHARE in unknown:
+        why = f"the log shows the sum of both masses, {fit.value(MASS):.4g} kg, not how it is split"
+        unknown |= {"masses.cart": why, "masses.stage": why}
+    if "friction.coulomb" in parameters and not any(name.startswith("bias.") for name in parameters):
+        total = f"{fit.value('friction.coulomb'):.4g} {parameters['friction.coulomb'].unit}"
+        why = f"the log moves in one direction only: its sum with a constant force is {total}"
+        unknown |= {"friction.coulomb": why, "friction.static": why}
+    return unknown
+
+
+def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
+    """The covariance of the fitted numbers with spreads that reach as far as the profiles do."""
+    spread = np.sqrt(np.diag(fit.covariance))
+    factors = np.ones(len(fit.free))
+    for i, number in enumerate(fit.free):
+        parameter = fit.problem.parameters[number]
+        interval = profiles.get(parameter.name)
+        if interval is None or not np.isfinite(spread[i]) or interval.open_low or interval.open_high:
+            continue
+        half = float(parameter.inner(interval.high) - parameter.inner(interval.low)) / 2
+        if spread[i] > 0:
+            factors[i] = max(1.0, half / (COVERAGE * spread[i]))
+    return fit.covariance * np.outer(factors, factors)
+
+
+def _keys_at(fit: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
+    values = {
+        parameter.name: parameter.outer(number) for parameter, number in zip(fit.problem.parameters, inner, strict=True)
+    }
+    return {key: float(value) for key, value in keys_of(fit.problem.flat, values).items()}
+
+
+def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
+    """The keys of the stage file, and their derivatives to the fitted numbers, shape (keys, parameters)."""
+    at = _keys_at(fit, fit.inner)
+    step = 1e-6
+    moved = [_keys_at(fit, fit.inner + step * row) for row in np.eye(len(fit.inner))]
+    return list(at), np.array([[(keys[key] - at[key]) / step for keys in moved] for key in at])
+
+
+def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
+    """What is possible of a key that is not shown: all that is believed of any bearing, since what a fit makes of such
+    a parameter, it makes up for what the model lacks."""
+    parameter = next(one for one in fit.problem.parameters if one.name == owner)
+    if owner != RATIO:
+        return parameter.low, parameter.high
+    coulomb = fit.value("friction.coulomb")
+    return coulomb * parameter.low, coulomb * parameter.high

@@ -1,0 +1,86 @@
+"""What a record's motion can show at all: slow steady speeds for the Stribeck effect, stuck phases for the bristles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from friso.identification.inverse_model import FilteredMotion
+
+STEADY = 0.5
+"""Share of the Coulomb friction that inertia has to stay below for a motion to count as steady."""
+
+LEAST_TIME = 0.02
+"""Time [s] for which a motion is steady at least."""
+
+NEAR = 3.0
+"""A Stribeck velocity is shown by steady motion within this factor of it, to both sides."""
+
+RESOLVED = 5.0
+"""Standard deviations of the position's noise by which bristles have to bend to be seen."""
+
+SAMPLES, EPISODES = 5, 3
+"""Samples in which the bristles are seen bending at the start of a motion, and number of such starts, at least."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """Speeds of steady motion [m/s], ascending, one per stretch, and for each stretch between
+    turning points the ways [m] gone at its samples, NaN where inertia outweighed friction. Below `resolution` [m] of
+    position nothing is seen, below `slowest` [m/s] no speed."""
+
+    steady: np.ndarray
+    starts: tuple[np.ndarray, ...]
+    resolution: float
+    slowest: float
+
+    def shows_speed(self, speed: float) -> bool:
+        """Whether there is steady motion both below and above a speed [m/s], near it."""
+        below = (self.steady >= speed / NEAR) & (self.steady < speed)
+        above = (self.steady > speed) & (self.steady <= speed * NEAR)
+        return bool(below.any() and above.any())
+
+    @property
+    def gap(self) -> tuple[float, float]:
+        """The widest range of speeds [m/s] without steady motion."""
+        speeds = np.concatenate([[self.slowest], self.steady]) if self.steady.size else np.array([self.slowest, np.inf])
+        widest = int(np.argmax(speeds[1:] / speeds[:-1]))
+        return float(speeds[widest]), float(speeds[widest + 1])
+
+    def shows_length(self, length: float) -> bool:
+        """Whether bristles are seen bending by a length [m], again and again."""
+        passes = [np.sum((distance > RESOLVED * self.resolution) & (distance < length)) for distance in self.starts]
+        return bool(sum(count >= SAMPLES for count in passes) >= EPISODES)
+
+
+def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:
+    """What a motion of shape (n,) shows, of a mass [kg] with this Coulomb friction [N]."""
+    rough = position - moved.position
+    steps = np.abs(np.diff(position))
+    quantum = steps[steps > 0].min() if (steps > 0).any() else 0.0
+    resolution = max(float(np.std(rough)), float(quantum) / np.sqrt(12))
+    length = max(1, round(LEAST_TIME / sample_time))
+    slowest = resolution / (length * sample_time)
+    calm = (mass * np.abs(moved.acceleration) < STEADY * coulomb) & (np.abs(moved.velocity) > slowest)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], calm, [False]]).astype(int)))
+    stretches = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= length]
+    speeds = [_speeds(np.abs(moved.velocity[a:b]), length) for a, b in stretches]
+    steady = np.sort(np.concatenate(speeds)) if speeds else np.zeros(0)
+    return Coverage(steady, _starts(position, moved, mass / coulomb, RESOLVED * resolution), resolution, slowest)
+
+
+def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
+    """Ways [m] gone from each turning point to the next at the samples at which inertia was small; a swing that is less
+    than `swing` [m] turns nothing."""
+    turns = (find_peaks(sign * position, prominence=swing)[0] for sign in (1, -1))
+    ends = np.unique(np.concatenate([[0], *turns]))
+    calm = mass_per_force * np.abs(moved.acceleration) < STEADY
+    pieces = zip(ends, [*ends[1:], len(position)], strict=True)
+    return tuple(np.where(calm[a:b], np.abs(position[a:b] - position[a]), np.nan) for a, b in pieces)
+
+
+def _speeds(speed: np.ndarray, length: int) -> np.ndarray:
+    """The mean speeds of the pieces of a stretch."""
+    return np.array([piece.mean() for piece in np.array_split(speed, max(1, len(speed) // length))])

@@ -1,0 +1,196 @@
+"""Which parameters a log shows: the fit with those that any motion shows, with all, and what of the rest to believe."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from friso.identification.output_error.coverage import Coverage
+from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
+from friso.identification.output_error.parameters import LONGEST, MASS, RATIO, SHARE
+from friso.identification.output_error.problem import Problem
+from friso.identification.output_error.profile import Profile, profile
+from friso.identification.readings.common import low_pass
+from friso.progress import Progress, silent
+
+STRIBECK = (RATIO, "friction.stribeck_velocity")
+BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
+
+STEP_OUT = 1.5
+"""A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
+
+EXPLAINED = 2.0
+"""A fit that leaves no more than so many times the noise of the record explains it."""
+
+SURE = 0.99
+"""Probability that parameters which no motion shows one by one improve the fit all the same."""
+
+STEPS = 10
+"""Pieces of about the same work that a fit with its profiles is."""
+
+SWINGS = 0.25
+"""Natural frequency of the mass on its bristles, times the sample time, up to which a log follows how these bend."""
+
+SHARP = 3.0
+"""Factor between the ends of a profile interval within which a parameter counts as shown."""
+
+
+@dataclass(frozen=True)
+class Identified:
+    """The fit, profiles by name of the parameters that not every motion shows, where they were asked about, and which
+    of these the record does show."""
+
+    fit: OutputErrorFit
+    profiles: Mapping[str, Profile]
+    shown: frozenset[str]
+
+
+def fit_identifiable(
+    follows: Problem,
+    loop: Problem | None,
+    covered: Coverage,
+    bandwidth: float,
+    noise: float,
+    progress: Progress = silent,
+) -> Identified:
+    """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
+
+    A closed loop that explains the record to its noise has the first and last word. Otherwise the stage that follows
+    the log decides which parameters are shown, since a loop that hunts soon gets out of step, and the loop is fitted
+    from there, unless it cannot follow. Where the fit is clearly better with those that are not shown it keeps them:
+    their effect is there, and without it friction and mass would have to explain it."""
+    names = [parameter.name for parameter in follows.parameters]
+    core = {parameter.name for parameter in follows.parameters if parameter.core}
+    progress(0, STEPS, "moves: mass and sliding friction along the log")
+    plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None])
+    if loop is not None:
+        every = tuple(range(len(names)))
+        progress(1, STEPS, "moves: all parameters in closed loop")
+        full = fit(loop, every, np.vstack([nearby(plain), everywhere(loop, every, plain.inner)]))
+        if explains(full, noise):
+            return _believed(full, core, covered, progress, explained=True)
+    progress(3, STEPS, "moves: all parameters along the log")
+    along = _along(follows, plain, core, covered, progress)
+    if loop is None:
+        return along
+    progress(STEPS - 1, STEPS, "moves: the closed loop from there")
+    starts = nearby(along.fit)
+    if set(along.fit.free) - set(_numbers(names, core)):
+        starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
+    looped = fit(loop, along.fit.free, starts)
+    return replace(along, fit=looped) if _in_step(looped, along.fit, bandwidth) else along
+
+
+def explains(fit: OutputErrorFit, noise: float) -> bool:
+    """Whether a fit in the machine's own loop leaves little more than the noise [N] of the record."""
+    return bool(fit.problem.closed and np.sqrt(fit.cost) < EXPLAINED * noise)
+
+
+def _along(
+    follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress
+) -> Identified:
+    """What the stage that follows the log shows."""
+    names = [parameter.name for parameter in follows.parameters]
+    hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
+    if not hopeful:
+        return Identified(plain, {}, frozenset())
+    every = _numbers(names, core | hopeful)
+    full = fit(follows, every, everywhere(follows, every, plain.inner))
+    believed = _believed(full, core, covered, progress)
+    if _pays(full, plain) or believed.shown == hopeful:
+        return believed
+    if not believed.shown:
+        return replace(believed, fit=plain)
+    free = _numbers(names, core | believed.shown)
+    neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
+    return replace(believed, fit=fit(follows, free, neutral[None]))
+
+
+def _believed(
+    full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
+) -> Identified:
+    """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
+    wherever its profiles are sharp."""
+    names = [parameter.name for parameter in full.problem.parameters]
+    asked = [i for i in full.free if names[i] not in core]
+    profiles = {}
+    for number, i in enumerate(asked):
+        progress(4 + min(number, STEPS - 6), STEPS, f"moves: how well {names[i]} is known")
+        profiles[names[i]] = profile(full, i, tuple(other for other in full.free if other != i), full.cost)
+    shown = {
+        name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
+    }
+    return Identified(full, profiles, frozenset(_complete(shown, {*names} - core)))
+
+
+def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
+    """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
+    more = len(full.free) - len(plain.free)
+    return bool(plain.cost > full.cost * (1 + chi2.ppf(SURE, more) / full.independent))
+
+
+def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
+    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, where that
+    counts, both within the motion's bandwidth [Hz], since the latter knows no noise above it."""
+    step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
+    powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
+    return bool(powers[0] <= STEP_OUT**2 * powers[1])
+
+
+def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
+    return tuple(i for i, name in enumerate(names) if name in chosen)
+
+
+def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
+    """Without either of the Stribeck effect's parameters, the other one means nothing."""
+    effect = set(STRIBECK) & optional
+    return identifiable if effect <= identifiable else identifiable - effect
+
+
+def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
+    """Whether the motion covers anything that the parameter could show itself in."""
+    parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
+    if name in STRIBECK:
+        return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
+    if name in BRISTLES:
+        return covered.shows_length(min(LONGEST, float(np.ptp(problem.inputs.reference))))
+    return parameter.unit != "" or name == SHARE
+
+
+def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
+    """Whether a profile closes on both sides, and near by."""
+    parameter = next(one for one in full.problem.parameters if one.name == seen.name)
+    closed = not (seen.open_low or seen.open_high)
+    return closed and (not parameter.logarithmic or seen.high < SHARP * seen.low)
+
+
+def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
+    """Whether the motion covers where a parameter acts."""
+    if name in STRIBECK:
+        return covered.shows_speed(full.value("friction.stribeck_velocity"))
+    if name in BRISTLES:
+        stiffness = full.value("friction.bristle_stiffness")
+        swings = np.sqrt(stiffness / full.value(MASS)) / (2 * np.pi)
+        fast_enough = swings * full.problem.inputs.sample_time < SWINGS
+        return bool(fast_enough and covered.shows_length(full.value("friction.coulomb") / stiffness))
+    return True
+
+
+def reason(name: str, covered: Coverage) -> str:
+    """Why a parameter is not shown, in a sentence."""
+    if name in STRIBECK:
+        low, high = covered.gap
+        if not np.isfinite(high):
+            return "no steady motion at all, in which the Stribeck effect would show"
+        return (
+            f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would show"
+        )
+    if name in BRISTLES:
+        return (
+            "the record passes too quickly, for its sampling, through the first micrometres of every motion, where the "
+            "bristles bend"
+        )
+    return "the fit hardly changes with it, or its end of the range is the best"

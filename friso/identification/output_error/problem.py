@@ -1,0 +1,268 @@
+"""The fit as a problem: what is simulated for given parameters, and how far it is from the log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from friso.engine.arrays import Status
+from friso.engine.driven import Followed, Inputs, follow
+from friso.engine.kernel import Kernel, kernel
+from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
+from friso.equations.driven import Driven
+from friso.equations.roles import Role, Steady
+from friso.equations.structure import structure
+from friso.identification.inverse_model import SMOOTH, motion
+from friso.identification.logs.log import Log
+from friso.identification.output_error.parameters import MASS, FitParameter, stages
+from friso.identification.readings.common import robust
+from friso.stage.controllers import CONTROLLER
+
+STEP = 1e-4
+"""Steps of the fitted numbers for derivatives: shares of the value for logarithmic ones."""
+
+RTOL = 1e-5
+"""Relative tolerance of the simulations."""
+
+CONTINUOUS = "the controller is simulated in continuous time"
+
+SLOW = 10.0
+"""Bandwidth [Hz] at most of the controller that holds a stage to a log's position."""
+
+FIRST = 10
+"""Samples from which the velocity at the beginning is taken."""
+
+REST, STILL = 0.1, 20.0
+"""A stage rests where it goes less than so many standard deviations of the position's noise in this time [s]."""
+
+SETTLED = 3.0
+"""Time constants of the controller that holds a stage to a log, after which it has forgotten where that stood."""
+
+PASSES = 5 / 8
+"""Noise bandwidth [Hz] of a critically damped second-order loop, in units of its natural frequency [rad/s]."""
+
+SAME = 1e-3
+"""Share by which the sample time of the log and that of the drive may differ to count as one."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Simulated records: position, velocity and force of the controller, SI, shape (runs, n) or of one run (n,); NaN
+    after a failure."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A stage as flat keys that follows a log, the parameters, and the force [N] expected of the controller, `target`.
+
+    In a `closed` loop the stage has the controller of its machine and follows the log's reference; the target is
+    the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
+    own whose target is zero: what it has to add is what the model does not explain. `start` holds position
+    [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the fit leaves out.
+    `unsettled` are inputs that the log allows as well as those taken.
+    """
+
+    flat: Mapping[str, Any]
+    form: Driven
+    inputs: Inputs
+    target: np.ndarray
+    parameters: tuple[FitParameter, ...]
+    closed: bool
+    start: tuple[float, float]
+    counted: np.ndarray
+    unsettled: tuple[Inputs, ...] = ()
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        return kernel(self.form)
+
+    @property
+    def passes(self) -> float:
+        """The share of the noise of the log's force, RMS, that the residual holds: all of it in closed loop, and of a
+        stage that is held to the log what the controller that holds it, (2 w s + w^2) / (s + w)^2, lets through."""
+        if self.closed:
+            return 1.0
+        omega = 2 * self.flat[KP] / self.flat[KD]
+        return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
+
+    def beginning(self, count: int) -> Problem:
+        """The same with the first so many samples alone."""
+        inputs = replace(self.inputs, reference=self.inputs.reference[:count], force=self.inputs.force[:count])
+        counted = self.counted[:count]
+        return replace(self, inputs=inputs, target=self.target[:count], counted=counted, unsettled=())
+
+    def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
+        """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
+        flat = stages(self.flat, self.parameters, inner)
+        starts = self._starts(flat, len(inner))
+        for runs in follow(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
+            yield runs.numbers, self._record(flat, runs)
+
+    def record(self, inner: np.ndarray) -> Simulated:
+        """The record of one run, each of shape (n,)."""
+        ((_, record),) = self.simulated(inner[None])
+        return Simulated(record.position[0], record.velocity[0], record.force[0])
+
+    def residuals(self, inner: np.ndarray) -> np.ndarray:
+        """Wanted minus simulated force [N], shape (runs, n), 0 where it does not count; infinite for runs that
+        failed."""
+        residuals = np.empty((len(inner), len(self.target)))
+        for numbers, record in self.simulated(inner):
+            residuals[numbers] = (self.target - record.force) * self.counted
+        return np.where(np.isfinite(residuals), residuals, np.inf)
+
+    def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For each row of fitted numbers, shape (rows, parameters), the residual, shape (n,), and its derivatives to
+        the numbers that are `free` in this row, shape (n, free); all from runs side by side."""
+        owner, number = np.nonzero(free)
+        steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
+        moved = inner[owner].copy()
+        moved[np.arange(len(owner)), number] += steps
+        residuals = self.residuals(np.vstack([inner, moved]))
+        at, off = residuals[: len(inner)], residuals[len(inner) :]
+        slopes = (off - at[owner]) / steps[:, None]
+        return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
+
+    def _step(self, inner: np.ndarray, i: int) -> float:
+        """The step of a number, away from the nearer end of its range."""
+        parameter = self.parameters[i]
+        size = STEP * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
+        return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
+
+    def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
+        """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
+        position, velocity = self.start
+        speed = np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0]
+        beginning = Steady(self.inputs.reference[0] - position, position, velocity, speed, self.target[0])
+        reached = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
+        starts = self.kernel.settled(reached, beginning, runs)
+        if bristles := self.kernel.having(Role.BRISTLE):
+            pull = self.target[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
+            held = flat.get("friction.static", flat["friction.coulomb"])
+            bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
+            starts[:, bristles] = np.reshape(bent, (-1, 1))
+        return starts
+
+    def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
+        position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
+        held = self.kernel.held
+        force = runs.held[:, :, held.index("held_force")] if "held_force" in held else self._force(flat, runs)
+        failed = runs.statuses != Status.DONE
+        return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
+
+    def _force(self, flat: Mapping[str, Any], runs: Followed) -> np.ndarray:
+        """The force of a controller in continuous time, from the states at the samples."""
+        count = runs.states.shape[1]
+        if not self.closed:
+            return self._holding_force(runs)
+        part = {key: value[runs.numbers] if np.ndim(value) else value for key, value in flat.items()}
+        part |= {"motion.size": np.nan, "motion.duration": np.nan}
+        values = [np.asarray(value)[:, None] for value in self.kernel.values(part, len(runs.numbers))]
+        reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
+        states = np.moveaxis(runs.states, 2, 0)
+        modes = self.kernel.modes(states, 0.0, reference, values)
+        outputs = self.kernel.module.outputs(states, modes, 0.0, reference, values)
+        return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
+
+    def _holding_force(self, runs: Followed) -> np.ndarray:
+        """The force [N] of the controller that holds a stage to a log (`tracking`), shape (runs, n)."""
+        rows = self.inputs.segments[0, : runs.states.shape[1]]
+        off, slip = (
+            rows[:, column] - runs.states[:, :, place]
+            for column, place in ((1, self.kernel.position), (2, self.kernel.velocity))
+        )
+        return self.flat[KP] * off + self.flat[KD] * slip
+
+
+def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
+    """The stage with its own controller on the log's reference; a `disturbance` in the log acts beside it."""
+    sampled = "drive.sample_time" in flat and not why_continuous(flat, log.sample_time)
+    samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0
+    count = part.stop - part.start
+    extra = log["disturbance"][part] if "disturbance" in log else np.zeros(count)
+    return Problem(
+        flat,
+        Driven(structure(flat), samples),
+        Inputs(log["reference"][part], extra, log.sample_time),
+        log["force"][part] - extra,
+        tuple(parameters),
+        True,
+        _start(log, part),
+        np.ones(count),
+    )
+
+
+def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
+    """Why the controller of a drive that samples is simulated in continuous time all the same, in a sentence; empty
+    where it is not, or where the drive does not tell its sample time. `sample_time` [s] is the log's."""
+    if "drive.sample_time" not in flat:
+        return ""
+    step = flat["drive.sample_time"]
+    if abs(step / sample_time - 1) >= SAME:
+        return f"{CONTINUOUS}: the drive samples every {1e3 * step:g} ms, the log every {1e3 * sample_time:g} ms"
+    return ""
+
+
+def _is_held(flat: Mapping[str, Any], log: Log) -> bool:
+    """Whether the force of a log is held from each of its samples to the next."""
+    return abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME
+
+
+def tracking(
+    flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
+) -> Problem:
+    """The stage under the log's force, held to the log's smoothed position by a slow controller; `bandwidth` [Hz] is
+    that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest. A log tells
+    neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was."""
+    omega = 2 * np.pi * min(bandwidth, SLOW)
+    smooth, sharper = (
+        motion(log["position"][part], log.sample_time, cutoff * bandwidth).position for cutoff in (SMOOTH, 2 * SMOOTH)
+    )
+    inputs = Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log))
+    mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
+    held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
+    held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
+    return Problem(
+        held,
+        Driven(structure(held)),
+        inputs,
+        np.zeros(part.stop - part.start),
+        tuple(parameters),
+        False,
+        _start(log, part),
+        _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega),
+        (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper)),
+    )
+
+
+def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settling: float) -> np.ndarray:
+    """1 where a motion, shape (n,) [m], moves, and 0 where it rests.
+
+    A stage that sticks does so within micrometres of the log, and the controller that holds it to the log then shows
+    that distance instead of a force: rests do not count, nor does the time `settling` [s] after each of them and after
+    the beginning."""
+    window = max(3, round(REST / sample_time))
+    way = maximum_filter1d(position, window) - minimum_filter1d(position, window)
+    steps = np.abs(np.diff(position))
+    digit = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
+    resting = way <= STILL * max(robust(position - smooth), digit / np.sqrt(12))
+    resting[0] = True
+    late = round(settling / sample_time)
+    recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
+    return np.where(recent, 0.0, 1.0)
+
+
+def _start(log: Log, part: slice) -> tuple[float, float]:
+    """Position [m] and velocity [m/s] at the beginning, from a parabola through the first samples."""
+    time = np.arange(FIRST) * log.sample_time
+    slope = np.polyfit(time, log["position"][part][:FIRST], 2)[1]
+    return float(log["position"][part.start]), float(slope)

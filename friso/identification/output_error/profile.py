@@ -1,0 +1,97 @@
+"""Profile intervals: how far a parameter can be moved, all others following, before the fit gets clearly worse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from friso.identification.output_error.fit import OutputErrorFit
+from friso.identification.output_error.refine import bounds_of, costs, refine
+
+POINTS = 7
+"""Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
+
+WIDE = 4.0
+"""Standard deviations about the fit that the values reach, for a parameter whose spread is known."""
+
+WIDER = 5.0
+"""Times as far each time that the interval does not end within."""
+
+ROUNDS = 3
+"""Iterations of each of these fits."""
+
+WORSE = float(chi2.ppf(0.95, 1))
+"""By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Values of a parameter, ascending [SI], the mean squares of the residual with the other ones fitted [N^2], and
+    what that may at most be inside the 95 % interval; `low` and `high` are the interval's ends, those of the range
+    where it ends nowhere before (`open_low`, `open_high`)."""
+
+    name: str
+    values: np.ndarray
+    cost: np.ndarray
+    limit: float
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+
+
+def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> Profile:
+    """The profile of parameter `number`, with the `others` fitted at each of its values.
+
+    `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
+    or over the whole range.
+    """
+    low, high = (float(end[number]) for end in bounds_of(fit.problem))
+    centre = fit.inner[number]
+    spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
+    limit = best * (1 + WORSE / fit.independent)
+    parameter = fit.problem.parameters[number]
+    half = WIDE * np.sqrt(spread) if spread > 0 else np.inf
+    while True:
+        near, far = max(low, centre - half), min(high, centre + half)
+        values = np.unique([*np.linspace(near, far, POINTS), centre])
+        cost = _costs(fit, number, others, values)
+        left, right, open_left, open_right = _ends(values, cost, limit)
+        if not ((open_left and near > low) or (open_right and far < high)):
+            break
+        half *= WIDER
+    ends = float(parameter.outer(left)), float(parameter.outer(right))
+    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
+
+
+def _costs(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
+    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted."""
+    starts = np.repeat(fit.inner[None], len(values), axis=0)
+    starts[:, number] = values
+    free = np.zeros(starts.shape, bool)
+    free[:, list(others)] = True
+    return refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
+
+
+def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
+    """Where the profile crosses the limit, on both sides of its lowest value, and on which side it does not."""
+    lowest = int(np.argmin(cost))
+    left, right = values[0], values[-1]
+    inside = cost <= max(limit, cost[lowest])
+    below, above = np.flatnonzero(~inside[:lowest]), np.flatnonzero(~inside[lowest:])
+    if below.size:
+        left = _crossing(values, cost, limit, below[-1], below[-1] + 1)
+    if above.size:
+        right = _crossing(values, cost, limit, lowest + above[0], lowest + above[0] - 1)
+    return left, right, not below.size, not above.size
+
+
+def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
+    """Where the profile crosses the limit between two values, by the square root of what it is worse."""
+    if not np.isfinite(cost[outside]):
+        return values[inside]
+    base = min(cost[inside], limit)
+    share = np.sqrt((limit - base) / (cost[outside] - base)) if cost[outside] > base else 1.0
+    return values[inside] + min(share, 1.0) * (values[outside] - values[inside])

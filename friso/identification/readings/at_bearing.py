@@ -1,0 +1,236 @@
+"""From what the drive commands and the sensor sees to the bearing: force and motion of the body that rides on it.
+
+What of a record is looked at is held at a low-pass; friction depends on the whole motion, though, and so the motion is
+seen up to a few times that frequency.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import bilinear, lfilter, lfilter_zi
+
+from friso.identification.kind import Prior
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
+
+FINER = 8
+"""Points per sample for what a mode of the structure does: a mode of a tenth of the sampling rate is off by 0.05 %."""
+
+LEAST, SAMPLED = 20, 0.2
+"""Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over that of the
+samples."""
+
+EXPLAINED = 0.2
+"""Share of the friction's standard deviation that a model may leave unexplained."""
+
+EDGE = 2.0
+"""Periods of the low-pass at either end of a record that its start and end touch."""
+
+SEEN, ROUNDING = 10.0, 1e-9
+"""Standard deviations of the noise that those of the motion have to reach, and the same over the largest position."""
+
+MOVES, STANDS_OUT, GIVES = 0.02, 3.0, 3.0
+"""A joint bends where its deflection reaches this share of the motion, so many times its sensor's noise, and so many
+times what the contact that holds it gives."""
+
+HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
+
+
+@dataclass(frozen=True)
+class StructureMode:
+    """The first mode of a structure on the side of the force and the sensor: a `share` of the moving mass on a spring
+    of its own, and the frequency [Hz] and damping ratio that it has there, the rest being held."""
+
+    share: float
+    frequency: float
+    damping_ratio: float
+
+
+@dataclass(frozen=True)
+class Between:
+    """What lies between the force that is commanded and the bearing: its `delay` [s] (None: not known) and the
+    `bandwidth` of the current loop [Hz]; the `mass` [kg] that is believed to move and the share of it that is `beyond`
+    the joint; the stiffness [N/m] of the `contact` that holds the joint, and of the `joint` itself; the `mode` of the
+    structure; the viscous friction [N s/m] and the half-width of its interval."""
+
+    delay: float | None = None
+    bandwidth: float = np.inf
+    mass: float = 0.0
+    beyond: float = 0.0
+    contact: float = np.inf
+    joint: float = 0.0
+    mode: StructureMode | None = None
+    viscous: tuple[float, float] = (0.0, 0.0)
+
+
+DIRECT = Between()
+"""Nothing lies between; the delay is not known."""
+
+
+def between(flat: Mapping[str, Any]) -> Between:
+    """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
+    limiter.
+
+    The frequency of the parasitic mode is that of both parts of the stage's mass against each other; with the other one
+    held, that of the part on the spring is lower.
+    """
+    drive, joint, mode = (
+        {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
+        for name in ("drive.", "joint.", "parasitic.")
+    )
+    cart, held = (flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
+    lower = np.sqrt(1 - mode["mass"] / held) if mode else 1.0
+    return Between(
+        delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
+        bandwidth=drive.get("current_bandwidth", np.inf),
+        mass=cart + held,
+        beyond=held / (cart + held) if joint and held else 0.0,
+        contact=joint.get("limiter_stiffness", np.inf),
+        joint=joint.get("stiffness", 0.0),
+        mode=StructureMode(mode["mass"] / (cart + held), *(lower * mode[key] for key in ("frequency", "damping_ratio")))
+        if mode
+        else None,
+        viscous=(flat.get("friction.viscous", 0.0), 0.0),
+    )
+
+
+def believed_between(prior: Prior, log: Log) -> Between:
+    """What lies between force and bearing, as other experiments show it or else the stage file has it, which states no
+    viscous friction better than to its whole size. Raises InputError."""
+    believed = between(prior.believed(log))
+    viscous = prior.estimates.get("friction.viscous")
+    return replace(believed, viscous=(believed.viscous[0], viscous.half_width if viscous else believed.viscous[0]))
+
+
+@dataclass(frozen=True)
+class BearingRecord:
+    """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
+    is held), and force [N], shape (n,)."""
+
+    time: np.ndarray
+    position: np.ndarray
+    bent: np.ndarray | None
+    force: np.ndarray
+
+    @property
+    def interval(self) -> float:
+        """Between samples [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def body(self) -> np.ndarray:
+        """About where the body on the bearing is [m], shape (n,)."""
+        return self.position if self.bent is None else self.position - self.bent
+
+    def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
+        """With the motion low-passed at a frequency [Hz], about its start, and every `step`th sample."""
+        place = low_pass(self.position, self.interval, cutoff)
+        bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
+        force = self.force if step == 1 else low_pass(self.force, self.interval, cutoff)
+        return BearingRecord(self.time[::step], (place - place[0])[::step], bent, force[::step])
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """At a `cutoff` [Hz] over time [s], shape (n,)."""
+
+    time: np.ndarray
+    cutoff: float
+
+    @property
+    def inside(self) -> slice:
+        """The samples which the ends of the record do not touch."""
+        edge = int(EDGE / (self.cutoff * (self.time[1] - self.time[0])))
+        return slice(edge, len(self.time) - edge)
+
+    def __call__(self, signal: np.ndarray) -> np.ndarray:
+        """The signal, shape (n,), low-passed, inside."""
+        return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
+
+
+def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
+    """A part of a log. Raises InputError for missing channels."""
+    position, force = channel(log, "position")[part], channel(log, "force")[part]
+    return BearingRecord(
+        log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force
+    )
+
+
+def why_unseen(record: BearingRecord, fewest: int) -> str:
+    """Why nothing can be read from a record, of which so many samples are needed; empty where it can."""
+    if len(record.time) < fewest:
+        return f"the record has {len(record.time)} samples: {fewest} are needed"
+    if not np.ptp(record.force) > 0:
+        return "the force does not change"
+    highest = motion_bandwidth(record.body, record.interval)
+    if highest * record.interval > SAMPLED:
+        needed = SAMPLED / highest
+        sampled = f"one sample in {record.interval:.3g} s"
+        return f"{sampled}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
+    cutoff = max(highest, LEAST / (len(record.time) * record.interval))
+    motion = float(low_pass(record.position, record.interval, cutoff).std())
+    noise = robust(np.diff(record.position, 2)) / 6**0.5
+    if not motion > max(SEEN * noise, ROUNDING * float(np.abs(record.position).max())):
+        return f"the motion, {motion:.2g} m RMS, does not stand out from the noise"
+    return ""
+
+
+def cutoff_of(record: BearingRecord) -> float:
+    """The low-pass [Hz] for a record: where its motion ends, but no slower than its length allows."""
+    highest = motion_bandwidth(record.body, record.interval)
+    return max(min(highest, SAMPLED / (2 * record.interval)), LEAST / (len(record.time) * record.interval))
+
+
+def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position [m] of the body on the bearing, the force [N] that has arrived, and the acceleration [m/s^2] that it
+    gives to the whole moving mass, shape (n,) each: inertia is the mass times that. `mass` [kg] counts where a contact
+    gives way, by the force that goes through it."""
+    time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
+    force, before = _arrived(time, record.force, between), between.beyond * acceleration
+    if between.mode is not None:
+        before = before + between.mode.share * (_followed(time, acceleration, between.mode) - acceleration)
+    gives = (force - mass * before) / between.contact if record.bent is None else record.bent
+    body = record.position - gives
+    return body, force, before + (1 - between.beyond) * rate_of(time, rate_of(time, body))
+
+
+def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
+    """Time derivative of a signal at times [s], both of shape (n,), by a spline."""
+    return CubicSpline(time, signal)(time, 1)
+
+
+def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
+    """The measured deflection [m] of a joint that bends; None where it is not measured, or held and about what its
+    contact `gives` [m]."""
+    measured = deflection(log)
+    if measured is None or len(position) < LEAST:
+        return None
+    bent, cutoff = measured[part], SAMPLED / log.sample_time / 4
+    size = low_pass(bent, log.sample_time, cutoff).std()
+    noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
+    noise *= robust(np.diff(bent, 2)) / 6**0.5
+    return bent if size > max(STANDS_OUT * noise, MOVES * position.std(), GIVES * gives) else None
+
+
+def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
+    """The force [N] that a command [N], shape (n,), has become: late by the delay and by the current loop."""
+    late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
+    if not np.isfinite(between.bandwidth):
+        return late
+    ratio = 1 / (np.pi * between.bandwidth * (time[1] - time[0]))
+    b, a = np.array([1.0, 1.0]) / (1 + ratio), np.array([1.0, (1 - ratio) / (1 + ratio)])
+    return lfilter(b, a, late, zi=lfilter_zi(b, a) * late[0])[0]
+
+
+def _followed(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
+    """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
+    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
+    fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * FINER + 1))
+    damping = 2 * mode.damping_ratio * omega
+    b, a = bilinear([damping, omega**2], [1.0, damping, omega**2], 1 / step)
+    return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][::FINER]

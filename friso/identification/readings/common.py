@@ -1,0 +1,211 @@
+"""What the experiments in time share: checked channels, zero-phase filters, and means whose samples are correlated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import accumulate
+from typing import Any
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt, welch
+from scipy.stats import t as student
+
+from friso.errors import InputError
+from friso.identification.estimate import Estimate
+from friso.identification.logs.log import ROLES, Log
+from friso.intervals import COVERAGE
+
+ORDER = 2
+"""Order of the low-pass filter, which goes over the record forth and back: 4 in all."""
+
+BLOCKS = 8
+"""Blocks into which a stretch is cut for its mean: enough for an interval, each long enough to forget the last."""
+
+NORMAL_MAD = 1.4826
+"""Standard deviation over median absolute deviation, of a normal distribution."""
+
+LINEARITY = 1e-3
+"""Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
+amplifiers."""
+
+_EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
+
+
+def record(name: str, sample_time: float, **signals: Any) -> Log:
+    """A log of plain SI arrays by role, without gaps, `sample_time` [s] apart. Raises InputError for what is none."""
+    arrays = {role: np.asarray(values, dtype=float) for role, values in signals.items()}
+    for role, values in arrays.items():
+        if role not in ROLES:
+            raise InputError(role, "no role", f"one of {', '.join(ROLES)}", "position", name)
+        if values.ndim != 1 or values.shape != next(iter(arrays.values())).shape:
+            raise InputError(role, f"an array of shape {values.shape}", "arrays of one length", "1000 values", name)
+    if not (np.isfinite(sample_time) and sample_time > 0):
+        raise InputError("sample_time", f"{sample_time!r}", "a time greater than 0 s", "1 ms", name)
+    count = len(next(iter(arrays.values()))) if arrays else 0
+    return Log(name, np.arange(count) * sample_time, float(sample_time), arrays, (slice(0, count),))
+
+
+def channel(log: Log, role: str) -> np.ndarray:
+    """The values of a role, in its SI unit and finite, shape (n,). Raises InputError otherwise."""
+    if role not in log:
+        actual = f"channels for {', '.join(log.signals) or 'nothing'}"
+        raise InputError(role, actual, f"a channel for the {role.replace('_', ' ')}", f'--map {role}="NAME"', log.name)
+    if log.unit(role) != ROLES[role]:
+        example = _EXAMPLES.get(role, f'--unit {role}="mm"')
+        raise InputError(role, f"a channel in {log.unit(role)}", f"one in {ROLES[role]}", example, log.name)
+    values = log[role]
+    if not np.isfinite(values).all():
+        actual = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are no finite numbers"
+        raise InputError(role, actual, "finite values, with gaps between segments", "", log.name)
+    return values
+
+
+def deflection(log: Log) -> np.ndarray | None:
+    """Position of the stage minus that of the cart [m], shape (n,): measured, or of two sensors; None without."""
+    if "relative_position" in log:
+        return channel(log, "relative_position")
+    if "cart_position" in log and "position" in log:
+        return channel(log, "position") - channel(log, "cart_position")
+    return None
+
+
+def cart(log: Log) -> np.ndarray | None:
+    """Position of the cart [m], shape (n,): measured, or of two sensors; None without."""
+    if "cart_position" in log:
+        return channel(log, "cart_position")
+    if "relative_position" in log and "position" in log:
+        return channel(log, "position") - channel(log, "relative_position")
+    return None
+
+
+def on_bearing(log: Log) -> np.ndarray:
+    """Position of the body that rides on the bearing [m], shape (n,): the cart, else the one body measured."""
+    moved = cart(log)
+    return channel(log, "position") if moved is None else moved
+
+
+def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
+    """Butterworth low-pass forth and back, without phase shift, at `cutoff` [Hz]; a record sampled too slowly to hold
+    anything above the cut-off, or of fewer samples than the filter's own ends take, is returned as it is."""
+    if cutoff >= 0.45 / sample_time:
+        return values
+    sections = butter(ORDER, cutoff, fs=1 / sample_time, output="sos")
+    padding = min(int(3 / (cutoff * sample_time)), len(values) - 1)
+    return values if len(values) < 10 else sosfiltfilt(sections, values, padlen=padding)
+
+
+def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
+    """Time derivative of the values, sampled every `sample_time` [s] and low-passed at the `cutoff` [Hz], shape (n,);
+    0 for fewer than two."""
+    if len(values) < 2:
+        return np.zeros(len(values))
+    return np.gradient(low_pass(values, sample_time, cutoff), sample_time)
+
+
+CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
+"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
+spectrum, at its top, which is taken for noise; and lines of the spectrum."""
+
+
+def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
+    """The highest frequency [Hz] up to which a position, shape (n,), moves, and stands out of its noise, which is taken
+    to be white; 0 where it does nowhere."""
+    rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
+    white = np.sin(np.pi * rates * sample_time) ** 4
+    top = slice(-int(np.ceil(FLOOR * len(rates))), None)
+    noise = white * float(np.median(density[top] / white[top]))
+    return float(rates[density > np.maximum(CLEAR * noise, STRONG * density.max())].max(initial=0.0))
+
+
+def robust(values: np.ndarray) -> float:
+    """Standard deviation of what most values are like, by the median absolute deviation; 0 of none."""
+    if not len(values):
+        return 0.0
+    return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))
+
+
+def runs(mask: np.ndarray) -> list[slice]:
+    """The stretches over which a mask, shape (n,), is true."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
+    return [slice(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+@dataclass(frozen=True)
+class Mean:
+    """A mean, its standard error and the degrees of freedom of that."""
+
+    value: float
+    error: float
+    freedom: float
+
+
+def block_mean(values: np.ndarray) -> Mean:
+    """The mean with the error that its blocks show: neighbouring samples are not independent."""
+    count = min(BLOCKS, len(values))
+    means = np.array([part.mean() for part in np.array_split(values, count)])
+    error = float(means.std(ddof=1) / np.sqrt(count)) if count > 1 else np.inf
+    return Mean(float(values.mean()), error, count - 1)
+
+
+def correlated_mean(values: np.ndarray) -> Mean:
+    """The mean of values in a row, of which each may resemble the one before (first-order autoregression): the degrees
+    of freedom are those of as many independent ones."""
+    count = len(values)
+    off = values - values.mean()
+    power = float(off @ off)
+    share = min(max(float(off[1:] @ off[:-1]) / power, 0.0), 0.9) if power > 0 and count >= BLOCKS else 0.0
+    independent = max(count * (1 - share) / (1 + share), 2.0)
+    error = float(values.std(ddof=1) / np.sqrt(independent))
+    return Mean(float(values.mean()), error, max(round(independent) - 1, 1))
+
+
+def t_value(freedom: float) -> float:
+    """Half-width of a 95 % interval of Student's t distribution, in standard errors."""
+    return float(student.ppf(0.975, freedom))
+
+
+def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: float = 0.0) -> Estimate:
+    """An estimate with Student's interval, widened by what is systematic: `low` below and `high` above."""
+    half = t_value(mean.freedom) * mean.error
+    ends = (mean.value - half - low, mean.value + half + high)
+    return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
+
+
+def solved(square: np.ndarray, product: np.ndarray) -> np.ndarray:
+    """The solution of normal equations, shape (p, p) and (p,), whose columns are of very different size; 0 for one that
+    is empty."""
+    size = np.sqrt(np.maximum(np.diag(square), 0.0))
+    size = np.where(size > 0, size, 1.0)
+    return np.linalg.lstsq(square / np.outer(size, size), product / size, rcond=None)[0] / size
+
+
+def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
+    parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
+    square, product = columns.T @ columns, columns.T @ target
+    without = np.array([solved(square - x.T @ x, product - x.T @ y) for x, y in parts])
+    off = without - without.mean(axis=0)
+    return off.T @ off * (BLOCKS - 1) / BLOCKS
+
+
+def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:
+    """Correlation, shape (p, p), of quantities of that covariance, which systematic `shifts`, shape (m, p), move
+    together, and doubts of half-width `even`, shape (p,), each by itself."""
+    total = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
+    size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
+    return total / np.outer(size, size)
+
+
+def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
+    """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
+    come to rest at `ends` [m], both of shape (n - 1,), from a deflection at the `start` [m] on; exact in each move."""
+    remaining = np.exp(-np.abs(moves) / ends)
+    steps = zip((np.sign(moves) * ends).tolist(), remaining.tolist(), strict=True)
+    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=start)])
+
+
+def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+    """Either direction by name, with the mask of what belongs to it."""
+    yield "forward", directions > 0
+    yield "backward", directions < 0

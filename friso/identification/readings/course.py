@@ -1,0 +1,110 @@
+"""How a log goes that nobody has named: whether its reference moves, and what repeats in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+from friso.errors import InputError
+from friso.identification.logs.log import Log
+from friso.identification.response.period import find_periods
+
+BACK = 0.1
+"""A signal turns where it goes back by this share of its range."""
+
+STILL = 0.01
+"""Share of the travel within which a position rests."""
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """What repeats in a log: every so many `samples`, with about so many `harmonics`, turning so many times in between,
+    while the position rests for a share of the time."""
+
+    samples: int
+    harmonics: float
+    turns: int
+    rests: float
+
+
+@dataclass(frozen=True)
+class Course:
+    """How a log goes."""
+
+    log: Log
+
+    @property
+    def reference_moves(self) -> bool:
+        """Whether there is a reference that is not constant."""
+        return "reference" in self.log and bool(np.ptp(self.log["reference"][self.log.longest]) > 0)
+
+    @property
+    def signal(self) -> str:
+        """The role of what drives it from outside: the force injected, else a reference that moves, else the force."""
+        return external(self.log) or "force"
+
+    @cached_property
+    def repetition(self) -> Repetition | None:
+        """What repeats in this signal; None where nothing does."""
+        part = self.log.longest
+        try:
+            periods = find_periods(self.log[self.signal][part])
+        except InputError:
+            return None
+        period = periods.cut(self.log[self.signal][part]).mean(axis=0)
+        moved = self.log["position"][part][periods.start : periods.stop]
+        return Repetition(periods.samples, _harmonics(period), _turns(period), _rest(moved, periods.samples))
+
+    @property
+    def repeats(self) -> str:
+        """What repeats, in words; "" for nothing."""
+        repetition = self.repetition
+        return f"the {self.signal} repeats every {repetition.samples} samples" if repetition else ""
+
+    @property
+    def words(self) -> str:
+        """The whole of it in words."""
+        repetition = self.repetition
+        if repetition is None:
+            return "a log whose reference stands still, with nothing periodic in it"
+        between = f"has about {repetition.harmonics:.0f} harmonics and {repetition.turns} reversals per period"
+        return f"a log in which {self.repeats}, {between}"
+
+
+def external(log: Log) -> str | None:
+    """The role of what moves a loop from outside: the force injected, else a reference that moves; None without one.
+
+    A reference that is held constant excites nothing.
+    """
+    roles = ("disturbance", "reference")
+    return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
+
+
+def _harmonics(period: np.ndarray) -> float:
+    """How many harmonics of equal power would spread as those of a signal over one period, shape (samples,), do."""
+    power = np.abs(np.fft.rfft(period)[1:]) ** 2
+    return float(power.sum() ** 2 / np.sum(power**2))
+
+
+def _rest(position: np.ndarray, samples: int) -> float:
+    """Share of the time in which the position stays within `STILL` of its travel for a tenth of a period.
+
+    A sine does so at no time: about its turning points it moves by 2.4 % of its travel.
+    """
+    size = max(samples // 10, 2)
+    moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
+    return float(np.mean(moved < STILL * np.ptp(position)))
+
+
+def _turns(period: np.ndarray) -> int:
+    """How often a signal over one period, shape (samples,), turns back by more than `BACK` of its range."""
+    least, turns, direction, last = BACK * np.ptp(period), 0, 1.0, period[0]
+    for value in period:
+        if (value - last) * direction > 0:
+            last = value
+        elif (last - value) * direction > least:
+            direction, last, turns = -direction, value, turns + 1
+    return turns

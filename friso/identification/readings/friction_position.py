@@ -1,0 +1,244 @@
+"""Friction against the place on the rail, at constant speed, and whether it can be read off at all (thesis, Fig. 21).
+
+The actuator force is friction only where the motion is steady and the loop quick enough to follow; that it is friction
+of the rail, and not the loop's own swinging, shows in that passes over the same places repeat it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.signal import lfilter, periodogram
+
+from friso.identification.estimate import Estimate
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import block_mean, by_t, channel, low_pass, on_bearing
+from friso.identification.readings.passes import CUTOFF, Pass, passes
+from friso.intervals import COVERAGE
+
+POINTS = 400
+"""Places of a map over the whole travel."""
+
+REPEATS = 0.5
+"""Correlation of the maps of two passes from which they repeat each other."""
+
+DRAWS = 300
+"""Random fields by which the interval of the correlation length is found."""
+
+LEAST_LENGTHS = 5.0
+"""Correlation lengths that a pass must hold for its correlation length to be shown."""
+
+HARMONICS = 3
+"""Harmonics reported of each pass."""
+
+
+@dataclass(frozen=True)
+class Harmonic:
+    """An oscillation over the place: wavelength [m], amplitude [N], and the frequency [Hz] in time at that speed."""
+
+    wavelength: float
+    amplitude: float
+    frequency: float
+
+
+@dataclass(frozen=True)
+class PassMap:
+    """One pass: velocity [m/s]; force [N] over `places` [m], NaN where it was not, shape (POINTS,); mean force and
+    standard deviation about it [N], correlation length [m]; the strongest harmonics; whether the motion was steady."""
+
+    velocity: float
+    places: np.ndarray
+    force: np.ndarray
+    mean: Estimate
+    spread: float
+    correlation_length: Estimate
+    harmonics: tuple[Harmonic, ...]
+    steady: bool
+
+
+@dataclass(frozen=True)
+class FrictionPosition:
+    """The passes; `repeatability`, the mean correlation of the maps of pairs over the same places, and that of every
+    pair as (first, second, correlation); whether dynamic friction can be `separated`, and the sentence that says so."""
+
+    passes: tuple[PassMap, ...]
+    repeatability: Estimate
+    pairs: tuple[tuple[int, int, float], ...]
+    separated: bool
+    verdict: str
+    warnings: tuple[str, ...]
+
+
+def friction_position(
+    log: Log, mass: float = 0.0, crossover: float | None = None, cutoff: float = CUTOFF
+) -> FrictionPosition:
+    """Friction along the rail from the passes at constant velocity, `mass` [kg] times acceleration taken off.
+
+    With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
+    InputError for missing channels.
+    """
+    stretches = passes(log, cutoff)
+    position, force = on_bearing(log), channel(log, "force")
+    if not stretches:
+        unknown = _no_repeatability("no stretch of constant velocity")
+        verdict = "Dynamic friction cannot be determined: the log has no stretch of constant velocity."
+        return FrictionPosition((), unknown, (), False, verdict, ())
+    travel = [np.ptp(position[p.span]) for p in stretches]
+    long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
+    ends = [position[p.span] for p in long]
+    places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS)
+    maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, cutoff)) for stretch in long)
+    pairs = _pairs(maps)
+    repeatability = _repeatability(maps, pairs)
+    separated, verdict = _verdict(maps, repeatability, crossover)
+    short = len(stretches) - len(long)
+    warnings = [f"{short} passes shorter than a fifth of the longest are left out."] if short else []
+    if not mass:
+        warnings.append("No mass is given: the force contains that of inertia.")
+    return FrictionPosition(maps, repeatability, pairs, separated, verdict, tuple(warnings))
+
+
+def _map(
+    stretch: Pass,
+    places: np.ndarray,
+    position: np.ndarray,
+    force: np.ndarray,
+    sample_time: float,
+    settings: tuple[float, float],
+) -> PassMap:
+    """Mean force by place; places are met once, or several times where the motion goes back a little."""
+    mass, cutoff = settings
+    x, f = position[stretch.span], force[stretch.span]
+    smooth = low_pass(x, sample_time, cutoff)
+    f = f - mass * np.gradient(np.gradient(smooth, sample_time), sample_time)
+    step = places[1] - places[0]
+    bins = np.clip(np.round((x - places[0]) / step).astype(int), 0, len(places) - 1)
+    count = np.bincount(bins, minlength=len(places))
+    with np.errstate(invalid="ignore"):
+        mapped = np.where(count > 0, np.bincount(bins, f, minlength=len(places)) / count, np.nan)
+    inside = np.arange(bins.min(), bins.max() + 1)
+    there = inside[count[inside] > 0]
+    mapped[inside] = np.interp(inside, there, mapped[there])  # places passed between two samples
+    row = mapped[inside]
+    mean = by_t("friction force along the rail", "N", block_mean(row), "mean over the place by blocks")
+    flat = row - np.polyval(np.polyfit(inside, row, 1), inside)
+    return PassMap(
+        stretch.velocity,
+        places,
+        mapped,
+        mean,
+        float(row.std()),
+        _correlation_length(flat, step),
+        _harmonics(flat, step, abs(stretch.velocity)),
+        stretch.steady,
+    )
+
+
+def _length(fields: np.ndarray) -> np.ndarray:
+    """Lag, in places, at which the autocorrelation of each field falls to 1/e, shape (fields,); NaN if it does not."""
+    count = fields.shape[1]
+    power = np.abs(np.fft.rfft(fields, 2 * count, axis=1)) ** 2
+    correlation = np.fft.irfft(power, axis=1)[:, : count // 2]
+    correlation = correlation / correlation[:, :1]
+    below = correlation < np.exp(-1)
+    at = np.where(below.any(axis=1), below.argmax(axis=1), 1)
+    rows = np.arange(len(fields))
+    before, after = correlation[rows, at - 1], correlation[rows, at]
+    return np.where(below.any(axis=1), at - 1 + (before - np.exp(-1)) / (before - after), np.nan)
+
+
+def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
+    """Where the autocorrelation of the field is 1/e; its interval by the ratio of found to true length of
+    random fields with exponential correlation, detrended in the same way."""
+    name, unit, method = "correlation length", "m", "autocorrelation of the force over the place falls to 1/e"
+    if not np.ptp(flat) > 0:
+        return Estimate.unknown(name, unit, method, "the force does not vary with the place")
+    length = float(_length(flat[None])[0])
+    count = len(flat)
+    if not length * LEAST_LENGTHS <= count:
+        reason = f"the pass holds fewer than {LEAST_LENGTHS:g} correlation lengths"
+        return Estimate.unknown(name, unit, method, reason, low=count / LEAST_LENGTHS * step)
+    share = np.exp(-1 / max(length, 0.5))
+    noise = np.random.default_rng(0).standard_normal((DRAWS, count + int(5 * length) + 1))
+    fields = np.asarray(lfilter([1.0], [1.0, -share], noise, axis=1))[:, -count:]
+    trend = np.stack([np.ones(count), np.linspace(-1, 1, count)])
+    fields -= fields @ np.linalg.pinv(trend) @ trend
+    low, middle, high = np.nanpercentile(_length(fields) / max(length, 0.5), [2.5, 50, 97.5])
+    value, least, most = (float(length / ratio * step) for ratio in (middle, high, low))
+    return Estimate(name, unit, value, least, most, method)
+
+
+def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, ...]:
+    """The strongest lines of the spectrum over the place."""
+    rates, power = periodogram(flat, 1 / step, window="hann", scaling="spectrum")
+    inner = np.flatnonzero((power[1:-1] > power[:-2]) & (power[1:-1] >= power[2:])) + 1
+    best = inner[np.argsort(power[inner])[::-1][:HARMONICS]]
+    return tuple(Harmonic(float(1 / rates[i]), float((2 * power[i]) ** 0.5), float(speed * rates[i])) for i in best)
+
+
+def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
+    """Correlation of the maps, detrended, of all pairs that share at least half of the shorter one's places; passes in
+    opposite directions by the friction against the motion."""
+    pairs = []
+    for (i, first), (j, second) in combinations(enumerate(maps), 2):
+        common = np.isfinite(first.force) & np.isfinite(second.force)
+        shorter = min(np.isfinite(first.force).sum(), np.isfinite(second.force).sum())
+        if common.sum() >= max(0.5 * shorter, 20):
+            x = np.arange(common.sum())
+            rows = [np.sign(m.velocity) * m.force[common] for m in (first, second)]
+            rows = [r - np.polyval(np.polyfit(x, r, 1), x) for r in rows]
+            sizes = float(np.sqrt(np.sum(rows[0] ** 2) * np.sum(rows[1] ** 2)))
+            pairs.append((i, j, float(rows[0] @ rows[1]) / sizes if sizes > 0 else 0.0))
+    return tuple(pairs)
+
+
+def _no_repeatability(reason: str) -> Estimate:
+    return Estimate.unknown(
+        "repeatability", "1", "correlation of the force over the place between passes", reason, -1, 1
+    )
+
+
+def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float], ...]) -> Estimate:
+    """Mean correlation of the pairs, by Fisher's z; as many independent places as correlation lengths in a pass."""
+    if not pairs:
+        return _no_repeatability("no two passes over the same places")
+    z = np.arctanh(np.clip([r for _, _, r in pairs], -0.999999, 0.999999))
+    lengths = [m.correlation_length for m in maps]
+    lengths_shown = [length.value for length in lengths if length.determined]
+    if not lengths_shown:
+        return _no_repeatability("the passes are too short against the correlation length of the force")
+    travel = min(np.isfinite(m.force).sum() * (m.places[1] - m.places[0]) for m in maps)
+    independent = max(travel / (2 * float(np.median(lengths_shown))), 4.0)
+    error = max((independent - 3) ** -0.5, float(z.std(ddof=1)) / len(z) ** 0.5 if len(z) > 1 else 0.0)
+    value, low, high = np.tanh(z.mean() + COVERAGE * error * np.array([0, -1, 1]))
+    method = f"mean correlation of the force over the place between {len(pairs)} pairs of passes"
+    return Estimate("repeatability", "1", float(value), float(low), float(high), method)
+
+
+def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
+    """Whether the force is the friction of the rail, and why not."""
+    reasons = []
+    rough = [m for m in maps if not m.steady]
+    if rough:
+        speeds = ", ".join(sorted({f"{abs(m.velocity) * 1e3:.3g}" for m in rough}))
+        reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
+    if not repeatability.determined:
+        reasons.append(f"repeatability is not shown ({repeatability.reason})")
+    elif repeatability.value < REPEATS:
+        reasons.append(
+            f"repeated passes over the same places differ (correlation {repeatability.value:.2f}, 95 % interval "
+            f"{repeatability.low:.2f} to {repeatability.high:.2f})"
+        )
+    quick = [m for m in maps if crossover and any(h.frequency > crossover for h in m.harmonics[:1])]
+    if quick:
+        fastest = max(m.harmonics[0].frequency for m in quick)
+        reasons.append(f"the force oscillates at {fastest:.3g} Hz, too fast for a loop of {crossover:g} Hz to follow")
+    varies = ", ".join(f"{m.spread:.2g} N at {abs(m.velocity) * 1e3:.3g} mm/s" for m in maps)
+    if reasons:
+        return False, f"Dynamic friction cannot be determined: {'; '.join(reasons)}. The force varies by {varies}."
+    return True, (
+        f"The force repeats from pass to pass (correlation {repeatability.value:.2f}, 95 % interval "
+        f"{repeatability.low:.2f} to {repeatability.high:.2f}): it is friction along the rail, and varies by {varies}."
+    )

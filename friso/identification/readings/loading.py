@@ -1,0 +1,46 @@
+"""Stiffness of the joint in slow motion: while the cart sticks, a stage that creeps on loads the joint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.readings.common import LINEARITY, Mean, by_t, solved
+
+KEY, UNIT = "joint.stiffness", "N/m"
+METHOD = "force over deflection while the cart sticks"
+LEAST = 3
+SOFT = "more deflection does not need more force"
+
+
+def stiffness_of_loading(
+    deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
+) -> Estimate:
+    """The stiffness [N/m] from the deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the
+    actuator's force [N], all low-passed, shape (n,), over the `loads`, each between two slips.
+
+    Least squares of a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
+    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads it is
+    unknown.
+    """
+    count = len(loads)
+    if count < LEAST:
+        return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {LEAST} are needed")
+    signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
+    products = np.array([x @ x.T for x in signals])
+    if not products[:, 0, 0].sum() > 0:
+        return Estimate.unknown(KEY, UNIT, METHOD, "the deflection stays the same")
+    without = np.array([_spring(products.sum(axis=0) - product) for product in products])
+    error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
+    value = _spring(products.sum(axis=0))
+    estimate = by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, LINEARITY * abs(value), LINEARITY * abs(value))
+    return (
+        estimate
+        if estimate.low > 0
+        else Estimate.unknown(KEY, UNIT, METHOD, SOFT, 0.0, max(estimate.high, 0.0) or np.inf)
+    )
+
+
+def _spring(products: np.ndarray) -> float:
+    """Coefficient of the first signal in a fit of the last by the others, from the scalar products of all."""
+    return float(solved(products[:-1, :-1], products[:-1, -1])[0])

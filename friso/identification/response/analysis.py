@@ -1,0 +1,243 @@
+"""What the frequency responses of one bench tell: lines, modes, two masses, and where friction bends them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from friso.errors import InputError
+from friso.identification.logs.log import Log
+from friso.identification.logs.measured_response import MeasuredResponse
+from friso.identification.readings.course import external
+from friso.identification.response.arbitrary import local_polynomial
+from friso.identification.response.closed_loop import feedback
+from friso.identification.response.departure import Departure, Drag, departure, friction_from_departure
+from friso.identification.response.limit_cases import Visible, visible
+from friso.identification.response.mass_line import StraightLine, mass_lines
+from friso.identification.response.modes import Modes, fit_modes
+from friso.identification.response.period import find_periods
+from friso.identification.response.periodic import multisine
+from friso.identification.response.records import ResponseRecord, from_log, relative_error
+from friso.identification.response.response import Channels, FrequencyResponse
+from friso.identification.response.simulated import Explanation, explained
+from friso.identification.response.two_mass import TwoMass, fit_two_mass, widened
+
+ABOVE_FRICTION = 1 / 7
+"""Share of the highest frequency below which friction may bend a response: lines below it are left to a second look."""
+
+RIGID = 0.4
+"""Share of the antiresonance's frequency up to which both masses move as one (to 1/(1 - 0.16) = 1.2)."""
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The responses of force to position of the driven mass and, where it is measured, of the other one; what they show
+    between `band` [Hz]; how friction bends the lower end; and `aside`, for every log, the relative errors with which
+    the other logs' model predicts its outputs. `warnings` say what was not found and why."""
+
+    logs: tuple[Log, ...]
+    driven: FrequencyResponse
+    other: FrequencyResponse | None
+    band: Range
+    lines: tuple[StraightLine, ...]
+    modes: Modes | None
+    two_masses: TwoMass | None
+    seen: Visible | None
+    departs: Departure | None
+    drag: Drag | None
+    explanation: Explanation | None
+    aside: tuple[tuple[str, tuple[float, ...]], ...]
+    warnings: tuple[str, ...]
+
+
+def analyse(
+    logs: Sequence[Log],
+    band: Range | None = None,
+    period: float | None = None,
+    measured: MeasuredResponse | None = None,
+) -> Bench:
+    """What the logs of one bench, realisations of one experiment, show; or a response as somebody `measured` it.
+
+    `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
+    periodic excitation (default: found). Raises InputError where no response can be had.
+    """
+    records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
+    if measured is not None:
+        driven, other = as_measured(measured), None
+    else:
+        driven, other = _clear([_response(of_output, logs[0], output, period) for output, of_output in records.items()])
+    warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
+    first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
+    model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
+    departs = _attempt(warnings, "departure", departure, driven, model.predict) if model else None
+    used = band or _above(driven, departs)
+    if model and len(logs) > 1:
+        model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
+    upper = driven.between(*used)
+    drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
+    modes = _attempt(warnings, "modes", fit_modes, upper)
+    return Bench(
+        tuple(logs), driven, other, used,
+        _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
+        _attempt(warnings, "limit cases", visible, upper, modes), departs, drag, explanation,
+        _left_out(warnings, records, logs, used, period), tuple(dict.fromkeys([*driven.warnings, *warnings])),
+    )  # fmt: skip
+
+
+def _outputs(logs: Sequence[Log]) -> list[str]:
+    """The roles of the outputs that all logs have: the driven mass, and the other one where it is measured."""
+    if not logs:
+        return []
+    return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
+
+
+def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
+    """A response that somebody else measured: how far it can be believed follows from its scatter alone."""
+    output, _, unit = measured.unit.partition("/")
+    unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
+    return FrequencyResponse(
+        measured.frequency, measured.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
+        Channels("force", unit or "1", "position", output or "1"), measured.coherence,
+        ("the file gives no deviations: the scatter between neighbouring lines stands for them",),
+    )  # fmt: skip
+
+
+def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
+    """Relative errors with which the two-mass model predicts the outputs of another log, excited every `period` [s],
+    over the band.
+
+    Raises InputError where there is no model.
+    """
+    if bench.two_masses is None:
+        raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
+    return _errors(bench.two_masses, log, bench.band, period, bench.other is not None)
+
+
+def _attempt(warnings: list[str], what: str, function, *arguments):
+    """The answer of an analysis, or None and why it has none."""
+    try:
+        return function(*arguments)
+    except InputError as error:
+        warnings.append(f"no {what}: {error.actual}; expected {error.expected}")
+        return None
+
+
+def _record(log: Log, output: str) -> ResponseRecord:
+    return from_log(log, "force", output, external(log))[0]
+
+
+def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
+    """By averaging over periods, or where nothing repeats by the local polynomial method; names are the log's."""
+    channels = from_log(log, "force", output)[1]
+    try:
+        find_periods(records[0].driving, None if period is None else period / records[0].sample_time)
+    except InputError:
+        if len(records) > 1:
+            raise
+        return local_polynomial(records[0], channels)
+    return multisine(records, period, channels)
+
+
+def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
+    """The responses of the two outputs, or of the one, on the lines on which any of them stands out of the noise.
+
+    Raises InputError where none does.
+    """
+    good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
+    usable = [response.at(np.isin(response.frequency, good)) for response in responses]
+    return usable[0], usable[1] if len(usable) > 1 else None
+
+
+def _above(driven: FrequencyResponse, departs: Departure | None) -> Range:
+    """The band above the departure by friction."""
+    low = departs.frequency.high if departs is not None and departs.frequency.determined else 0.0
+    return max(float(driven.frequency[0]), low), _top(driven)
+
+
+def _top(driven: FrequencyResponse) -> float:
+    """The last line, rounding errors apart."""
+    return float(driven.frequency[-1]) * (1 + 1e-9)
+
+
+def _of_all(
+    records: dict[str, list[ResponseRecord]],
+    logs: Sequence[Log],
+    driven: FrequencyResponse,
+    other: FrequencyResponse | None,
+    band: Range,
+    period: float | None,
+) -> TwoMass:
+    """The two-mass model of all realisations, its intervals as wide as single ones scatter."""
+    apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
+    return widened(fit_two_mass(driven, other, band), apart)
+
+
+def _single(
+    records: dict[str, list[ResponseRecord]], logs: Sequence[Log], which: int, band: Range, period: float | None
+) -> TwoMass:
+    """The two-mass model of one realisation."""
+    responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
+    return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
+
+
+def _friction(
+    warnings: list[str],
+    records: Sequence[ResponseRecord],
+    driven: FrequencyResponse,
+    departs: Departure | None,
+    model: TwoMass | None,
+    period: float | None,
+) -> tuple[Drag | None, Explanation | None]:
+    """The friction level that explains the departure, and whether a simulation with it does."""
+    if not records or departs is None or model is None or not departs.frequency.determined:
+        return None, None
+    step = records[0].sample_time
+    rigid = RIGID * model["antiresonance frequency"].value
+    limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
+    smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
+    speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]
+    drag = _attempt(warnings, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
+    if drag is None or not drag.coulomb.determined or not np.isfinite(drag.coulomb.value):
+        return drag, None
+    once = _attempt(warnings, "explanation", lambda: [_last_period(record, period) for record in records])
+    if once is None:
+        return drag, None
+    return drag, _attempt(warnings, "explanation", explained, drag, driven, once, step, limits)
+
+
+def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
+    """The input over the last whole period. Raises InputError where nothing repeats."""
+    periods = find_periods(record.driving, None if period is None else period / record.sample_time)
+    return record.input[periods.stop - periods.samples : periods.stop]
+
+
+def _left_out(
+    warnings: list[str],
+    records: dict[str, list[ResponseRecord]],
+    logs: Sequence[Log],
+    band: Range,
+    period: float | None,
+) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """For each log, how the model of one other log predicts it."""
+    if len(logs) < 2:
+        return ()
+    rows = []
+    for i, log in enumerate(logs):
+        model = _attempt(warnings, "two masses", _single, records, logs, (i + 1) % len(logs), band, period)
+        if model is not None:
+            rows.append((log.name, _errors(model, log, band, period, len(records) > 1)))
+    return tuple(rows)
+
+
+def _errors(model: TwoMass, log: Log, band: Range, period: float | None, both: bool) -> tuple[float, ...]:
+    """Relative errors of the driven output and, if asked, of the other one."""
+    outputs = [("position", True), *([("cart_position", False)] if both else [])]
+    return tuple(
+        relative_error(lambda f, c=collocated: model.predict(f, c), _record(log, output), band, period)
+        for output, collocated in outputs
+    )

@@ -1,0 +1,154 @@
+"""Where a measured response leaves a linear model at low frequency, and whether friction explains it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from friso.errors import InputError
+from friso.identification.estimate import Estimate
+from friso.identification.response.fitting import refined
+from friso.identification.response.response import FrequencyResponse
+from friso.intervals import COVERAGE
+
+WINDOW = 9
+"""Neighbouring lines that are judged together: scatter averages out over them, a departure does not."""
+
+CHANCE = 0.01
+"""Chance below which a window of lines counts as off the model."""
+
+RANDOM = np.sqrt(2 / np.pi)
+"""Damping by Coulomb friction F under a velocity of normal distribution with standard deviation v, over F/v (Gelb,
+Vander Velde 1968, table E.2: random-input describing function of the ideal relay)."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """Below `frequency` a response differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz].
+
+    `differ` says whether realisations differ there by more than noise (chance below 1 %), None where there is one
+    only; `ratio` is their scatter over the noise.
+    """
+
+    frequency: Estimate
+    lines: np.ndarray
+    excess: np.ndarray
+    differ: bool | None
+    ratio: float
+
+
+def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndarray]) -> Departure:
+    """Where the response leaves `model`, a function of frequencies [Hz], at its low end.
+
+    The mean of the ratio of response to model, over windows of neighbouring lines, is tested against 1 (F with the
+    degrees of the deviations) in the lower half of the lines; the scale of the test is that of the upper half, where
+    the model is taken to hold as well as it can. The interval is the last window that is off. Raises InputError for
+    fewer than 36 lines.
+    """
+    frequency = response.frequency
+    if len(frequency) < 4 * WINDOW:
+        raise InputError(
+            "response", f"{len(frequency)} lines", f"at least {4 * WINDOW} lines", "a multisine of 100 lines"
+        )
+    ratio = response.response / model(frequency)
+    weight = 2 * np.abs(response.response) ** 2 / response.scatter() ** 2
+    half, ones = len(frequency) // 2, np.ones(WINDOW)
+    pulls = np.abs(np.convolve(weight * (ratio - 1), ones, "valid")) ** 2 / np.convolve(weight, ones, "valid") / 2
+    scale = max(float(np.mean(pulls[half:])), 1.0)
+    limit = scale * stats.f.ppf(1 - CHANCE, 2, max(np.median(response.degrees), 2.0))
+    off = np.flatnonzero(pulls[:half] > limit)
+    name, method = "departure frequency", f"mean over {WINDOW} lines, against the linear model"
+    if not off.size:
+        reason = "the response follows the model down to its lowest line"
+        onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
+        return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
+    last = int(off[-1]) + WINDOW - 1
+    low, high = frequency[last - WINDOW + 1], frequency[last]
+    middle = float(frequency[last - WINDOW // 2])
+    onset = Estimate(name, "Hz", middle, float(low), float(high), method)
+    return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
+
+
+def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
+    """Whether distortion is more than noise on some lines, and its ratio to it."""
+    noise, distortion = response.noise[part], response.distortion[part]
+    if not np.all(np.isfinite(distortion)) or not np.all(noise > 0):
+        return None, np.nan
+    ratio = np.median((noise**2 + distortion**2) / noise**2)
+    degrees = float(np.median(response.degrees))
+    return bool(ratio > stats.f.ppf(1 - CHANCE, degrees, 10 * degrees)), float(np.sqrt(ratio))
+
+
+@dataclass(frozen=True)
+class Drag:
+    """What acts on a rigid mass besides its inertia, at low frequency: a spring and a damper that replace friction.
+
+    `coulomb` is the friction level that damps as much at the velocity of this record (a random one of standard
+    deviation `velocity`), `sign` is -1 where the output goes against the input; `left` is the share of the departure
+    from the mass line that these do not explain.
+    """
+
+    mass: Estimate
+    damping: Estimate
+    stiffness: Estimate
+    coulomb: Estimate
+    velocity: float
+    sign: float
+    left: float
+    warnings: tuple[str, ...]
+
+
+def friction_from_departure(
+    response: FrequencyResponse, velocities: Sequence[np.ndarray], limits: tuple[float, float], sign: float = 1.0
+) -> Drag:
+    """The friction level that explains how a response leaves its mass line between `limits` [Hz].
+
+    `velocities` are those of the realisations, each of shape (n,), [output unit/s]. Under a broad-band excitation
+    Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation of the velocity: 1/(m s^2 + d s + k) is fitted.
+    The interval covers that of the damping and the difference between two distributions of the velocity, normal and
+    sinusoidal (gain 4/pi over the amplitude). Valid while the body slides most of the time. `sign` is -1 where the
+    output goes against the input. Raises InputError for fewer than 8 lines.
+    """
+    part = response.between(*limits)
+    if len(part.frequency) < 8:
+        raise InputError("limits", f"{len(part.frequency)} lines", "at least 8 lines", "0.2 to 5 Hz")
+    s = 2j * np.pi * part.frequency
+    values, deviation = sign * part.response, np.hypot(part.scatter(), 0.01 * np.abs(part.response))
+
+    def model(p: np.ndarray) -> np.ndarray:
+        return (1 / (np.exp(p[0]) * s**2 + p[1] * s + p[2]))[None]
+
+    inertia = float(np.median(1 / np.abs(values[-4:] * s[-4:] ** 2)))
+    fit = refined(model, np.array([np.log(inertia), inertia, 0.0]), values[None], deviation[None])
+    into, out = part.channels.input_unit, part.channels.output_unit
+    method = "mass, damper and spring fitted to the response"
+    mass = fit.estimate("mass", f"{into} s^2/{out}", method, lambda p: float(np.exp(p[0])), positive=True)
+    damping = fit.estimate("equivalent damping", f"{into} s/{out}", method, lambda p: float(p[1]))
+    stiffness = fit.estimate("equivalent stiffness", f"{into}/{out}", method, lambda p: float(p[2]))
+    velocity = float(np.sqrt(np.mean([np.var(run) for run in velocities])))
+    bare = 1 / (np.exp(fit.parameters[0]) * s**2)
+    left = np.linalg.norm((values - model(fit.parameters)[0]) / deviation) / np.linalg.norm((values - bare) / deviation)
+    warnings = []
+    if stiffness.low > 0:
+        warnings.append("besides friction a spring acts (guide, cable, cogging or friction before sliding)")
+    if left > 0.5:
+        warnings.append("friction as a damper and a spring leaves more than half of the departure unexplained")
+    return Drag(
+        mass, damping, stiffness, _coulomb(damping, velocity, into), velocity, sign, float(left), tuple(warnings)
+    )
+
+
+def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
+    """The Coulomb level behind an equivalent damping, with the describing functions of random and sinusoidal motion."""
+    method = "damping at low frequency, as Coulomb friction under random motion"
+    if damping.high <= 0:
+        reason = "the response shows no damping at low frequency"
+        return Estimate.unknown("friction.coulomb", unit, method, reason, 0.0, 0.0)
+    random, sine = velocity / RANDOM, velocity * np.sqrt(2) * np.pi / 4
+    value = max(damping.value, 0.0) * random
+    model = abs(sine / random - 1) * value
+    half = float(np.hypot(damping.half_width * random, COVERAGE * model / np.sqrt(3)))
+    return Estimate("friction.coulomb", unit, value, max(value - half, 0.0), value + half, method)

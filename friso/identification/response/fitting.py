@@ -1,0 +1,109 @@
+"""Weighted least squares of a model to responses, and how far its parameters and what follows from them are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from friso.identification.estimate import Estimate
+
+Model = Callable[[np.ndarray], np.ndarray]
+"""From parameters (p,) to complex responses (outputs, lines)."""
+
+
+CLOSE = 1e-6
+"""Relative change of the sum of squares, or of the parameters, that ends a fit: far below what noise does to them."""
+
+
+LOOSE = 1e3
+"""Factor to either side from which an interval to first order says nothing about a positive quantity."""
+
+
+@dataclass(frozen=True)
+class ResponseFit:
+    """Parameters (p,), their covariance (p, p), the sum of squares in units of the variance, and the counts of data."""
+
+    parameters: np.ndarray
+    covariance: np.ndarray
+    squares: float
+    count: int
+
+    @property
+    def reduced(self) -> float:
+        """Sum of squares over degrees of freedom: 1 where model and deviations are right."""
+        return self.squares / max(self.count - len(self.parameters), 1)
+
+    @property
+    def bic(self) -> float:
+        """Bayesian information criterion, scale of the variance unknown (Schwarz 1978, doi:10.1214/aos/1176344136)."""
+        return self.count * np.log(self.squares / self.count) + len(self.parameters) * np.log(self.count)
+
+    def estimate(
+        self, name: str, unit: str, method: str, of: Callable[[np.ndarray], float], positive: bool = False
+    ) -> Estimate:
+        """What follows from the parameters, with its interval to first order; a `positive` one in the logarithm."""
+        value = of(self.parameters)
+        if not np.isfinite(value) or (positive and not value > 0):
+            return Estimate.unknown(name, unit, method, "the fitted model does not have it")
+        steps = 1e-4 * np.sqrt(np.maximum(np.diag(self.covariance), 1e-30))
+        slopes = np.array([(of(self.parameters + h) - of(self.parameters - h)) for h in np.diag(steps)]) / (2 * steps)
+        deviation = float(np.sqrt(max(slopes @ self.covariance @ slopes, 0.0)))
+        plain = Estimate.normal(name, unit, value, deviation, method)
+        if not positive:
+            return plain
+        factor = np.exp(min(plain.half_width / value, np.log(2 * LOOSE)))
+        if not factor < LOOSE:
+            reason = f"its interval spans more than a factor of {LOOSE:g} to either side"
+            return Estimate.unknown(name, unit, method, reason, 0.0)
+        return Estimate(name, unit, value, value / factor, value * factor, method)
+
+
+def refined(
+    model: Model,
+    start: np.ndarray,
+    response: np.ndarray,
+    deviation: np.ndarray,
+    lower: np.ndarray | float = -np.inf,
+    upper: np.ndarray | float = np.inf,
+) -> ResponseFit:
+    """The model's parameters by least squares, weighted by the deviations; responses of shape (outputs, lines).
+
+    The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since a
+    model is never quite right: the covariance is the larger of the plain one, scaled by the residual, and one that
+    allows for that (Newey, West 1987, doi:10.2307/1913610).
+    """
+    weight = np.sqrt(2) / deviation
+
+    def residuals(parameters: np.ndarray) -> np.ndarray:
+        error = (model(parameters) - response) * weight
+        return np.stack([error.real, error.imag], axis=-1).ravel()
+
+    limits = (lower, upper)
+    solution = least_squares(residuals, start, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
+    count, lines = solution.fun.size, response.shape[1]
+    free = max(count - len(solution.x), 1)
+    inverse = np.linalg.pinv(solution.jac.T @ solution.jac, rcond=1e-14, hermitian=True)
+    plain = inverse * (2 * solution.cost / free)
+    by_line = (solution.jac * solution.fun[:, None]).reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
+    robust = inverse @ _long_run(by_line) @ inverse * (count / free)
+    return ResponseFit(solution.x, _larger(plain, robust), float(2 * solution.cost), count)
+
+
+def _long_run(scores: np.ndarray) -> np.ndarray:
+    """Covariance of the sum of scores (lines, p) that are correlated over some lines."""
+    total = scores.T @ scores
+    reach = int(4 * (len(scores) / 100) ** (2 / 9))
+    for lag in range(1, min(reach, len(scores) - 1) + 1):
+        cross = scores[lag:].T @ scores[:-lag]
+        total += (1 - lag / (reach + 1)) * (cross + cross.T)
+    return total
+
+
+def _larger(plain: np.ndarray, robust: np.ndarray) -> np.ndarray:
+    """The plain covariance with its deviations raised to those of the robust one where they are larger."""
+    ratio = np.diag(robust) / np.maximum(np.diag(plain), np.finfo(float).tiny)
+    raised = np.sqrt(np.maximum(ratio, 1.0))
+    return plain * raised[:, None] * raised

@@ -1,0 +1,96 @@
+"""The limit cases of a stage (thesis, Table 1 and Fig. 7) in a measured response, in the words of `friso.frequency`.
+
+A cart that is "stuck" makes friction a spring: a stiffness line at low frequency, and with a free joint the mode of the
+stage on it. A cart that is "sliding" shows the mass line of cart and stage, and with a free joint an antiresonance and
+a resonance, above which the mass line of the stage alone follows. A touched limiter is recognised by its frequencies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from friso.identification.response.mass_line import KINDS, StraightLine, straight_lines
+from friso.identification.response.modes import Modes, fit_modes
+from friso.identification.response.response import FrequencyResponse
+
+
+@dataclass(frozen=True)
+class Visible:
+    """What a response shows: straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the
+    cart ("stuck", "sliding", or "" where it cannot be decided), and all of it in words."""
+
+    case: str
+    lines: tuple[StraightLine, ...]
+    modes: Modes | None
+    words: tuple[str, ...]
+
+
+def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
+    """Which lines and modes a force-to-position response shows; `modes` are fitted where they are not given."""
+    sign = _sign(response)
+    lines = [line for slope in KINDS for line in straight_lines(response, slope, sign)]
+    ordered = tuple(sorted(lines, key=lambda line: line.low))
+    if modes is None and len(response.frequency) >= 12:
+        modes = fit_modes(response)
+    pairs = _named(modes)
+    case = _case(ordered, pairs)
+    return Visible(
+        case, ordered, modes, (*(_words(line) for line in ordered), *_mode_words(pairs), _verdict(case, pairs))
+    )
+
+
+def _sign(response: FrequencyResponse) -> float | None:
+    """The sign of the widest line, whatever its slope."""
+    lines = [line for slope in KINDS for line in straight_lines(response, slope, None, 1)]
+    return max(lines, key=lambda line: line.octaves).sign if lines else None
+
+
+def _named(modes: Modes | None) -> Mapping[str, float]:
+    """Frequencies [Hz] of resonances and antiresonances by name, by frequency."""
+    if modes is None:
+        return {}
+    frequencies = {
+        estimate.name.removesuffix(" frequency"): estimate.value
+        for estimate in modes.estimates
+        if estimate.unit == "Hz"
+    }
+    return dict(sorted(frequencies.items(), key=lambda item: item[1]))
+
+
+def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
+    """The case by the lowest line: a spring is a stuck cart, a mass or a damper a sliding one.
+
+    A line above the first antiresonance, or the first resonance if there is none, says nothing about the cart.
+    """
+    kind = "antiresonance" if any(name.startswith("antiresonance") for name in pairs) else "resonance"
+    first = min((value for name, value in pairs.items() if name.startswith(kind)), default=np.inf)
+    below = [line for line in lines if line.low < first]
+    if not below:
+        return ""
+    return "stuck" if below[0].kind == "stiffness line" else "sliding"
+
+
+def _words(line: StraightLine) -> str:
+    value = line.value
+    text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
+    return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"
+
+
+def _mode_words(pairs: Mapping[str, float]) -> list[str]:
+    return [f"{name} at {value:.4g} Hz" for name, value in pairs.items()]
+
+
+def _verdict(case: str, pairs: Mapping[str, float]) -> str:
+    kinds = [name.split()[0] for name in pairs]
+    pair = any(a == "antiresonance" and b == "resonance" for a, b in pairwise(kinds))
+    if case == "sliding":
+        return "cart sliding: " + ("free joint, antiresonance and resonance" if pair else "no joint mode is seen")
+    if case == "stuck":
+        return "cart stuck: " + (
+            "friction or joint as a spring, then a mode" if "resonance" in kinds else "spring alone"
+        )
+    return "no straight line below the modes: the cart may be stuck or sliding"

@@ -1,0 +1,156 @@
+"""Modes of a response: resonances and antiresonances with their damping, by a rational fit in the frequency domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.estimate import Estimate
+from friso.identification.response.fitting import ResponseFit, refined
+from friso.identification.response.rational import RationalShape, Row, bounds, orders, rational, roots, simplest
+from friso.identification.response.response import FrequencyResponse
+
+METHOD = "rational fit of the response"
+
+MOST = 4
+"""Modes at most."""
+
+LEAST = 0.01
+"""Relative error of the response below which no model is trusted; keeps a few strong lines from ruling the fit."""
+
+
+EXPLAINED = 3.0
+"""Sum of squares over degrees of freedom up to which a fit counts as right."""
+
+CANCELS = 1.0
+"""Distance of a resonance from an antiresonance, over the smaller of their half-widths, up to which they nearly cancel:
+the response then changes by a factor of two at most, over so narrow a band that any unevenness may look like it."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The fit over `band` [Hz], its resonances and antiresonances by frequency: ("resonance 1 frequency", ...).
+
+    `order` says how the number of modes was chosen; `low_level` and `high_level` are the acceleration per input below
+    and above all modes (the mass lines), unknown without a rigid body.
+    """
+
+    shape: RationalShape
+    fit: ResponseFit
+    scale: float
+    estimates: tuple[Estimate, ...]
+    low_level: Estimate
+    high_level: Estimate
+    order: str
+    band: tuple[float, float]
+    warnings: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Estimate:
+        return next(estimate for estimate in self.estimates if estimate.name == name)
+
+    def predict(self, frequency: np.ndarray) -> np.ndarray:
+        """The fitted response at frequencies [Hz], complex, same shape."""
+        return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
+
+
+def fit_modes(
+    response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None, most: int = MOST
+) -> Modes:
+    """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
+
+    `rigid` says whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
+    """
+    part = response if band is None else response.between(*band)
+    part = part.at(part.frequency > 0)
+    if len(part.frequency) < 12:
+        raise InputError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
+    scale = float(np.sqrt(part.frequency[0] * part.frequency[-1]))
+    s = 1j * part.frequency / scale
+    deviation = np.hypot(part.scatter(), LEAST * np.abs(part.response))
+    kinds = (True, False) if rigid is None else (rigid,)
+    rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, most)]
+    shape, start, *_ = simplest(rows)
+    low, high = bounds(shape, s)
+    fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
+    limits = (float(part.frequency[0]), float(part.frequency[-1]))
+    low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
+    warnings = [*_cancelling(fit, shape, scale, limits)]
+    if fit.reduced > EXPLAINED:
+        warnings.append(f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})")
+    estimates = _pairs(fit, shape, scale, limits)
+    return Modes(
+        shape,
+        fit,
+        scale,
+        estimates,
+        low_level,
+        high_level,
+        _described(shape, rows),
+        limits,
+        tuple(warnings),
+    )
+
+
+def _described(shape: RationalShape, rows: list[Row]) -> str:
+    """How the order was chosen."""
+    tried = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
+    return f"{shape.words} by the Bayesian information criterion ({tried})"
+
+
+def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
+    """A sentence for each resonance within the band that an antiresonance nearly cancels."""
+    poles, zeros = roots(fit.parameters, shape)
+    for pole in sorted(poles, key=abs):
+        if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
+            continue
+        zero = zeros[np.argmin(np.abs(zeros - pole))]
+        if abs(zero - pole) <= CANCELS * min(-pole.real, abs(zero.real)):
+            yield (
+                f"a resonance at {abs(pole) * scale:.4g} Hz and an antiresonance at {abs(zero) * scale:.4g} Hz nearly "
+                "cancel: an unevenness of the response looks like this, too, and may be no mode"
+            )
+
+
+def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
+    """Frequencies and damping ratios of resonances and antiresonances within the band, by frequency."""
+    estimates: list[Estimate] = []
+    for kind, which in (("resonance", 0), ("antiresonance", 1)):
+        inside = [
+            root
+            for root in sorted(roots(fit.parameters, shape)[which], key=abs)
+            if band[0] <= abs(root) * scale <= band[1] and -root.real < 0.7 * abs(root)
+        ]
+        for number, root in enumerate(inside, 1):
+            tracked = _tracked(shape, which, root)
+            name = f"{kind} {number}"
+            estimates += [
+                fit.estimate(f"{name} frequency", "Hz", METHOD, lambda p, t=tracked: abs(t(p)) * scale, positive=True),
+                fit.estimate(f"{name} damping ratio", "1", METHOD, lambda p, t=tracked: -t(p).real / abs(t(p))),
+            ]
+    return tuple(estimates)
+
+
+def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
+    """The root that is nearest to a given one, as a function of the parameters."""
+
+    def nearest(parameters: np.ndarray) -> complex:
+        candidates = roots(parameters, shape)[which]
+        return complex(candidates[np.argmin(np.abs(candidates - root))]) if candidates.size else complex(np.nan, np.nan)
+
+    return nearest
+
+
+def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
+    """Acceleration per input below all modes (the rigid body alone) or above all (with their residues)."""
+    unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
+    name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"
+    if not shape.rigid:
+        return Estimate.unknown(name, unit, METHOD, "no rigid body fits the response in this band")
+    if which == "high" and shape.constant:
+        return Estimate.unknown(name, unit, METHOD, "modes beyond the band still act at its upper end")
+    stop = shape.nonlinear + (1 if which == "low" else 1 + shape.modes)
+    factor = (2 * np.pi * scale) ** 2
+    return fit.estimate(name, unit, METHOD, lambda p: factor * float(np.sum(p[shape.nonlinear : stop])))

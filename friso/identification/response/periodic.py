@@ -1,0 +1,131 @@
+"""Responses from periodic excitation: averages over periods and realisations, noise and distortion apart.
+
+The robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4: noise is what differs
+from period to period, nonlinear distortion what differs from one random-phase realisation to another beyond that. With
+an external reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.response.records import ResponseRecord, Spectra, spectra
+from friso.identification.response.response import Channels, FrequencyResponse
+
+LINES = 5
+"""Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
+
+CLOCKS, EQUAL = 1e-3, 1e-6
+"""Share by which the periods of realisations may differ, as those of clocks do, and up to which they are equal."""
+
+FEW = 10
+"""Real degrees of freedom per line from which a variance stands on its own."""
+
+
+def multisine(
+    records: Sequence[ResponseRecord], period: float | None = None, channels: Channels | None = None
+) -> FrequencyResponse:
+    """The response on the excited lines, from one or more realisations of a periodic excitation.
+
+    A realisation is a record with phases of its own; if it has a reference, the response is the indirect one, that of
+    output and input to the reference. `period` [s] is about how long a period is (default: found). The deviation covers
+    noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises InputError for
+    records that are not periodic or do not belong together.
+    """
+    every, remarks = _together([spectra(record, period) for record in records])
+    excited = np.logical_and.reduce([realisation.excited for realisation in every])
+    if not excited.any():
+        raise InputError(
+            "records", "realisations without a common line", "the same excited lines", "one period for all"
+        )
+    response, noise = _averaged(every, excited)
+    degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in every))
+    if len(every) > 1:
+        total, total_degrees = _total(every, excited, response)
+        distortion, distortion_known = np.sqrt(np.maximum(total**2 - noise**2, 0.0)), True
+        degrees = np.where(distortion > 0, total_degrees, degrees)
+    else:
+        distortion = _at_free_lines(every[0], excited, response)
+        distortion_known = bool(np.isfinite(distortion).any())
+    deviation = np.hypot(noise, np.nan_to_num(distortion))
+    warnings = dict.fromkeys([*remarks, *(text for realisation in every for text in realisation.warnings)])
+    if not distortion_known:
+        warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
+    frequency = every[0].frequency[excited]
+    known_channels = channels or Channels()
+    return FrequencyResponse(
+        frequency, response, deviation, noise, distortion, degrees, "multisine", known_channels, None, tuple(warnings)
+    )
+
+
+def _together(every: list[Spectra]) -> tuple[list[Spectra], list[str]]:
+    """The realisations, if they have the same lines, and what to say of their clocks. Raises InputError."""
+    if not every:
+        raise InputError("records", "none", "at least one record", "two realisations of a multisine")
+    spacings = np.array([realisation.frequency[0] for realisation in every])
+    apart = float(np.ptp(spacings) / spacings.min())
+    if apart > CLOCKS or len({len(realisation.frequency) for realisation in every}) > 1:
+        text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
+        raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
+    if apart <= EQUAL:
+        return every, []
+    mean = float(spacings.mean())
+    lines = np.arange(1, len(every[0].frequency) + 1) * mean
+    remark = f"the periods of the records differ by {1e6 * apart:.3g} ppm, as clocks do: {1 / mean:.6g} s is used"
+    return [replace(realisation, frequency=lines) for realisation in every], [remark]
+
+
+def _averaged(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The response and the deviation of it by noise, each (lines,)."""
+    outputs, inputs = _relative(every, excited)
+    gain = inputs.mean(axis=0)
+    response = outputs.mean(axis=0) / gain
+    variance = np.zeros(len(response))
+    for realisation in every:
+        residuals = (realisation.output[:, excited] - response * realisation.input[:, excited]) / realisation.reference[
+            excited
+        ]
+        variance += np.var(residuals, axis=0, ddof=1) / len(residuals)
+    return response, np.sqrt(variance) / (len(every) * np.abs(gain))
+
+
+def _relative(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Output and input over the external signal, averaged over periods, each (realisations, lines)."""
+    outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in every]
+    inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in every]
+    return np.array(outputs), np.array(inputs)
+
+
+def _total(every: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The deviation of the mean, from how realisations differ, and its degrees of freedom, each (lines,)."""
+    outputs, inputs = _relative(every, excited)
+    count = len(every)
+    squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
+    relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
+    freedom = 2 * (count - 1)
+    width = 1 if freedom >= FEW else min(LINES, len(relative))
+    window = np.ones(width)
+    shared = np.convolve(np.ones(len(relative)), window, "same")
+    relative = np.convolve(relative, window, "same") / shared
+    return np.sqrt(relative) * np.abs(response), freedom * shared
+
+
+def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
+    """Distortion (lines,) from what the output holds, beyond noise, at lines in the band that are not excited.
+
+    What the input itself holds there is taken off with the interpolated response. NaN where there are no such lines.
+    """
+    places = np.flatnonzero(excited)
+    free = np.setdiff1d(np.arange(places[0], places[-1] + 1), places)
+    if len(free) < 2:
+        return np.full(len(places), np.nan)
+    parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
+    left = realisation.output[:, free] - (parts[0] + 1j * parts[1]) * realisation.input[:, free]
+    power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
+    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[:LINES]
+    local = np.maximum(power[near].mean(axis=0), 0.0)
+    return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])

@@ -1,0 +1,179 @@
+"""Rational responses: a rigid body, modes and a constant behind a delay; how many modes a measured one asks for.
+
+The response is R/(s (s + delta)) + sum of r_i/(s^2 + 2 zeta_i omega_i s + omega_i^2) + c, times exp(-s delay), with s
+over a scale. Modes are added one at a time, each started where it helps most; the nonlinear parameters are refined with
+the linear ones (residues) eliminated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from friso.identification.response.fitting import CLOSE, ResponseFit
+
+CLEAR = 10.0
+"""By how much the information criterion must fall for another mode (Kass, Raftery 1995: very strong evidence)."""
+
+WORTH = 0.8
+"""The share of the sum of squares that another mode may leave at most. The model's error is not independent from line
+to line, so that the criterion alone would go on fitting the wiggles of friction."""
+
+PLACES, DAMPINGS = 60, (0.003, 0.01, 0.03, 0.1, 0.3)
+"""Frequencies and damping ratios at which a further mode is tried."""
+
+
+@dataclass(frozen=True)
+class RationalShape:
+    """What a model is made of: a rigid body or not, its number of modes, and a constant for those beyond the band."""
+
+    rigid: bool
+    modes: int
+    constant: bool
+
+    @property
+    def nonlinear(self) -> int:
+        """Parameters in front of the linear ones: viscous pole, delay; logarithms of frequencies, then of dampings."""
+        return 2 + 2 * self.modes
+
+    @property
+    def words(self) -> str:
+        parts = [f"{self.modes} mode{'s' if self.modes != 1 else ''}"]
+        parts += ["rigid body"] * self.rigid + ["constant"] * self.constant
+        return " + ".join(parts)
+
+
+class Row(NamedTuple):
+    """A model that was tried: parameters (p,), criterion, sum of squares."""
+
+    shape: RationalShape
+    parameters: np.ndarray
+    bic: float
+    squares: float
+
+
+def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool, most: int) -> list[Row]:
+    """Shape, parameters and criterion with 0, 1, ... modes, as long as one more helps; the last also with constant."""
+    rows: list[Row] = []
+    nonlinear = np.zeros(2)
+    for modes in range(most + 1):
+        shape = RationalShape(rigid, modes, False)
+        if modes:
+            nonlinear = _another(nonlinear, shape, s, values, deviation)
+        if rigid or modes:
+            nonlinear = _eliminated(nonlinear, shape, s, values, deviation)
+            rows.append(_completed(nonlinear, shape, s, values, deviation))
+        if len(rows) > 1 and not _better(rows[-1], rows[-2]):
+            break
+    best = simplest(rows)
+    shape = RationalShape(rigid, best.shape.modes, True)
+    nonlinear = _eliminated(best.parameters[: shape.nonlinear], shape, s, values, deviation)
+    return [*rows, _completed(nonlinear, shape, s, values, deviation)]
+
+
+def simplest(rows: list[Row]) -> Row:
+    """The simplest model that no larger one beats clearly."""
+    ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
+    best = ordered[0]
+    for row in ordered[1:]:
+        if _better(row, best):
+            best = row
+    return best
+
+
+def _better(larger: Row, smaller: Row) -> bool:
+    return larger.bic < smaller.bic - CLEAR and larger.squares < WORTH * smaller.squares
+
+
+def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
+    """What the linear parameters multiply, complex, shape (linear, lines)."""
+    viscous, delay = nonlinear[:2]
+    omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
+    parts = [1 / (s * (s + viscous))[None]] if shape.rigid else []
+    parts.append(1 / (s**2 + 2 * (damping * omega)[:, None] * s + (omega**2)[:, None]))
+    if shape.constant:
+        parts.append(np.ones((1, len(s)), complex))
+    return np.concatenate(parts) * np.exp(-s * delay)
+
+
+def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
+    """The response at complex frequencies s [rad/s], shape (lines,), of parameters of this shape."""
+    return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
+
+
+def _solved(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The best real linear parameters and the weighted residuals, real and imaginary part after each other."""
+    weight = np.sqrt(2) / deviation
+    matrix, right = (columns * weight).T, values * weight
+    matrix, right = np.concatenate([matrix.real, matrix.imag]), np.concatenate([right.real, right.imag])
+    sizes = np.linalg.norm(matrix, axis=0)
+    linear = np.linalg.lstsq(matrix / sizes, right, rcond=1e-12)[0] / sizes
+    return linear, matrix @ linear - right
+
+
+def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Limits of all parameters: modes within an octave of the band, damping ratios from 1e-4 to 2, delays of a turn."""
+    low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
+    rest = np.full(linear, np.inf)
+    omega, damping = np.full(shape.modes, np.log(low / 2)), np.full(shape.modes, np.log(1e-4))
+    lower = np.concatenate([[0.0, -1 / high], omega, damping, -rest])
+    upper = np.concatenate([[high, 1 / high], omega + np.log(4 * high / low), damping + np.log(2e4), rest])
+    return lower, upper
+
+
+def _another(
+    nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> np.ndarray:
+    """Nonlinear parameters with one more mode, at the place and damping that leave the least."""
+    before = shape.modes - 1
+    best, best_parameters = np.inf, nonlinear
+    for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), PLACES):
+        for damping in DAMPINGS:
+            tried = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
+            left = _solved(_columns(tried, shape, s), values, deviation)[1]
+            if left @ left < best:
+                best, best_parameters = left @ left, tried
+    return best_parameters
+
+
+def _eliminated(
+    start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> np.ndarray:
+    """Nonlinear parameters refined with the linear ones eliminated (Golub, Pereyra 1973)."""
+
+    def left(nonlinear: np.ndarray) -> np.ndarray:
+        return _solved(_columns(nonlinear, shape, s), values, deviation)[1]
+
+    lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
+    return least_squares(left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=CLOSE, max_nfev=60).x
+
+
+def _completed(
+    nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> Row:
+    """The model with all its parameters, and how good it is."""
+    linear, left = _solved(_columns(nonlinear, shape, s), values, deviation)
+    parameters = np.concatenate([nonlinear, linear])
+    squares = float(left @ left)
+    return Row(shape, parameters, ResponseFit(parameters, np.zeros((0, 0)), squares, left.size).bic, squares)
+
+
+def roots(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
+    """Poles of the modes and zeros of the response, those with positive imaginary part, in units of the scale."""
+    omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
+    linear = parameters[shape.nonlinear :]
+    factors = [np.array([1.0, parameters[0], 0.0])] if shape.rigid else []
+    factors += [np.array([1.0, 2 * z * w, w**2]) for w, z in zip(omega, damping, strict=True)]
+    numerator = np.zeros(1)
+    for number, residue in enumerate(linear):
+        others = [factor for other, factor in enumerate(factors) if other != number]
+        product = np.array([residue])
+        for factor in others:
+            product = np.polymul(product, factor)
+        numerator = np.polyadd(numerator, product)
+    zeros = np.roots(numerator)
+    poles = omega * (-damping + 1j * np.sqrt(np.maximum(1 - damping**2, 0.0)))
+    return poles[np.argsort(np.abs(poles))], zeros[zeros.imag > 1e-6 * np.abs(zeros)]

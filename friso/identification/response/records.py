@@ -1,0 +1,249 @@
+"""Records of a periodic experiment turned into spectra, period by period."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from friso.errors import InputError
+from friso.identification.logs.log import Log
+from friso.identification.response.period import Periods, find_periods
+from friso.identification.response.response import Channels
+
+WEAK = 0.01
+"""Amplitude, over that of the strongest line, below which a line does not count as excited (-40 dB)."""
+
+CLEAR = 3.0
+"""How many standard deviations of its mean an excited line stands out of the noise."""
+
+GAP, SHARE = 2.5, 0.95
+"""A step down between line amplitudes that parts those meant from the rest, if the former hold that power."""
+
+SLIPPED = 0.05
+"""Samples by which a generator's clock slips over the record from which on it is taken anew."""
+
+FAR = 1.5
+"""A leading period is a transient if it lies this much further off than any period of the second half."""
+
+
+@dataclass(frozen=True)
+class ResponseRecord:
+    """Input, output and, in closed loop, the external reference (or injected force), each (n,), `sample_time` [s]."""
+
+    input: np.ndarray
+    output: np.ndarray
+    sample_time: float
+    reference: np.ndarray | None = None
+
+    @property
+    def driving(self) -> np.ndarray:
+        """The external signal: the reference, or in open loop the input."""
+        return self.input if self.reference is None else self.reference
+
+    def checked(self, least: int = 8) -> ResponseRecord:
+        """The record as floats. Raises InputError for NaN, unequal lengths, constant signals, too few samples."""
+        named = {"input": self.input, "output": self.output}
+        if self.reference is not None:
+            named["reference"] = self.reference
+        arrays = {name: np.asarray(values, float) for name, values in named.items()}
+        lengths = {name: values.shape for name, values in arrays.items()}
+        if len(set(lengths.values())) > 1 or any(values.ndim != 1 for values in arrays.values()):
+            raise InputError("record", f"shapes {lengths}", "signals of one and the same length", "20 000 samples each")
+        if not self.sample_time > 0:
+            raise InputError("sample_time", f"{self.sample_time}", "a time greater than 0 s", "0.001")
+        for name, values in arrays.items():
+            _check_signal(name, values, least)
+        return ResponseRecord(arrays["input"], arrays["output"], self.sample_time, arrays.get("reference"))
+
+
+def from_log(
+    log: Log, driving: str = "force", output: str = "position", reference: str | None = None
+) -> tuple[ResponseRecord, Channels]:
+    """The longest segment of a log as a record, by roles, with names and units. Raises InputError for a missing one."""
+    roles = [driving, output] + ([reference] if reference else [])
+    for role in roles:
+        if role not in log:
+            raise InputError(
+                role, f"a log with {', '.join(log.signals)}", f"a channel for the {role}", f'{role}="Axis1"'
+            )
+    part = log.longest
+    record = ResponseRecord(
+        log[driving][part], log[output][part], log.sample_time, log[reference][part] if reference else None
+    )
+    return record, Channels(driving, log.unit(driving), output, log.unit(output))
+
+
+def _check_signal(name: str, values: np.ndarray, least: int) -> None:
+    if len(values) < least:
+        raise InputError(name, f"{len(values)} samples", f"at least {least}", "20 000 samples")
+    bad = int(np.count_nonzero(~np.isfinite(values)))
+    if bad:
+        raise InputError(
+            name, f"{bad} samples that are not numbers", "finite samples", "a log cut into segments at gaps"
+        )
+    if not np.ptp(values) > 0:
+        raise InputError(name, f"a constant signal ({values[0]:g})", "a signal that moves", "a multisine")
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """Spectra of one realisation at the harmonics `frequency` [Hz] (lines,), from the first on.
+
+    `input` and `output` are (periods, lines); `reference` (lines,) that of the external signal, averaged. `excited`
+    (lines,) are the lines that the external signal holds.
+    """
+
+    frequency: np.ndarray
+    reference: np.ndarray
+    input: np.ndarray
+    output: np.ndarray
+    excited: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
+    """Spectra of whole periods without transient, by the external signal: the reference if there is one, or the input.
+
+    `period` [s] is about how long a period is. What drifts from period to period is taken out beforehand.
+    Raises InputError for what does not repeat and for fewer than two periods that are left.
+    """
+    record = record.checked()
+    expected = None if period is None else period / record.sample_time
+    periods = find_periods(record.driving, expected)
+    driving = _harmonics(record.driving, periods)
+    warnings = periods.warnings
+    slip = _slip(driving, periods.samples)
+    if abs(slip) * periods.count > SLIPPED:
+        text = f"a period has {periods.samples + slip:.7g} samples, since clocks differ: taken anew at whole ones"
+        warnings = (*warnings, text)
+        record = _at_other_rate(record, 1 + slip / periods.samples)
+        periods = find_periods(record.driving, periods.samples)
+        driving = _harmonics(record.driving, periods)
+    driven, reaction = (_harmonics(signal, periods) for signal in (record.input, record.output))
+    alike = _alike(driving)
+    excited = _excited(driving[alike])
+    if not excited.any():
+        raise InputError("excitation", "no line above the noise", "a periodic input with lines", "a multisine")
+    first = _settled(reaction[alike][:, excited])
+    stationary = np.flatnonzero(alike)[first:]
+    warnings = (*warnings, *_left_out(alike, first))
+    if len(stationary) < 2:
+        raise InputError("period", f"{len(stationary)} period without transient", "at least two", "a longer record")
+    frequency = np.arange(1, driven.shape[1] + 1) / (periods.samples * record.sample_time)
+    return Spectra(
+        frequency, driving[stationary].mean(axis=0), driven[stationary], reaction[stationary], excited, warnings
+    )
+
+
+def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
+    if not alike.all():
+        yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, in which the input is another"
+    if first:
+        yield f"the first {first} of {np.count_nonzero(alike)} periods left out as transient"
+
+
+def _slip(driving: np.ndarray, samples: int) -> float:
+    """By how many samples a period is longer than whole `samples`: by how much the harmonics of the external signal,
+    shape (periods, lines), turn from one period to the next, in proportion to their numbers."""
+    turned = np.sum(driving[1:] * driving[:-1].conj(), axis=0)
+    number, weight = np.arange(1, driving.shape[1] + 1), np.abs(turned)
+    most = float(weight @ number**2)
+    return -float(weight * np.angle(turned) @ number) / most * samples / (2 * np.pi) if most > 0 else 0.0
+
+
+def _at_other_rate(record: ResponseRecord, step: float) -> ResponseRecord:
+    """A record taken anew every `step` samples, by cubic splines: what these lose of high frequencies, all of its
+    signals lose."""
+    at = np.arange(int((len(record.input) - 1) / step) + 1) * step
+
+    def taken(signal: np.ndarray) -> np.ndarray:
+        return CubicSpline(np.arange(len(signal)), signal)(at)
+
+    reference = None if record.reference is None else taken(record.reference)
+    return ResponseRecord(taken(record.input), taken(record.output), record.sample_time * step, reference)
+
+
+def _harmonics(signal: np.ndarray, periods: Periods) -> np.ndarray:
+    """Amplitudes of the harmonics in every period, shape (periods, lines), the signal's drift taken out."""
+    samples = signal[periods.start : periods.stop]
+    cut = (samples - drift(samples, periods.samples)).reshape(periods.count, periods.samples)
+    return np.fft.rfft(cut, axis=1)[:, 1 : (periods.samples - 1) // 2 + 1] * (2 / periods.samples)
+
+
+def drift(signal: np.ndarray, samples: int) -> np.ndarray:
+    """What is left of a signal, shape (n,), when averaged over a moving period: exactly nothing of the harmonics.
+
+    At both ends, where no whole period fits, it is continued as a straight line.
+    """
+    sums = np.concatenate([[0.0], np.cumsum(signal - signal.mean())])
+    average = (sums[samples:] - sums[:-samples]) / samples + signal.mean()
+    at = np.arange(len(average)) + (samples - 1) / 2
+    length = min(len(average), samples)
+    ends = [np.polynomial.Polynomial.fit(at[part], average[part], 1) for part in (slice(length), slice(-length, None))]
+    every = np.arange(len(signal))
+    inside = np.interp(every, at, average)
+    return np.where(every < at[0], ends[0](every), np.where(every > at[-1], ends[1](every), inside))
+
+
+def _alike(driving: np.ndarray) -> np.ndarray:
+    """Which periods have the same external signal as most."""
+    middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
+    off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
+    return off <= 5 * np.median(off) + 1e-3 * np.sqrt(np.mean(np.abs(middle) ** 2))
+
+
+def _excited(driving: np.ndarray) -> np.ndarray:
+    """Which lines the external signal holds on purpose, shape (lines,)."""
+    mean = np.abs(driving.mean(axis=0))
+    noise = np.std(driving, axis=0, ddof=1) / np.sqrt(len(driving)) if len(driving) > 1 else 0 * mean
+    excited = (mean > WEAK * mean.max()) & (mean > CLEAR * noise)
+    sizes = np.sort(mean[excited])[::-1]
+    if sizes.size > 2:
+        steps = sizes[:-1] / sizes[1:]
+        cut = int(np.argmax(steps))
+        if steps[cut] > GAP and np.sum(sizes[: cut + 1] ** 2) > SHARE * np.sum(sizes**2):
+            excited &= mean >= sizes[cut]
+    return excited
+
+
+def _settled(reaction: np.ndarray) -> int:
+    """The number of leading periods that are transient, given the output (periods, lines); at least three stay.
+
+    Each period is compared with the later half of the others, which show what is usual. Without a transient
+    they are exchangeable: one of them lies furthest off at the front by chance only, and `FAR` makes that rarer.
+    """
+    count = len(reaction)
+    last = max(3, count // 2)
+    if count <= last:
+        return 0
+    later = np.arange(count - last, count)
+    off = np.array([_distance(reaction[number], reaction[later[later != number]]) for number in range(count)])
+    return int(np.flatnonzero(off <= FAR * off[later].max())[0])
+
+
+def _distance(single: np.ndarray, others: np.ndarray) -> float:
+    """How far a period lies from the mean of others, in units of their variance, on the middle one of its lines."""
+    variance = np.maximum(np.var(others, axis=0, ddof=1), np.finfo(float).tiny)
+    return float(np.median(np.abs(single - others.mean(axis=0)) ** 2 / variance))
+
+
+def relative_error(
+    model: Callable[[np.ndarray], np.ndarray],
+    record: ResponseRecord,
+    band: tuple[float, float],
+    period: float | None = None,
+) -> float:
+    """||G U - Y|| / ||Y|| over the excited lines in `band` [Hz] of a periodic record that the model has not seen.
+
+    `model` gives complex responses at frequencies [Hz]; U and Y are averaged over periods. `period` [s] is about how
+    long one is (default: found). Raises InputError where the record is not periodic or no line lies in the band.
+    """
+    measured = spectra(record, period)
+    inside = measured.excited & (measured.frequency >= band[0]) & (measured.frequency <= band[1])
+    if not inside.any():
+        raise InputError("band", f"{band[0]:g} to {band[1]:g} Hz", "a band that holds excited lines", "3 to 20 Hz")
+    force, reaction = measured.input.mean(axis=0)[inside], measured.output.mean(axis=0)[inside]
+    return float(np.linalg.norm(model(measured.frequency[inside]) * force - reaction) / np.linalg.norm(reaction))

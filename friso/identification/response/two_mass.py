@@ -1,0 +1,264 @@
+"""Two masses and a joint from responses at the driven mass and, where it is measured too, at the other one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.estimate import Estimate
+from friso.identification.response.fitting import ResponseFit, refined
+from friso.identification.response.modes import fit_modes
+from friso.identification.response.response import FrequencyResponse
+from friso.intervals import COVERAGE
+
+METHOD = "two-mass model fitted to the response"
+
+RATIOS = (1.05, 1.2, 1.5, 2.0, 3.0)
+"""Resonance over antiresonance from which the fit starts."""
+
+MISSES = 0.4
+"""Root mean square of the logarithm of response over model beyond which a model is none of the response."""
+
+EXPLAINED = 3.0
+"""Sum of squares over degrees of freedom up to which a model counts as right."""
+
+FAR = np.log(30.0)
+"""Logarithm of the factor by which masses and stiffness may move from the start; twice that for damping."""
+
+DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, DELAY = range(7)
+"""Places of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; delay."""
+
+
+@dataclass(frozen=True)
+class TwoMass:
+    """A driven mass, a joint and another mass; units follow from the response's: mass is input per acceleration.
+
+    `fit` holds the parameters (see the module); `signs` of the two outputs are -1 where they go against the input.
+    `estimates` hold masses, stiffness, damping, viscous friction, delay, antiresonance and resonance.
+    """
+
+    signs: tuple[float, float]
+    fit: ResponseFit
+    estimates: tuple[Estimate, ...]
+    band: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Estimate:
+        return next(estimate for estimate in self.estimates if estimate.name == name)
+
+    def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
+        """The response at frequencies [Hz] of the driven mass, or of the other one; complex, same shape."""
+        which = 0 if collocated else 1
+        return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
+
+
+def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    """Responses of the driven and the other mass to a force on the former, shape (2, lines), over frequencies
+    [Hz]."""
+    driven, other, stiffness, damping = np.exp(parameters[:DRAG])
+    s = 2j * np.pi * frequency
+    joint = damping * s + stiffness
+    first = driven * s**2 + parameters[DRAG] * s + joint
+    second = other * s**2 + parameters[OTHER_DRAG] * s + joint
+    determinant = first * second - joint**2
+    return np.stack([second, joint]) / determinant * np.exp(-s * parameters[DELAY])
+
+
+def fit_two_mass(
+    collocated: FrequencyResponse,
+    noncollocated: FrequencyResponse | None = None,
+    band: tuple[float, float] | None = None,
+) -> TwoMass:
+    """The two-mass model of force-to-position responses on the same lines, in a `band` [Hz] (default: all of them).
+
+    Raises InputError where there are too few lines or the two responses have different ones.
+    """
+    responses = [collocated] if noncollocated is None else [collocated, noncollocated]
+    if band is not None:
+        responses = [response.between(*band) for response in responses]
+    frequency = responses[0].frequency
+    if len(frequency) < 8:
+        raise InputError("band", f"{len(frequency)} lines", "at least 8 lines for a two-mass model", "3 to 20 Hz")
+    if len(responses) > 1 and not np.array_equal(frequency, responses[1].frequency):
+        raise InputError("response", "responses on different lines", "both outputs of the same records", "one period")
+    values = np.stack([response.response for response in responses])
+    deviation = np.stack([_deviation(response) for response in responses])
+    sign = _sign(values[0])
+    options = [(sign, sign), (sign, -sign)][: len(responses)]
+    seen = cache(lambda: _from_modes(responses[0]))
+    fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen), pair) for pair in options]
+    fit, signs = min(fits, key=lambda candidate: candidate[0].squares)
+    _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency)[: len(values)])
+    limits = (float(frequency[0]), float(frequency[-1]))
+    return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
+
+
+def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
+    """The estimates with intervals that also explain how far fits of single realisations, `apart`, lie from each other.
+
+    Where these scatter more than their intervals allow, friction moves the parameters from one realisation to the next,
+    which one response cannot show: the intervals are scaled up by the Birge ratio (Birge 1932,
+    doi:10.1103/PhysRev.40.207). Raises InputError for fewer than two.
+    """
+    if len(apart) < 2:
+        raise InputError("records", f"{len(apart)} single fits", "at least two realisations", "exp1 and exp2")
+    rows = [_scaled(estimate, [fit[estimate.name] for fit in apart]) for estimate in fitted.estimates]
+    return replace(fitted, estimates=tuple(rows))
+
+
+def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
+    """An estimate with its interval scaled by the ratio of external to internal scatter of the others, if above 1."""
+    if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
+        return estimate
+    values, weights = (
+        np.array([another.value for another in others]),
+        np.array([(COVERAGE / another.half_width) ** 2 for another in others]),
+    )
+    off = values - np.average(values, weights=weights)
+    ratio = max(float(np.sqrt(np.sum(weights * off**2) / (len(others) - 1))), 1.0)
+    low, high = (
+        estimate.value - ratio * (estimate.value - estimate.low),
+        estimate.value + ratio * (estimate.high - estimate.value),
+    )
+    return replace(estimate, low=low, high=high, method=f"{estimate.method}, scatter of {len(others)} realisations")
+
+
+def _deviation(response: FrequencyResponse) -> np.ndarray:
+    """Deviations as weights: not below a thousandth of the response, which no model is right to."""
+    return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
+
+
+def _sign(response: np.ndarray) -> float:
+    """1 where the mass follows the force (-180 degrees) on most lines, -1 where it goes against it."""
+    return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
+
+
+def _follows(values: np.ndarray, model: np.ndarray) -> None:
+    """Raises InputError where a model is nowhere near the response, shape (outputs, lines)."""
+    off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
+    if off > MISSES:
+        text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
+        expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
+        raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
+
+
+def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
+    """A start from the first antiresonance and resonance of a rational fit, of whole mass 1; none where it has none."""
+    try:
+        modes = fit_modes(response)
+    except InputError:
+        return []
+    values = {mode.name: mode.value for mode in modes.estimates}
+    names = ("antiresonance 1 frequency", "resonance 1 frequency", "resonance 1 damping ratio")
+    zero, pole, damping = (values.get(name, np.nan) for name in names)
+    if not 0 < zero < pole:
+        return []
+    other = 1 - (zero / pole) ** 2
+    stiffness = other * (2 * np.pi * zero) ** 2
+    return [_start(other, stiffness, 4 * np.pi * max(damping, 1e-4) * pole * other * (1 - other))]
+
+
+def _start(other: float, stiffness: float, damping: float) -> np.ndarray:
+    return np.array([*np.log([1 - other, other, stiffness, damping]), 0.0, 0.0, 0.0])
+
+
+def _best(
+    values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen: Callable[[], list[np.ndarray]]
+) -> ResponseFit:
+    """The best of the fits from the most promising mass ratio, from the modes `seen` and from the next ratio; the first
+    one that explains the data."""
+    late = 0.1 / frequency[-1]
+    reach = np.array([FAR] * 3 + [2 * FAR])
+
+    def model(parameters: np.ndarray) -> np.ndarray:
+        return two_masses(parameters, frequency)[: len(values)]
+
+    def misfit(start: np.ndarray) -> float:
+        return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
+
+    def starts() -> Iterator[np.ndarray]:
+        first, second, *_ = sorted(_starts(values[0], frequency), key=misfit)
+        yield first
+        yield from (_scaled_to(visible, values[0], frequency) for visible in seen())
+        yield second
+
+    fits = []
+    for start in starts():
+        lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, -late])
+        upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, late])
+        fits.append(refined(model, start, values, deviation, lower, upper))
+        if fits[-1].reduced < EXPLAINED:
+            break
+    return min(fits, key=lambda fit: fit.squares)
+
+
+def _starts(response: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
+    """Starts at the highest place of the acceleration inside the band, with several mass ratios."""
+    level = np.abs(response) * (2 * np.pi * frequency) ** 2
+    resonance = frequency[1 + int(np.argmax(level[1:-1]))]
+    for ratio in RATIOS:
+        other = 1 - 1 / ratio**2
+        stiffness = other * (2 * np.pi * resonance / ratio) ** 2
+        damping = 0.1 * np.sqrt(stiffness * other)
+        yield _scaled_to(_start(other, stiffness, damping), response, frequency)
+
+
+def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    """A start with masses, stiffness and damping as large as the response asks for."""
+    scale = np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response)))
+    return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
+
+
+def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
+    if signs[0] < 0:
+        yield "the driven mass goes against the input: its sign was reversed"
+    if signs[0] != signs[1]:
+        yield "the second output has the opposite sign of the first: it was reversed"
+    if fit.reduced > EXPLAINED:
+        yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
+
+
+def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
+    """Masses and joint, with what follows from them."""
+    into, out = response.channels.input_unit, response.channels.output_unit
+    rate = f"{into} s/{out}"
+
+    rows = [
+        ("driven mass", f"{into} s^2/{out}", lambda p: float(np.exp(p[DRIVEN]))),
+        ("other mass", f"{into} s^2/{out}", lambda p: float(np.exp(p[OTHER]))),
+        ("total mass", f"{into} s^2/{out}", lambda p: float(np.exp(p[DRIVEN]) + np.exp(p[OTHER]))),
+        ("joint stiffness", f"{into}/{out}", lambda p: float(np.exp(p[STIFFNESS]))),
+        ("joint damping", rate, lambda p: float(np.exp(p[DAMPING]))),
+        ("antiresonance frequency", "Hz", lambda p: abs(_root(p, True)) / (2 * np.pi)),
+        ("antiresonance damping ratio", "1", lambda p: -np.cos(np.angle(_root(p, True)))),
+        ("resonance frequency", "Hz", lambda p: abs(_root(p, False)) / (2 * np.pi)),
+        ("resonance damping ratio", "1", lambda p: -np.cos(np.angle(_root(p, False)))),
+    ]
+    positive = [fit.estimate(name, _si(unit), METHOD, of, positive=True) for name, unit, of in rows]
+    plain = [
+        fit.estimate("driven viscous friction", _si(rate), METHOD, lambda p: float(p[DRAG])),
+        fit.estimate("other viscous friction", _si(rate), METHOD, lambda p: float(p[OTHER_DRAG])),
+        fit.estimate("delay", "s", METHOD, lambda p: float(p[DELAY])),
+    ]
+    return (*positive, *plain)
+
+
+def _root(parameters: np.ndarray, zero: bool) -> complex:
+    """The zero of the collocated response, or the pole, that is furthest out above the real axis [rad/s]."""
+    driven, other, stiffness, damping = np.exp(parameters[:DRAG])
+    first = np.array([driven, parameters[DRAG] + damping, stiffness])
+    second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])
+    joint = np.array([damping, stiffness])
+    characteristic = second if zero else np.polysub(np.polymul(first, second), np.polymul(joint, joint))
+    roots = np.roots(characteristic)
+    upper = roots[roots.imag > 0]
+    return complex(upper[np.argmax(np.abs(upper))]) if upper.size else complex(np.nan, np.nan)
+
+
+def _si(unit: str) -> str:
+    """The usual names where input is in newtons and output in metres."""
+    return {"N s^2/m": "kg", "N s/m": "N s/m"}.get(unit, unit)

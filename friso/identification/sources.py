@@ -1,0 +1,165 @@
+"""The files given: what each holds, how it is mapped, and which kind of experiment it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from friso.errors import InputError, LogError
+from friso.identification.kind import Source
+from friso.identification.kinds import KINDS
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.gaps import GapsError
+from friso.identification.logs.log import Log
+from friso.identification.logs.mapping import SUFFIX, Mapping, load, place_for
+from friso.identification.logs.read import is_frequency_response, read_frequency_response, read_table
+from friso.identification.logs.roles import find
+from friso.identification.readings.course import Course
+
+MOVED = ("position", "force")
+"""Roles by which the kind of an experiment is recognised."""
+
+
+@dataclass(frozen=True)
+class LogFile:
+    """A file with what it holds, its kind of experiment and why it counts as one, how it was mapped, and where that is
+    kept (None: not yet, or nothing had to be said about it)."""
+
+    path: Path
+    source: Source
+    kind: str
+    reason: str
+    mapping: Mapping = Mapping()  # noqa: RUF009 (frozen)
+    mapping_file: Path | None = None
+
+
+class OpenQuestions(GapsError):
+    """What several logs do not tell; `mappings` are what was said of them, by file, kept beside or not."""
+
+    def __init__(self, gaps: Sequence[LogError], mappings: dict[Path, Mapping]) -> None:
+        super().__init__(gaps)
+        self.mappings = mappings
+
+
+def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
+    """The files, mapped as the options say, or as kept from an earlier time beside them or in `folder`. Raises
+    OpenQuestions for all that they do not tell, InputError for what cannot be read.
+
+    Of several files, each takes what the options say about channels that it has.
+    """
+    if options.experiment is not None:
+        KINDS.checked(options.experiment, "--as", "--as {}")
+    files: list[LogFile] = []
+    gaps: list[LogError] = []
+    mappings: dict[Path, Mapping] = {}
+    for path in paths:
+        said = _applicable(options, path, paths)
+        try:
+            file = _read(path, said, folder)
+            files.append(replace(file, mapping_file=kept_at(path, file.mapping, folder)))
+            mappings[path] = file.mapping
+        except GapsError as error:
+            gaps += error.gaps
+            mappings[path] = said.over(load(path, folder) or Mapping())
+    if gaps:
+        raise OpenQuestions(gaps, mappings)
+    return files
+
+
+def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:
+    """Of the options what this file can use; what no file can use stays, to be answered where it is read."""
+    if len(paths) < 2 or is_frequency_response(path):
+        return options
+    names = {*options.roles.values(), *options.units}
+    holders = {name: [_has(other, name) for other in paths] for name in names}
+    place = paths.index(path)
+    lacking = {name for name, held in holders.items() if any(held) and not held[place]}
+    roles = {role: name for role, name in options.roles.items() if name not in lacking}
+    units = {name: unit for name, unit in options.units.items() if name not in lacking}
+    scales = {k: v for k, v in options.scales.items() if k in roles or k not in options.roles}
+    return replace(options, roles=roles, units=units, scales=scales)
+
+
+def _has(path: Path, name: str) -> bool:
+    """Whether a file has a channel of this name."""
+    if is_frequency_response(path):
+        return False
+    try:
+        find(read_table(path), name, "")
+    except InputError:
+        return False
+    return True
+
+
+def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
+    if is_frequency_response(path):
+        kind = next(name for name in KINDS if KINDS[name].responses)
+        return LogFile(path, read_frequency_response(path), kind, "the file holds a frequency response")
+    stored = load(path, folder) or Mapping()
+    if stored.experiment is not None:
+        KINDS.checked(stored.experiment, f"{path}{SUFFIX}: experiment", 'experiment = "{}"')
+    mapping = options.over(stored)
+    if mapping.experiment is not None:
+        KINDS.checked(mapping.experiment, "--as", "--as {}")
+        log = named(path, mapping, mapping.experiment)
+        before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
+        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping)
+    log, kind, reason = unnamed(path, mapping)
+    return LogFile(path, log, kind, reason, mapping)
+
+
+def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
+    """A log without a stated kind, its kind of experiment, and why. Raises GapsError for all that is open,
+    the units included that most kinds need."""
+    gaps: list[LogError] = []
+    kind = reason = ""
+    try:
+        log = read_log(path, mapping, strict=False, needed=MOVED)
+    except GapsError as error:
+        gaps += error.gaps
+        log = _without_clock(path, replace(mapping, roles={**mapping.roles, **error.proposed}))
+    try:
+        kind, reason = recognised(log, path) if log is not None else ("", "")
+    except LogError as error:
+        gaps.append(error)
+    if not (kind and not KINDS[kind].si):
+        try:
+            log = named(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
+        except GapsError as error:
+            gaps += [gap for gap in error.gaps if gap.example not in [other.example for other in gaps]]
+    if gaps or log is None:
+        raise GapsError(gaps)
+    return log, kind, reason
+
+
+def _without_clock(path: Path, mapping: Mapping) -> Log | None:
+    """A log whose instants are not told, sample by sample: how it goes can be seen without. None where it cannot."""
+    try:
+        return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
+    except LogError:
+        return None
+
+
+def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
+    """Where the mapping of a log is kept for the next time: beside it, or in `folder`; None for nothing to keep."""
+    return None if mapping == Mapping() else place_for(path, folder)
+
+
+def named(path: Path, mapping: Mapping, kind: str) -> Log:
+    """The log with the signals that the kind of experiment needs."""
+    chosen = KINDS[kind]
+    return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)
+
+
+def recognised(log: Log, path: Path) -> tuple[str, str]:
+    """The only kind of experiment that a log without a stated kind may be of, and why. Raises InputError
+    where none claims it, or several do."""
+    course = Course(log)
+    claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}
+    reasons = {name: reason for name, claims in claims_of.items() if (reason := claims(course)) is not None}
+    if len(reasons) == 1:
+        return next(iter(reasons.items()))
+    names = sorted(reasons or KINDS, key=lambda name: name != "moves")
+    expected = f"the kind of experiment: {', '.join(names)}"
+    raise LogError("--as", course.words, expected, f"--as {names[0]}", str(path))

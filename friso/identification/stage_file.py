@@ -1,0 +1,116 @@
+"""The stage file that identification writes: the stage given (or one made up around a log), with the estimates."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.equations.controllers.van_dijk import table
+from friso.identification.estimate import Estimate
+from friso.identification.inverse_model import SMOOTH, InverseModel, motion
+from friso.identification.logs.log import Log
+from friso.stage import Stage
+
+BENDING, STRIBECK_VELOCITY = 5e-6, 1e-3
+"""Length [m] by which bristles bend and Stribeck velocity [m/s] of a stage made up around a log: our choice."""
+
+DIGITS = 2
+"""Significant digits of an uncertainty, and so of its value."""
+
+NOT_IDENTIFIED = "not identified: all that is possible"
+
+OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
+
+
+def made_up(log: Log, inverse: InverseModel) -> Stage:
+    """A stage around a log without any: one rigid mass, LuGre friction without Stribeck effect, a controller of our
+    choice, and a move as fast as the log's fastest."""
+    mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
+    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / BENDING
+    parts = [motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth) for part in log.segments]
+    top = max(float(np.abs(part.velocity).max()) for part in parts)
+    brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
+    time = max(top / brisk, log.sample_time)
+    back = max(2.0, 3 * time)
+    tables: dict[str, Any] = {
+        "masses": {"cart": f"{mass:.6g} kg"},
+        "friction": {
+            "model": "lugre",
+            "static": f"{coulomb:.6g} N",
+            "coulomb": f"{coulomb:.6g} N",
+            "stribeck_velocity": f"{STRIBECK_VELOCITY:g} m/s",
+            "stribeck_exponent": 2,
+            "bristle_stiffness": f"{stiffness:.6g} N/m",
+            "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} N*s/m",
+            "viscous": f"{viscous:.6g} N*s/m",
+        },
+        "controller": table("10 Hz"),
+        "motion": {
+            "kind": "there_and_back",
+            "acceleration": f"{brisk:.4g} m/s^2",
+            "acceleration_time": f"{time:.4g} s",
+            "return_at": f"{back:.4g} s",
+            "duration": f"{2.5 * back:.4g} s",
+        },
+    }
+    return Stage(name=log.name, source=OUR_CHOICE, **tables)
+
+
+def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
+    """The stage with the estimates of its keys, as values with 95 % intervals or as ranges.
+
+    A stiffness that follows from a [flexure] stays as it follows. Raises InputError where they do not fit together,
+    which those of `fitting` do.
+    """
+    changes: dict[str, object] = {}
+    for estimate in estimates:
+        if "." not in estimate.name or (stage.flexure and estimate.name == "joint.stiffness"):
+            continue
+        if np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low:
+            changes[estimate.name] = written(estimate)
+    source = f"identified by friso from {', '.join(logs)}"
+    return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
+
+
+def origins(stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], from_user: bool) -> dict[str, str]:
+    """Where each key of an identified stage comes from: the estimates that it took, keys that follow another one, and
+    the stage file, or our choice where nothing was given."""
+    sources: dict[str, str] = {}
+    for estimate in estimates:
+        sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
+    sources |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
+    rest = "as given" if from_user else "our choice, not identified"
+    tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
+    keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
+    return {key: sources.get(key, rest) for key in keys}
+
+
+def with_origins(text: str, origins: Mapping[str, str]) -> str:
+    """The text of a stage file with a comment behind each key that says where it comes from."""
+    lines, table = [], ""
+    for line in text.splitlines():
+        key = f"{table}.{line.partition(' = ')[0]}"
+        if line.startswith("["):
+            table = line.strip("[]")
+        lines.append(f"{line}  # {origins[key]}" if key in origins and " = " in line else line)
+    return "\n".join(lines) + "\n"
+
+
+def written(estimate: Estimate) -> str:
+    """The text of an estimate in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is not shown."""
+    unit = f" {estimate.unit}" if estimate.unit else ""
+    if not estimate.determined:
+        return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
+    half, digits = rounded(estimate.half_width)
+    value = f"{estimate.value:.{digits}f}" if digits > 0 else f"{round(estimate.value, digits):.0f}"
+    return f"{value}{unit} +/- {half}{unit}"
+
+
+def rounded(half: float) -> tuple[str, int]:
+    """An uncertainty rounded up to two digits, as text, and the decimal places of its value."""
+    digits = DIGITS - 1 - math.floor(math.log10(half))
+    up = math.ceil(round(half * 10**digits, 6)) / 10**digits
+    return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits

@@ -1,0 +1,169 @@
+"""Which estimates the keys of a stage file can take: each within its bound, and all of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identification.estimate import Estimate
+from friso.identification.output_error.parameters import HIGHEST_RATIO
+from friso.identification.stage_file import identified, written
+from friso.intervals import uncertain_value
+from friso.quantities import Number, Quantity
+from friso.stage import Stage
+from friso.stage.stage import numeric_keys
+
+LEAST = 1e-3
+"""Share of a range's upper end at which one begins that would hold 0 or less, where a key does not allow that: smaller
+values make no difference beside it, and a range over orders of magnitude needs an end."""
+
+STATIC, COULOMB = "friction.static", "friction.coulomb"
+
+ADDED = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
+"""Keys that a stage file may get though it had none."""
+
+
+@dataclass(frozen=True)
+class Fitting:
+    """Estimates that can all stand in the stage file, keys that move along with another (full correlation), and a
+    sentence for each that cannot stand there as it was estimated."""
+
+    estimates: tuple[Estimate, ...]
+    follows: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
+    """What of the estimates, one per key, the stage file can take."""
+    flat, notes = stage.flat(), []
+    fields = numeric_keys({**flat, "bias.cart": 0.0})
+    accepted: dict[str, Estimate] = {}
+    for estimate in estimates:
+        field = fields.get(estimate.name) if estimate.name in (*flat, *ADDED) else None
+        if field is None:
+            notes += [f"{estimate.name}: the stage has no such key, it is left out"] if estimate.determined else []
+            continue
+        bounded = _bounded(estimate, stage, estimates)
+        accepted_estimate, why = _within(bounded, field)
+        if not why and bounded.high < estimate.high:
+            why = f"the upper end {bounded.high:.4g} {estimate.unit} is from what was known beforehand"
+        notes += [f"{estimate.name}: {why}"] if why else []
+        if accepted_estimate is not None:
+            accepted[estimate.name] = accepted_estimate
+    follows = _static_above(stage, fields, accepted, notes)
+    return Fitting(_together(stage, accepted, notes), {k: v for k, v in follows.items() if k in accepted}, tuple(notes))
+
+
+def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
+    """The whole mass, shared among the masses as in the stage."""
+    masses = {f"masses.{name}": value for name, value in stage.masses if value is not None}
+    method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
+    shares = {key: value / sum(masses.values()) for key, value in masses.items()}
+    return tuple(
+        replace(total, name=key, unit="kg", method=method, **{size: getattr(total, size) * share for size in sizes})
+        for key, share in shares.items()
+    )
+
+
+def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) -> Estimate:
+    """An estimate of which one bound is known, with the other one from what was known beforehand.
+
+    Static friction known as "at least" reaches up to `HIGHEST_RATIO` times Coulomb friction, the most that is believed
+    of a bearing, unless the stage knows.
+    """
+    before = stage.uncertain().get(estimate.name)
+    if before is not None and not estimate.determined and before.high >= estimate.low and before.low <= estimate.high:
+        estimate = replace(estimate, low=max(estimate.low, before.low), high=min(estimate.high, before.high))
+    if estimate.name != STATIC or not np.isfinite(estimate.low) or np.isfinite(estimate.high):
+        return estimate
+    flat = stage.flat()
+    coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
+    value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
+    top = HIGHEST_RATIO * value
+    # a bound that is Coulomb friction itself adds nothing: static friction then moves along with that
+    return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
+
+
+def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | None, str]:
+    """The estimate as far as the key allows it, or None; and why it is not as it was, if it is not."""
+    if not np.isfinite([estimate.low, estimate.high]).all():
+        ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
+        what = f"known only to be {' and '.join(ends)}" if ends else "unknown"
+        return None, f"{what}, the stage file keeps what it had"
+    if not estimate.high > estimate.low:
+        return None, "its uncertainty is not known, the stage file keeps what it had"
+    if not (field.bound.holds(estimate.low) or field.bound.holds(estimate.high)):
+        ends = f"{estimate.low:.4g} to {estimate.high:.4g} {estimate.unit}".rstrip()
+        return None, f"{ends} is all that is known, the stage file keeps what it had: it has to be {field.bound.text}"
+    if _allowed(estimate, field):
+        return estimate, ""
+    low = LEAST * estimate.high
+    cut = replace(estimate, value=np.nan, low=low, reason=estimate.reason or f"it has to be {field.bound.text}")
+    limits = f"{written(estimate)} was found, but it has to be {field.bound.text}"
+    if estimate.low < low and _allowed(cut, field):
+        return cut, f"{limits}: the stage file has {written(cut)}, from a thousandth of the upper end on"
+    return None, f"{limits}: the stage file keeps what it had"
+
+
+def _ends(estimate: Estimate) -> list[tuple[str, float]]:
+    """The ends that are known, in words."""
+    return [(word, end) for word, end in (("at least", estimate.low), ("at most", estimate.high)) if np.isfinite(end)]
+
+
+def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
+    """Whether the key takes the text of the estimate."""
+    try:
+        uncertain_value(written(estimate), field)
+    except InputError:
+        return False
+    return True
+
+
+def _static_above(
+    stage: Stage, fields: Mapping[str, Quantity | Number], estimates: dict[str, Estimate], notes: list[str]
+) -> dict[str, str]:
+    """Keep static friction no smaller than Coulomb friction: the less certain of both gives way, in `estimates`; which
+    moves along with the other, in the ratio that the stage had."""
+    flat = stage.flat()
+    if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
+        return {}
+    centre = {
+        key: float(uncertain_value(written(estimates[key]), fields[key]) if key in estimates else flat[key])
+        for key in (STATIC, COULOMB)
+    }
+    if centre[STATIC] >= centre[COULOMB]:
+        return {}
+    static = estimates.get(STATIC)
+    if static is not None and not static.determined and centre[COULOMB] < static.high:
+        estimates[STATIC] = replace(static, low=centre[COULOMB])
+        notes.append(f"{STATIC}: no smaller than Coulomb friction, the stage file has {written(estimates[STATIC])}")
+        return {}
+    leads, follows = (COULOMB, STATIC) if COULOMB in estimates else (STATIC, COULOMB)
+    ratio, lead = flat[follows] / flat[leads], estimates[leads]
+    lost = f" ({written(estimates[follows])} was found)" if follows in estimates else ""
+    estimates[follows] = replace(
+        lead, name=follows, value=lead.value * ratio, low=lead.low * ratio, high=lead.high * ratio
+    )
+    why = f"Coulomb friction would be above static friction otherwise{lost}"
+    notes.append(f"{follows}: moved along with {leads} to {written(estimates[follows])}, since {why}")
+    return {follows: leads}
+
+
+def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) -> tuple[Estimate, ...]:
+    """Those with which the stage is one; a key that breaks a rule of the stage file is taken out of `estimates`."""
+    units = [[key for key in (COULOMB, STATIC) if key in estimates]]
+    units += [[key] for key in estimates if key not in (COULOMB, STATIC)]
+    fine: list[Estimate] = []
+    for unit in units:
+        try:
+            identified(stage, [*fine, *(estimates[key] for key in unit)], ())
+        except InputError as error:
+            for key in unit:
+                del estimates[key]
+            notes.append(f"{', '.join(unit)}: left out, since the stage file takes {error.expected}")
+            continue
+        fine += [estimates[key] for key in unit]
+    return tuple(fine)

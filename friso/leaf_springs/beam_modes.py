@@ -1,0 +1,178 @@
+"""Modes and buckling load of undeflected leaves and their stage, from the stiffness and mass of one leaf.
+
+A leaf between held ends moves along x, y and z and twists independently of each other. Its lowest modes of each kind,
+together with the shapes that it takes statically when the stage moves, describe it completely (Craig & Bampton 1968,
+doi:10.2514/3.4741).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigh
+
+from friso.leaf_springs import plate
+from friso.leaf_springs.beam_system import COORDINATES, LeafBeams
+from friso.leaf_springs.closed_forms import axial, body_mass
+from friso.leaf_springs.evaluation import Mode, peak_of
+from friso.leaf_springs.mechanism import Mechanism, along_motion
+from friso.leaf_springs.naming import mode_name
+
+MODES = 12
+"""Modes reported, the lowest; and those of the stage above them."""
+
+OF_STAGE = 0.1
+"""Share of the energy of a mode from which it is one of the stage."""
+
+KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
+"""Coordinates of a node that go together while the leaf is straight, and how many modes between held ends are kept:
+bending, bending in its plane, torsion, stretching."""
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """A straight leaf: `static` (nodes, 6, 6) and `inner` (nodes, 6, modes) its shapes for unit motions of its stage
+    end and in its own modes between held ends at unit modal mass, `squares` (modes,) their circular frequencies squared
+    [1/s^2]; `stiffness` and `mass` (6, 6) at the stage end, `coupling` (modes, 6) the mass between the two kinds."""
+
+    static: np.ndarray
+    inner: np.ndarray
+    squares: np.ndarray
+    stiffness: np.ndarray
+    mass: np.ndarray
+    coupling: np.ndarray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
+        """Of the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf, but for its torsion, which
+        is that of a plate."""
+        size = len(stiffness)
+        stiffness, mass = stiffness.copy(), mass.copy()
+        stiffness[3::COORDINATES, 3::COORDINATES], mass[3::COORDINATES, 3::COORDINATES] = _torsion(
+            mechanism, size // COORDINATES
+        )
+        static, parts, squares = np.zeros((size, COORDINATES)), [], []
+        static[-COORDINATES:] = np.eye(COORDINATES)
+        for kind, number in KINDS:
+            inside = np.add.outer(np.arange(COORDINATES, size - COORDINATES, COORDINATES), kind).ravel()
+            clamped = stiffness[np.ix_(inside, inside)]
+            static[inside] = -np.linalg.solve(clamped, stiffness[inside, -COORDINATES:])
+            values, vectors = eigh(clamped, mass[np.ix_(inside, inside)])
+            shapes = np.zeros((size, min(number, len(values))))
+            shapes[inside] = vectors[:, :number]
+            parts.append(shapes)
+            squares.append(values[:number])
+        inner, moved = np.hstack(parts), mass @ static
+        return cls(
+            static.reshape(-1, COORDINATES, COORDINATES),
+            inner.reshape(-1, COORDINATES, inner.shape[1]),
+            np.concatenate(squares),
+            static.T @ stiffness @ static,
+            static.T @ moved,
+            inner.T @ moved,
+        )
+
+
+def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends: of cubic elements whose rates
+    of twist at the inner nodes follow statically. Beams lack warping, of which modes have more than statics."""
+    h = float(mechanism.length) / (nodes - 1)
+    rigidity = float(mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
+    warping = rigidity / float(plate.warping_rate(mechanism.width, mechanism.poisson)) ** 2
+    signs = np.array([[1, 1, -1, 1], [1, 1, -1, 1], [-1, -1, 1, -1], [1, 1, -1, 1]])
+    lengths = np.outer([1, h, 1, h], [1, h, 1, h])
+    bent = np.array([[12, 6, 12, 6], [6, 4, 6, 2], [12, 6, 12, 6], [6, 2, 6, 4]]) * signs / h**3
+    turned = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / (30 * h)
+    moved = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420
+    polar = float(mechanism.density * (mechanism.bending + mechanism.edgewise))
+    stiffness, mass = np.zeros((2 * nodes, 2 * nodes)), np.zeros((2 * nodes, 2 * nodes))
+    for i in range(0, 2 * nodes - 2, 2):
+        stiffness[i : i + 4, i : i + 4] += (warping * bent + rigidity * turned) * lengths
+        mass[i : i + 4, i : i + 4] += polar * moved * lengths
+    follow = np.zeros((2 * nodes, nodes))
+    follow[::2] = np.eye(nodes)
+    inside = slice(3, -1, 2)
+    follow[inside] = -np.linalg.solve(stiffness[inside, inside], stiffness[inside, ::2])
+    return follow.T @ stiffness @ follow, follow.T @ mass @ follow
+
+
+def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
+    """The lowest modes and all of the stage, the drive mode first, the others by frequency."""
+    ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
+    count = len(leaf.squares)
+    size = COORDINATES + count * len(rows)
+    stiffness, mass = np.zeros((size, size)), np.eye(size)
+    stage = slice(0, COORDINATES)
+    stiffness[stage, stage] = _gathered(ends, leaf.stiffness)
+    body = body_mass(mechanism)
+    mass[stage, stage] = body + _gathered(ends, leaf.mass)
+    np.fill_diagonal(stiffness[COORDINATES:, COORDINATES:], np.tile(leaf.squares, len(rows)))
+    # row k of the leaves takes part with the weights rows[k]
+    mass[COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(-1, COORDINATES)
+    mass[stage, COORDINATES:] = mass[COORDINATES:, stage].T
+    squares, vectors = eigh(stiffness, mass)
+    lowest = []
+    for square, vector in zip(squares, vectors.T, strict=True):
+        if len(lowest) >= MODES and not vector[stage] @ body @ vector[stage] > OF_STAGE:
+            continue
+        amplitudes = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
+        moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
+        moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], amplitudes)
+        lowest.append(_mode(mechanism, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
+    drive = max(lowest, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
+    return (replace(drive, name="drive"), *(mode for mode in lowest if mode is not drive))
+
+
+def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
+    """The mode that moves stage and leaves so, its sign such that the largest displacement of a leaf is positive."""
+    actuator, sensor = (
+        float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
+    )
+    sign = 1.0 if leaves.flat[np.argmax(np.abs(leaves))] >= 0 else -1.0
+    arm = np.subtract(mechanism.body.centre, (mechanism.length, 0.0, 0.0)).astype(float)
+    name = mode_name(stage, float(mechanism.body.mass), mechanism.body.inertia, arm, leaves, float(mechanism.leaf_mass))
+    return Mode(
+        name,
+        float(frequency),
+        sign * actuator,
+        sign * sensor,
+        peak_of(mechanism, actuator, sensor),
+        sign * stage,
+        sign * leaves,
+    )
+
+
+def end_motions(offsets: np.ndarray) -> np.ndarray:
+    """Motion of the leaves' stage ends per small motion of the stage, shape (leaves, 6, 6)."""
+    ends = np.tile(np.eye(COORDINATES), (len(offsets), 1, 1))
+    ends[:, 0, 4], ends[:, 1, 3] = offsets, -offsets
+    return ends
+
+
+def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
+    """What the stage feels of this matrix at all stage ends."""
+    return np.einsum("lea,ef,lfb->ab", ends, matrix, ends)
+
+
+def _rows(offsets: np.ndarray) -> np.ndarray:
+    """Orthonormal patterns of the leaves, one per row: uniform, linear in the position of the leaf, and the rest."""
+    powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
+    return np.linalg.qr(powers)[0].T
+
+
+def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray, load: float) -> float:
+    """Least load [N] along the leaves, shared by them, at which the stage sways, `straight` being the stiffness of a
+    leaf without load and `load` a guess [N], at which it is linearised."""
+    state = np.zeros((1, leaves.nodes, COORDINATES))
+    strain = load / float(mechanism.leaves * axial(mechanism))
+    state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)
+    loaded = leaves.stiffness(state)[0]
+    # all leaves bend identically; the stage's pitch stretches them
+    moving = np.add.outer(np.arange(COORDINATES, len(straight), COORDINATES), (2, 4)).ravel()
+    without, with_load = (int(mechanism.leaves) * matrix[np.ix_(moving, moving)] for matrix in (straight, loaded))
+    softening = without - with_load
+    without[-1, -1] += axial(mechanism) / mechanism.length * mechanism.offset_squares
+    last = len(moving) - 1
+    largest = eigh(softening, without, eigvals_only=True, subset_by_index=(last, last))[0]
+    return float(load / largest)

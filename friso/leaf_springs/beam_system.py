@@ -1,0 +1,213 @@
+"""The leaves of one mechanism as geometrically exact beams of exudyn: forces, stiffness and mass of their nodes.
+
+Only this module knows exudyn. A leaf is a chain of equal two-node elements of constant strain. Three things keep few of
+them exact. The bending an element misses because its moment is taken as constant is added to its shear flexibility
+(residual bending flexibility: h^2/(12 E I) per force). The mass its bent middle carries beyond the straight line
+between its nodes is added to its rotary inertia (rho A h^2/6). And what the leaf has as a plate (plate.py) is averaged
+over the element, such that the whole leaf has the stiffness of the plate in parallel motion, under a constant torque,
+and under the torque that a force across the deflected leaf adds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn
+import numpy as np
+
+from friso.leaf_springs import plate
+from friso.leaf_springs.closed_forms import SHEAR, axial, edgewise_shear
+from friso.leaf_springs.mechanism import Mechanism
+
+ELEMENTS = 16
+"""Elements along a leaf; its modes are reported at the nodes between them."""
+
+COORDINATES = 6
+"""Coordinates of a node: displacements along x, y, z and angles of successive rotations about them."""
+
+
+class BeamFailure(RuntimeError):
+    """A mechanism that the beam model cannot evaluate."""
+
+
+class LeafBeams:
+    """The leaves, all identical and with free ends: exudyn holds one leaf and evaluates each state in turn.
+    States and forces are of shape (leaves, nodes, 6), the cart end first."""
+
+    def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
+        self.count, self.nodes = int(mechanism.leaves), elements + 1
+        self._container: Any = exudyn.SystemContainer()
+        self._system: Any = self._container.AddSystem()
+        _add_leaf(self._system, mechanism, elements)
+        self._system.Assemble()
+        settings: Any = exudyn.SimulationSettings()
+        settings.solution.file.write = False
+        settings.solution.sensors.active = False
+        settings.staticSolver.verboseMode = 0
+        self._solver: Any = exudyn.MainSolverStatic()
+        self._solver.InitializeSolver(self._system, settings)
+
+    def forces(self, state: np.ndarray) -> np.ndarray:
+        """Forces and moments [N, N m] that hold the nodes in this state."""
+        return -np.array([self._forces(leaf) for leaf in state]).reshape(state.shape)
+
+    def stiffness(self, state: np.ndarray) -> np.ndarray:
+        """Tangent stiffness of each leaf in this state, shape (leaves, 6 nodes, 6 nodes)."""
+        return np.array([self._stiffness(leaf) for leaf in state])
+
+    def mass(self) -> np.ndarray:
+        """Mass of an undeflected leaf, shape (6 nodes, 6 nodes)."""
+        self._move(np.zeros((self.nodes, COORDINATES)))
+        self._solver.ComputeMassMatrix(self._system)
+        return np.array(self._solver.GetSystemMassMatrix())
+
+    def _move(self, leaf: np.ndarray) -> None:
+        if not np.all(np.isfinite(leaf)):
+            raise BeamFailure("The beams have no finite state: check that all dimensions are positive numbers.")
+        self._system.systemData.SetODE2Coordinates(leaf.ravel())
+
+    def _forces(self, leaf: np.ndarray) -> np.ndarray:
+        self._move(leaf)
+        self._solver.ComputeODE2RHS(self._system)
+        return np.array(self._solver.GetSystemResidual())
+
+    def _stiffness(self, leaf: np.ndarray) -> np.ndarray:
+        self._move(leaf)
+        self._solver.ComputeJacobianODE2RHS(
+            self._system, scalarFactor_ODE2=-1, scalarFactor_ODE2_t=0, scalarFactor_ODE1=0
+        )
+        return np.array(self._solver.GetSystemJacobian())
+
+
+@dataclass(frozen=True)
+class Configuration:
+    """A configuration in the plane of motion: displacements of the `inner` nodes (leaves, nodes between the ends, 3)
+    and of the `stage` (x, z, about y)."""
+
+    inner: np.ndarray
+    stage: np.ndarray
+
+    @classmethod
+    def rest(cls, leaves: LeafBeams) -> Configuration:
+        """The configuration without deflection."""
+        return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
+
+    def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:
+        """The configuration moved along a rate, a factor times."""
+        return Configuration(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
+
+    def state(self, offsets: np.ndarray) -> np.ndarray:
+        """That of all nodes, shape (leaves, nodes, 6)."""
+        x, z, turn = self.stage
+        leaves, inner, _ = self.inner.shape
+        state = np.zeros((leaves, inner + 2, COORDINATES))
+        state[:, 1:-1, 0::2] = self.inner
+        state[:, -1, 0] = x + np.sin(turn) * offsets
+        state[:, -1, 2] = z + (np.cos(turn) - 1) * offsets
+        state[:, -1, 4] = turn
+        return state
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Coordinates of the leaves' nodes, eliminated: the inner nodes `follow` the stage (leaves, inner coordinates, 3)
+    and `settle` (leaves, inner coordinates) under forces that are out of balance; `force` (3,) and `stiffness` (3, 3)
+    are the remainder at the stage."""
+
+    follow: np.ndarray
+    settle: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+
+    @classmethod
+    def of(
+        cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
+    ) -> Condensed:
+        """Of the stiffness of the leaves and forces on their nodes, the coordinates which, which + 2 and which + 4 of
+        each node; `ends` (leaves, 3, 3) says how those of the leaf ends follow the stage, `bend` at which coordinate
+        their path is curved, and what the forces do there [N m]."""
+        matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
+        out = forces[:, 1:, which::2].reshape(len(forces), -1)
+        inside, border = slice(None, -3), slice(-3, None)
+        back = np.swapaxes(ends, 1, 2)
+        across = matrices[:, inside, border] @ ends
+        solved = np.linalg.solve(matrices[:, inside, inside], np.concatenate([across, out[:, inside, None]], axis=2))
+        follow, settle = -solved[:, :, :3], -solved[:, :, 3]
+        felt = np.swapaxes(across, 1, 2)
+        left = np.sum(back @ matrices[:, border, border] @ ends + felt @ follow, axis=0)
+        left[bend[0], bend[0]] += bend[1]
+        force = np.sum(back @ out[:, border, None] + felt @ settle[:, :, None], axis=0)[:, 0]
+        return cls(follow, settle, force, left)
+
+
+def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
+    """The nodes and elements of a leaf."""
+    h = float(mechanism.length) / elements
+    middles = h * (np.arange(elements // 2) + 0.5)
+    half = [
+        _section(mechanism, h, *pair)
+        for pair in zip(_curl(mechanism, h, middles), _twist(mechanism, h, middles), strict=True)
+    ]
+    nodes = [
+        system.AddNode({"nodeType": "RigidBodyRxyz", "referenceCoordinates": [i * h, 0, 0, 0, 0, 0], "Vshow": False})
+        for i in range(elements + 1)
+    ]
+    for i, section in enumerate(half[::-1] + half):
+        system.AddObject(
+            {
+                "objectType": "BeamGeometricallyExact",
+                "nodeNumbers": nodes[i : i + 2],
+                "length": h,
+                "sectionData": section,
+                "Vshow": False,
+            }
+        )
+
+
+def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
+    """The section of an element of length h, its compliance in bending and torsion over that of a plain beam given."""
+    weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
+    shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)
+    torsion = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness) / twist
+    edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
+    bulge = mechanism.area * h**2 / 6
+    section: Any = exudyn.BeamSection()
+    section.stiffnessMatrix = np.diag([axial(mechanism), edgewise, flatwise, torsion, weak, strong])
+    section.massPerLength = mechanism.density * mechanism.area
+    moments = [mechanism.bending + mechanism.edgewise, mechanism.bending + bulge, mechanism.edgewise + bulge]
+    section.inertia = mechanism.density * np.diag(moments)
+    return section
+
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+def _inside(h: float, middles: np.ndarray) -> np.ndarray:
+    """Points for integrals over elements, shape (elements, 4)."""
+    return middles[:, None] + _POINTS * h / 2
+
+
+def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+    """Compliance in bending of elements, weighted by the square of the moment in parallel motion."""
+    s = _inside(h, middles)
+    return (
+        (plate.compliance_profile(s, mechanism.length, mechanism.width, mechanism.poisson) * s**2)
+        @ _WEIGHTS
+        / (s**2 @ _WEIGHTS)
+    )
+
+
+def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+    """Compliance in torsion of elements: as `plate.free_twist`, so that a constant torque meets the stiffness of the
+    plate, but tilted, so that the torque of a force across the deflected leaf, s^3, does so too.
+
+    That torque in an element is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
+    (found by comparison; 1/n^2 errors of the stiffness along y vanish).
+    """
+    s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length
+    even = (
+        plate.free_twist(s * mechanism.length / 2, mechanism.length, mechanism.width, mechanism.poisson) @ _WEIGHTS / 2
+    )
+    odd = (plate.cubic_twist(s, mechanism.length, mechanism.width, mechanism.poisson) * s**3) @ _WEIGHTS / 2
+    return plate.tilted(even, end**3 + end * (2 * h / mechanism.length) ** 2 / 2, end, odd.sum())

@@ -1,0 +1,256 @@
+"""The mechanism by closed forms, for one or for a million geometries at once.
+
+Sources: Soemers, Design Principles for Precision Mechanisms (2010), ch. 2; Awtar, Slocum & Sevincer (2007),
+doi:10.1115/1.2717231, for the deflected leaf; plate.py for what clamps do to a wide leaf.
+Stiffness in N/m, forces in N, lengths in m, frequencies in Hz; arrays of one shape throughout.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.leaf_springs import plate
+from friso.leaf_springs.mechanism import Mechanism
+
+SHEAR = 5 / 6
+"""Share of a rectangle's area that carries shear (Timoshenko's coefficient)."""
+
+CLAMPED = 4.730040744862704
+"""First root of cos x cosh x = 1: a beam between clamps."""
+
+WITH_STAGE, WITH_TURN = 0.41543, 0.08939
+"""Mean over a leaf of its first bending mode, of mean square 1, times the shape that it takes statically when the stage
+moves along the motion, and when it turns about the width (per length of the leaf)."""
+
+LATERAL = 9.229
+"""Force across the end of a leaf, over sqrt(E I G J)/L^2, at which the leaf gives way sideways: it twists and bends,
+theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both clamps, the stage free to follow."""
+
+
+def drive_stiffness(mechanism: Mechanism) -> Any:
+    """Stiffness along the motion, the stage kept parallel: n 12 E I/L^3, stiffened as a plate."""
+    beam = 12 * mechanism.young * mechanism.bending / mechanism.length**3
+    return mechanism.leaves * beam * plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
+
+
+def loaded_drive_stiffness(mechanism: Mechanism) -> Any:
+    """The stiffness along the motion under the load along the leaves: gone at the buckling load."""
+    return drive_stiffness(mechanism) * (1 - mechanism.load / buckling_load(mechanism))
+
+
+def axial(mechanism: Mechanism) -> Any:
+    """E A of a leaf [N], as stiff as its clamps make it."""
+    return mechanism.young * mechanism.area * plate.stretching(mechanism.length, mechanism.width, mechanism.poisson)
+
+
+def edgewise_shear(mechanism: Mechanism) -> Any:
+    """5/6 G A of a leaf in its plane [N], as stiff as its clamps make it."""
+    return (
+        SHEAR
+        * mechanism.shear
+        * mechanism.area
+        * plate.edgewise_shear(mechanism.length, mechanism.width, mechanism.poisson)
+    )
+
+
+def support_x(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
+    """Stiffness along the leaves with all else held: falls as the deflected leaves, which are plates, bend under it."""
+    straight = mechanism.leaves * axial(mechanism) / mechanism.length
+    stiffened = plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
+    return straight / (1 + 12 / 700 * (deflection / mechanism.thickness) ** 2 / stiffened)
+
+
+def support_y(mechanism: Mechanism, deflection: Any = 0.0) -> Any:
+    """Stiffness along the width with all else held: bending and shear in the plane of the leaves, and the twist
+    4 delta (s/L)^3 that a force across a deflected leaf adds, s from its middle, without the warping its clamps forbid.
+    """
+    flat = mechanism.length**3 / (12 * mechanism.young * mechanism.edgewise) + mechanism.length / edgewise_shear(
+        mechanism
+    )
+    rigidity = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness)
+    twisted = deflection**2 * mechanism.length / (28 * rigidity) * _cubic_twist(mechanism)
+    return mechanism.leaves / (flat + twisted)
+
+
+def _cubic_twist(mechanism: Mechanism) -> Any:
+    """Compliance of a leaf under a torque that goes with s^3, over that of one free to warp.
+
+    The rate of twist p solves p - p''/rate^2 = s^3, with p = 0 at the clamps: p = s^3 + 6 s/rate^2 - A sinh(rate s).
+    """
+    half = plate.warping_rate(mechanism.width, mechanism.poisson) * mechanism.length / 2
+    free = half**7 / 7
+    end = half**3 + 6 * half
+    decay = half**3 / np.tanh(half) - 3 * half**2 + 6 * half / np.tanh(half) - 6
+    return (free + 6 * half**5 / 5 - end * decay) / free
+
+
+def max_stress(mechanism: Mechanism, deflection: Any) -> Any:
+    """Largest bending stress [Pa] at the clamps, 3 E t delta/L^2 for a beam."""
+    beam = 3 * mechanism.young * mechanism.thickness * deflection / mechanism.length**2
+    return beam * plate.stress_factors(mechanism.length, mechanism.width, mechanism.poisson)[1]
+
+
+def shortening(mechanism: Mechanism, deflection: Any) -> Any:
+    """By how much the stage comes nearer to the cart: 3 delta^2/(5 L)."""
+    return 3 * deflection**2 / (5 * mechanism.length)
+
+
+def buckling_load(mechanism: Mechanism) -> Any:
+    """Load along the leaves, borne by all of them, at which the stage sways: n pi^2 E I/L^2, stiffened as a plate."""
+    return (
+        mechanism.leaves
+        * np.pi**2
+        * mechanism.young
+        * mechanism.bending
+        / mechanism.length**2
+        * _mode_stiffening(mechanism)
+    )
+
+
+def leaf_bending(mechanism: Mechanism) -> Any:
+    """Frequency of the first bending mode of a leaf between its clamps: 1.028 t/L^2 sqrt(E/rho), stiffened."""
+    beam = (
+        CLAMPED**2
+        / (2 * np.pi * mechanism.length**2)
+        * np.sqrt(mechanism.young * mechanism.bending / (mechanism.density * mechanism.area))
+    )
+    return beam * np.sqrt(_mode_stiffening(mechanism))
+
+
+def _mode_stiffening(mechanism: Mechanism) -> Any:
+    """Stiffening for moments that change their sign along the leaf as in a mode: as in parallel motion, on which the
+    even share of the moments, which are far from the clamps, has little influence."""
+    return plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson)
+
+
+def leaf_torsion(mechanism: Mechanism) -> Any:
+    """Frequency of the first torsional mode of a leaf between its clamps, by Rayleigh's quotient of the twist that an
+    even torque along it makes."""
+    rate = plate.warping_rate(mechanism.width, mechanism.poisson)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    half = np.asarray(rate * mechanism.length / 2)[..., None]
+    s = nodes * half
+    twist = (half**2 - s**2) / 2 - half * (np.cosh(half) - np.cosh(s)) / np.sinh(half)
+    quotient = (twist @ weights) / (twist**2 @ weights)
+    rigidity = mechanism.young * mechanism.thickness**2 / (12 * (1 - mechanism.poisson**2))
+    return rate**2 * np.sqrt(quotient * rigidity / mechanism.density) / (2 * np.pi)
+
+
+def lateral_load(mechanism: Mechanism) -> Any:
+    """Force across the leaves, along their width at the leaf ends and borne by all of them, at which they give way."""
+    twist = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness)
+    return mechanism.leaves * LATERAL * np.sqrt(mechanism.young * mechanism.bending * twist) / mechanism.length**2
+
+
+def stage_stiffness(mechanism: Mechanism) -> np.ndarray:
+    """Stiffness of the stage at its reference point, undeflected, shape (..., 6, 6)."""
+    odd, even = (
+        plate.stiffening(mechanism.length, mechanism.width, mechanism.poisson, parity) for parity in (True, False)
+    )
+    bending = mechanism.young * mechanism.bending / mechanism.length
+    edgewise = mechanism.young * mechanism.edgewise / mechanism.length
+    sheared = 12 * edgewise / (edgewise_shear(mechanism) * mechanism.length)
+    parallel, half = 12 * edgewise / mechanism.length**2 / (1 + sheared), mechanism.length / 2
+    along = axial(mechanism) / mechanism.length
+    twist = plate.torsion_stiffness(
+        mechanism.length, mechanism.width, mechanism.thickness, mechanism.shear, mechanism.poisson
+    )
+    spread = mechanism.offset_squares
+    return _symmetric(
+        mechanism,
+        {
+            (0, 0): mechanism.leaves * along,
+            (1, 1): mechanism.leaves * parallel,
+            (2, 2): mechanism.leaves * 12 * bending * odd / mechanism.length**2,
+            (3, 3): mechanism.leaves * twist + parallel * spread,
+            (4, 4): mechanism.leaves * bending * (3 * odd + even) + along * spread,
+            (5, 5): mechanism.leaves * (parallel * half**2 + edgewise),
+            (2, 4): mechanism.leaves * 6 * bending * odd / mechanism.length,
+            (1, 5): -mechanism.leaves * parallel * half,
+        },
+    )
+
+
+def stage_mass(mechanism: Mechanism) -> np.ndarray:
+    """Mass of stage and leaves, the latter following as they do statically, at the reference point, (..., 6, 6)."""
+    leaf, length, spread = mechanism.leaf_mass, mechanism.length, mechanism.offset_squares
+    leaves = _symmetric(
+        mechanism,
+        {
+            (0, 0): mechanism.leaves * leaf / 3,
+            (1, 1): mechanism.leaves * leaf * 13 / 35,
+            (2, 2): mechanism.leaves * leaf * 13 / 35,
+            (3, 3): mechanism.leaves * leaf * mechanism.width**2 / 36 + leaf * spread * 13 / 35,
+            (4, 4): mechanism.leaves * leaf * length**2 / 105 + leaf * spread / 3,
+            (5, 5): mechanism.leaves * leaf * length**2 / 105,
+            (2, 4): mechanism.leaves * leaf * length * 11 / 210,
+            (1, 5): -mechanism.leaves * leaf * length * 11 / 210,
+        },
+    )
+    return leaves + body_mass(mechanism)
+
+
+def body_mass(mechanism: Mechanism) -> np.ndarray:
+    """Mass of the rigid stage alone at its reference point, shape (..., 6, 6)."""
+    mass = mechanism.body.mass
+    x, y, z = mechanism.body.centre[0] - mechanism.length, mechanism.body.centre[1], mechanism.body.centre[2]
+    inertia = mechanism.body.inertia
+    return _symmetric(
+        mechanism,
+        {
+            (0, 0): mass,
+            (1, 1): mass,
+            (2, 2): mass,
+            (3, 3): inertia[0] + mass * (y**2 + z**2),
+            (4, 4): inertia[1] + mass * (x**2 + z**2),
+            (5, 5): inertia[2] + mass * (x**2 + y**2),
+            (3, 4): -mass * x * y,
+            (3, 5): -mass * x * z,
+            (4, 5): -mass * y * z,
+            (0, 4): mass * z,
+            (0, 5): -mass * y,
+            (1, 3): -mass * z,
+            (1, 5): mass * x,
+            (2, 3): mass * y,
+            (2, 4): -mass * x,
+        },
+    )
+
+
+def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray:
+    """The matrices, shape (..., 6, 6), with these entries on and above the diagonal."""
+    shape = np.broadcast_shapes(*(np.shape(entry) for entry in entries.values()), np.shape(mechanism.length))
+    matrices = np.zeros((*shape, 6, 6))
+    for (i, k), entry in entries.items():
+        matrices[..., i, k] = matrices[..., k, i] = entry
+    return matrices
+
+
+def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies, shape (..., 7), ascending, and shapes, (..., 7, 7), one per column at unit modal mass, of the stage
+    (six coordinates) and the leaves that all bend in phase in their first mode (the seventh, at its unit modal mass),
+    the leaves following the stage statically besides (Craig & Bampton 1968, doi:10.2514/3.4741); NaN where the numbers
+    make no mechanism."""
+    mass, stiffness = stage_mass(mechanism), stage_stiffness(mechanism)
+    mass, stiffness = (np.pad(matrix, [(0, 0)] * (matrix.ndim - 2) + [(0, 1), (0, 1)]) for matrix in (mass, stiffness))
+    together = np.sqrt(mechanism.leaves * mechanism.leaf_mass)
+    for coordinate, coupling in ((2, WITH_STAGE * together), (4, WITH_TURN * together * mechanism.length)):
+        mass[..., coordinate, 6] = mass[..., 6, coordinate] = coupling
+    mass[..., 6, 6] = 1.0
+    stiffness[..., 6, 6] = (2 * np.pi * leaf_bending(mechanism)) ** 2
+    possible = np.isfinite(mass + stiffness).all(axis=(-2, -1)) & (np.einsum("...ii->...i", mass) > 0).all(axis=-1)
+    factor = np.linalg.cholesky(np.where(possible[..., None, None], mass, np.eye(7)))
+    inverse = np.linalg.inv(factor)
+    turned = np.swapaxes(inverse, -1, -2)
+    squares, vectors = np.linalg.eigh(inverse @ np.where(possible[..., None, None], stiffness, 0.0) @ turned)
+    frequencies = np.sqrt(np.maximum(squares, 0)) / (2 * np.pi)
+    return np.where(possible[..., None], frequencies, np.nan), turned @ vectors
+
+
+def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Which of the modes, frequencies [Hz] (..., modes) and shapes (..., 7, modes), is the drive mode: that which
+    yields most to a steady force along the motion."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)

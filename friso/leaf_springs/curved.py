@@ -1,0 +1,78 @@
+"""A deflected leaf as a curved beam: its 6 x 6 stiffness from the energy of unit loads at its end (Castigliano)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.leaf_springs import plate
+from friso.leaf_springs.closed_forms import SHEAR, axial, edgewise_shear
+from friso.leaf_springs.mechanism import Mechanism
+
+POINTS = 48
+"""Gauss points along a leaf."""
+
+
+def stage_stiffness_at(mechanism: Mechanism, deflection: float) -> np.ndarray:
+    """Stiffness of the stage of one mechanism at its reference point, deflected [m] and kept parallel, (6, 6).
+
+    Elasticity is linear about the deflected shape; the forces that hold it there are too small to matter as long as
+    they are small against the buckling load.
+    """
+    leaf = leaf_stiffness(mechanism, deflection)
+    stiffness = np.zeros((6, 6))
+    for offset in mechanism.offsets:
+        shift = np.eye(6)
+        shift[0, 4], shift[1, 3] = offset, -offset
+        stiffness += shift.T @ leaf @ shift
+    return stiffness
+
+
+def leaf_stiffness(mechanism: Mechanism, deflection: float) -> np.ndarray:
+    """Stiffness of one leaf at its end, deflected [m] to 3 s^2 - 2 s^3, (6, 6)."""
+    nodes, weights = np.polynomial.legendre.leggauss(POINTS)
+    x, weight = (nodes + 1) / 2 * mechanism.length, weights / 2 * mechanism.length
+    share = x / mechanism.length
+    height, slope = deflection * (3 * share**2 - 2 * share**3), 6 * deflection / mechanism.length * (share - share**2)
+    loads, (per, arc) = _resultants(mechanism, deflection, x, height, slope), _per(mechanism, x, weight, slope)
+    compliance = np.einsum("pij,pik,pi,p->jk", loads, loads, per, arc)
+    return np.linalg.inv(compliance)
+
+
+def _per(mechanism: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compliance of the section for each resultant, (points, 6), and the length of arc per point, (points,)."""
+    s = x - mechanism.length / 2
+    sheared = 1 / (SHEAR * mechanism.shear * mechanism.area)
+    shape, ends = (mechanism.length, mechanism.width, mechanism.poisson), 2 * s / mechanism.length
+    compliance = (plate.cubic_twist(ends, *shape) * ends**3) @ weight
+    free = plate.tilted(plate.free_twist(s, *shape) * weight, ends**3, ends, compliance) / weight
+    twist = free / (mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
+    curl = plate.compliance_profile(s, mechanism.length, mechanism.width, mechanism.poisson) / (
+        mechanism.young * mechanism.bending
+    )
+    columns = (
+        1 / axial(mechanism),
+        1 / edgewise_shear(mechanism),
+        sheared,
+        twist,
+        curl,
+        1 / (mechanism.young * mechanism.edgewise),
+    )
+    return np.stack(np.broadcast_arrays(*columns), axis=1), weight * np.sqrt(1 + slope**2)
+
+
+def _resultants(
+    mechanism: Mechanism, deflection: float, x: np.ndarray, height: np.ndarray, slope: np.ndarray
+) -> np.ndarray:
+    """Forces and moments along and about tangent, width and normal at the points, per unit load at the end:
+    shape (points, 6, 6)."""
+    cosine, sine = 1 / np.sqrt(1 + slope**2), slope / np.sqrt(1 + slope**2)
+    turn = np.zeros((len(x), 3, 3))
+    turn[:, 0, 0], turn[:, 0, 2], turn[:, 1, 1], turn[:, 2, 0], turn[:, 2, 2] = cosine, sine, 1.0, -sine, cosine
+    arm_x, arm_z = mechanism.length - x, deflection - height
+    moment = np.zeros((len(x), 3, 3))  # arm x force
+    moment[:, 0, 1], moment[:, 1, 0], moment[:, 1, 2], moment[:, 2, 1] = -arm_z, arm_z, -arm_x, arm_x
+    full = np.zeros((len(x), 6, 6))
+    full[:, :3, :3] = turn
+    full[:, 3:, :3] = turn @ moment
+    full[:, 3:, 3:] = turn
+    return full

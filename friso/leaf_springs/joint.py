@@ -1,0 +1,90 @@
+"""What the leaf springs of a stage are to its equations of motion: stiffness of the joint and parasitic mode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.evaluation import VISIBLE
+from friso.leaf_springs.mechanism import Mechanism, along_motion
+from friso.stage.flexure import register_derivation
+
+LEAST = 1e-9
+"""Residue, times the stage's mass, below which it makes no difference: the equations need a parasitic mass."""
+
+
+@register_derivation("flexure")
+def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """`joint.stiffness` and the keys of [parasitic] of a stage whose leaves are given, by closed forms. Raises
+    InputError where a single mechanism buckles under its load."""
+    with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
+        mechanism = Mechanism.of(flat)
+        frequency, share = parasitic_mode(mechanism)
+        stiffness, buckling = closed_forms.loaded_drive_stiffness(mechanism), closed_forms.buckling_load(mechanism)
+    if np.ndim(stiffness) == 0 and mechanism.load >= buckling > 0:
+        expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
+        raise InputError(
+            "flexure.load", f"{float(mechanism.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"'
+        )
+    keys = {
+        "joint.stiffness": stiffness,
+        "parasitic.frequency": frequency,
+        "parasitic.mass": share / (1 + share) * mechanism.body.mass,
+        "parasitic.damping_ratio": mechanism.damping_ratio,
+    }
+    return {key: value if np.ndim(value) else float(value) for key, value in keys.items()}
+
+
+@dataclass(frozen=True)
+class VisibleModes:
+    """The modes of mechanisms other than the drive mode, arrays of shape (..., 7): frequency [Hz], and residue times
+    the mass of the stage, positive where actuator and sensor move in phase; those at the drive mode are 0."""
+
+    frequency: np.ndarray
+    residue: np.ndarray
+    visible: np.ndarray
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> VisibleModes:
+        """The modes of mechanisms by closed forms."""
+        frequency, shapes = closed_forms.modes(mechanism)
+        motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
+            mechanism, mechanism.sensor, shapes
+        )
+        internal = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]
+        residue = np.where(internal, motion * np.asarray(mechanism.body.mass)[..., None], 0.0)
+        return cls(frequency, residue, np.abs(residue) > VISIBLE * 2 * np.asarray(mechanism.damping_ratio)[..., None])
+
+    def at(self, mode: np.ndarray) -> tuple[Any, Any]:
+        """Frequency [Hz] and residue, each (...), of one mode each; infinite and 0 where none is visible."""
+        picked = [
+            np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
+            for quantity in (self.frequency, self.residue)
+        ]
+        visible = self.visible.any(axis=-1)
+        return np.where(visible, picked[0], np.inf)[()], np.where(visible, picked[1], 0.0)[()]
+
+
+def first_interfering(mechanism: Mechanism) -> Any:
+    """Frequency [Hz] of the lowest mode other than the drive mode that actuator and sensor see; infinite if none."""
+    visible = VisibleModes.of(mechanism)
+    return visible.at(np.argmin(np.where(visible.visible, visible.frequency, np.inf), axis=-1))[0]
+
+
+def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
+    """Frequency [Hz] and residue, times the stage's mass, of the mode whose resonance stands highest in the plant: the
+    largest residue over the square of the frequency. Where none is seen, that of the leaves, without weight.
+
+    The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
+    knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
+    """
+    visible = VisibleModes.of(mechanism)
+    height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2
+    frequency, residue = visible.at(np.argmax(height, axis=-1))
+    leaves = closed_forms.leaf_bending(mechanism)
+    return np.where(np.isfinite(frequency), frequency, leaves)[()], np.maximum(np.abs(residue), LEAST)[()]

@@ -1,0 +1,82 @@
+"""What the drive finds around it: friction and motor constant over position, floor and injection over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Tables
+from friso.stage.rig import Floor
+from friso.virtual_rig.floor import floor_acceleration
+from friso.virtual_rig.rail import friction_factors
+from friso.virtual_rig.task import MoveTask
+
+PER_LENGTH, PER_WAVE = 12, 40
+"""Points of the tables per correlation length, and per shortest wave of rolling elements or ripple."""
+
+MARGIN = 0.01
+"""How far beyond the reference [m] the tables reach at least; a share `BEYOND` of its way where that is more."""
+
+BEYOND = 0.5
+
+PER_PERIOD = 10
+"""Points of the floor's acceleration per period of its highest frequency."""
+
+
+def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
+    """The tables of the runs whose noise has these seeds, from flat keys to SI numbers or arrays of shape (runs,).
+
+    The rails are the machines': their seeds are "rail.seed". All runs share one table where they do not differ.
+    """
+    places, grid = _places(flat, task)
+    varied = [key for key, value in flat.items() if key.startswith(("rail.", "drive.ripple")) and np.ndim(value)]
+    over = [_over_places(_of_run(flat, run), places) for run in (range(len(seeds)) if varied else range(1))]
+    times, per_second = _over_time(floor, task, seeds)
+    return Tables(np.array(over), grid, times, np.array([per_second]))
+
+
+def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
+    return {key: value[run] if np.ndim(value) else value for key, value in flat.items()}
+
+
+def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
+    """The places [m] of the tables, evenly spaced, and their grid, shape (1, 2): first place, points per metre."""
+    low, high = task.span
+    margin = max(MARGIN, BEYOND * (high - low))
+    lengths = [np.inf]
+    for key, points in (("rail.correlation_length", PER_LENGTH), ("drive.ripple_pitch", PER_WAVE)):
+        lengths += [float(np.min(flat[key])) / points] if key in flat else []
+    if "rail.rolling_pitch" in flat:
+        lengths.append(float(np.min(flat["rail.rolling_pitch"])) / (3 * PER_WAVE))
+    step = min(lengths)
+    count = 2 if step == np.inf else int(np.ceil((high - low + 2 * margin) / step)) + 2
+    step = (high - low + 2 * margin) / (count - 1)
+    return low - margin + step * np.arange(count), np.array([[low - margin, 1 / step]])
+
+
+def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
+    """Factors of static and Coulomb friction and of the motor constant, shape (3, places)."""
+    ripple = 1 + flat.get("drive.ripple", 0.0) * np.cos(2 * np.pi * places / flat.get("drive.ripple_pitch", np.inf))
+    return np.array([*friction_factors(flat, places), ripple])
+
+
+def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
+    """Injected force and floor's acceleration, shape (runs or 1, 2, points), and their points per second."""
+    injected = len(task.injected) > 0
+    if floor is None and not injected:
+        return np.zeros((1, 2, 2)), 0.0
+    fine = [task.injected_each] if injected else []
+    fine += [1 / (PER_PERIOD * floor.frequency[-1])] if floor else []
+    interval = min(fine)
+    count = int(np.ceil(task.duration / interval)) + 2
+    inputs = np.zeros((len(seeds) if floor else 1, 2, count))
+    if injected:
+        times = np.arange(len(task.injected)) * task.injected_each
+        inputs[:, 0] = np.interp(np.arange(count) * interval, times, task.injected, right=0.0)
+    if floor:
+        for run, seed in enumerate(seeds):
+            shaken = floor_acceleration(floor, count * interval, interval, seed)
+            inputs[run, 1] = shaken[:count]
+    return inputs, 1 / interval
