@@ -125,17 +125,17 @@ def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.nda
     pieces = motion.pieces(flat, runs)
     end = np.broadcast_to(np.asarray(flat["motion.duration"], dtype=float), (runs,))
     start = window * end
-    every = np.arange(runs)
+    rows = np.arange(runs)
     windows = (pieces[:, :, 0] <= start[:, None]).sum(axis=1)
-    r0 = pieces[every, windows - 1]
-    since = start - r0[:, 0]
-    position = r0[:, 1] + since * (r0[:, 2] + since * r0[:, 3] / 2)
-    at_window = np.stack([start, position, r0[:, 2] + since * r0[:, 3], r0[:, 3]], axis=1)
+    r0 = pieces[rows, windows - 1]
+    elapsed = start - r0[:, 0]
+    position = r0[:, 1] + elapsed * (r0[:, 2] + elapsed * r0[:, 3] / 2)
+    at_window = np.stack([start, position, r0[:, 2] + elapsed * r0[:, 3], r0[:, 3]], axis=1)
     segments = np.zeros((runs, pieces.shape[1] + 2, 4))
     places = np.arange(pieces.shape[1])
     shifted = places[None, :] + (places[None, :] >= windows[:, None])
-    segments[every[:, None], shifted] = pieces
-    segments[every, windows] = at_window
+    segments[rows[:, None], shifted] = pieces
+    segments[rows, windows] = at_window
     segments[:, -1, 0] = end
     return segments, windows.astype(np.int64)
 
@@ -170,9 +170,9 @@ def _run_with_room(
     if not crowded.all():
         yield Runs(numbers[~crowded], Results(*(array[~crowded] for array in results)))
     del results, batch
-    again, fewer = numbers[crowded], max(1, options.chunk * CAPACITY // (4 * room))
-    for first in range(0, len(again), fewer):
-        yield from _run_with_room(kernel, flat, again[first : first + fewer], 4 * room, options, starts)
+    repeated, fewer = numbers[crowded], max(1, options.chunk * CAPACITY // (4 * room))
+    for first in range(0, len(repeated), fewer):
+        yield from _run_with_room(kernel, flat, repeated[first : first + fewer], 4 * room, options, starts)
 
 
 def settings_of(options: RunOptions) -> Settings:

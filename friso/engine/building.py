@@ -31,8 +31,8 @@ def entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
         _Work(missing).finish()
         prune(cache_folder())
         compiled |= {request: request.entry() for request in missing}
-    if lost := [request.title for request, entry in compiled.items() if entry is None]:
-        raise RuntimeError(f"what was compiled is not in {cache_folder()}: {', '.join(lost)}")
+    if dropped := [request.title for request, entry in compiled.items() if entry is None]:
+        raise RuntimeError(f"what was compiled is not in {cache_folder()}: {', '.join(dropped)}")
     return [entry for request in requests if (entry := compiled[request]) is not None]
 
 

@@ -68,8 +68,10 @@ def follow(
     for first in range(0, runs, CHUNK):
         numbers = np.arange(first, min(first + CHUNK, runs))
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
-        every = np.full(len(numbers), inputs.sample_time)
-        batch = batch._replace(segments=segments, first_steps=every, longest=every, windows=np.full(len(numbers), -1))
+        periods = np.full(len(numbers), inputs.sample_time)
+        batch = batch._replace(
+            segments=segments, first_steps=periods, longest=periods, windows=np.full(len(numbers), -1)
+        )
         results = empty_results(len(numbers), 1, count + 1, len(kernel.full_state))
         run_batch(kernel, batch, settings, results, options.threads)
         states, held = np.split(results.samples, [len(kernel.states)], axis=2)

@@ -297,8 +297,8 @@ def start_clock(B, layout, lane, j, batch):
         B[(layout.cell + w) * layout.lanes + lane] = -2.0
     look_up(B, layout, lane, j, tables)
     for i in range(layout.walked.size):
-        off = walk(B, layout, lane, layout.walked[i]) - B[(layout.cell + layout.walked[i]) * layout.lanes + lane]
-        value = B[(layout.base + i) * layout.lanes + lane] + off * B[(layout.slope + i) * layout.lanes + lane]
+        gap = walk(B, layout, lane, layout.walked[i]) - B[(layout.cell + layout.walked[i]) * layout.lanes + lane]
+        value = B[(layout.base + i) * layout.lanes + lane] + gap * B[(layout.slope + i) * layout.lanes + lane]
         B[(layout.reference + layout.tabled + i) * layout.lanes + lane] = value
 
 
@@ -400,8 +400,8 @@ def run(B, layout, queue, batch, settings, results):
         lane = -1
         while wanting:
             lane += 1
-            wants, wanting = wanting & 1, wanting >> 1
-            if not wants or B[ROW.run * layout.lanes + lane] < 0.0:
+            wanted, wanting = wanting & 1, wanting >> 1
+            if not wanted or B[ROW.run * layout.lanes + lane] < 0.0:
                 continue
             answer(B, layout, lane, batch, settings, results)
             status = outcome(B, layout, lane, batch, settings)

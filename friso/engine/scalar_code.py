@@ -305,27 +305,27 @@ class _Frame(ast.NodeVisitor):
         end = self._number(stop, INT).value
         counter = self._variables.alloca(_INT64)
         self._builder.store(self._number(start, INT).value, counter)
-        test, body, on, after = self._blocks(4)
+        test, body, increment, after = self._blocks(4)
         self._go(test)
         self._builder.position_at_end(test)
-        now = self._builder.load(counter)
-        self._builder.cbranch(self._builder.icmp_signed("<" if step > 0 else ">", now, end), body, after)
-        self._builder.position_at_end(on)
+        index = self._builder.load(counter)
+        self._builder.cbranch(self._builder.icmp_signed("<" if step > 0 else ">", index, end), body, after)
+        self._builder.position_at_end(increment)
         following = self._builder.add(self._builder.load(counter), ir.Constant(_INT64, step), flags=["nsw"])
         self._builder.store(following, counter)
         self._builder.branch(test)
         self._builder.position_at_end(body)
-        self._assign(node.target, _Value(now, INT))
-        self._loop(node, body, on, after)
+        self._assign(node.target, _Value(index, INT))
+        self._loop(node, body, increment, after)
 
-    def _loop(self, node: ast.For | ast.While, body: ir.Block, again: ir.Block, after: ir.Block) -> None:
+    def _loop(self, node: ast.For | ast.While, body: ir.Block, repeat: ir.Block, after: ir.Block) -> None:
         if node.orelse:
             self.generic_visit(node)
         self._builder.position_at_end(body)
-        self._loops.append((again, after))
+        self._loops.append((repeat, after))
         self._statements(node.body)
         self._loops.pop()
-        self._go(again)
+        self._go(repeat)
         self._builder.position_at_end(after)
 
     def visit_Break(self, node: ast.Break) -> None:
@@ -442,11 +442,11 @@ class _Frame(ast.NodeVisitor):
         after, ends = self._code.append_basic_block(), []
         decisive = ir.Constant(_BIT, int(isinstance(node.op, ast.Or)))
         for operand in node.values[:-1]:
-            truth, on = self._truth(self.visit(operand)), self._code.append_basic_block()
+            truth, further = self._truth(self.visit(operand)), self._code.append_basic_block()
             ends.append((decisive, self._builder.block))
-            ways = (after, on) if isinstance(node.op, ast.Or) else (on, after)
-            self._builder.cbranch(truth, *ways)
-            self._builder.position_at_end(on)
+            targets = (after, further) if isinstance(node.op, ast.Or) else (further, after)
+            self._builder.cbranch(truth, *targets)
+            self._builder.position_at_end(further)
         ends.append((self._truth(self.visit(node.values[-1])), self._builder.block))
         return _Value(self._meet(after, ends, _BIT), TRUTH)
 

@@ -58,9 +58,9 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
     parameters = [v[0] for v in shape.values({**flat, "motion.size": motion.size(flat)}, 1)]
     rows = motion.pieces(flat, 1)[0]
     active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
-    since, reference = time - active[:, 0], active[:, 1:].T
-    modes = shape.modes(states, since, reference, parameters)
-    outputs = shape.module.outputs(states, modes, since, reference, parameters)
+    elapsed, reference = time - active[:, 0], active[:, 1:].T
+    modes = shape.modes(states, elapsed, reference, parameters)
+    outputs = shape.module.outputs(states, modes, elapsed, reference, parameters)
     return [np.broadcast_to(np.asarray(output, dtype=float), time.shape) for output in outputs]
 
 

@@ -275,6 +275,6 @@ def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.E
     `STEADY`, the others 0; `force` is its own in that motion, in terms of the integrals."""
     if not integrals:
         return {}
-    *others, innermost = integrals
+    *outer, innermost = integrals
     rest = force.xreplace(dict.fromkeys(integrals, sp.S.Zero))
-    return {innermost: (STEADY.force - rest) / sp.diff(force, innermost), **dict.fromkeys(others, sp.S.Zero)}
+    return {innermost: (STEADY.force - rest) / sp.diff(force, innermost), **dict.fromkeys(outer, sp.S.Zero)}

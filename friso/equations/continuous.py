@@ -192,9 +192,9 @@ class Continuous(Blocks):
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
         self.kinks += [ahead, behind]
-        way = sp.Piecewise((1, error.settled > window), (-1, error.settled < -window), (0, True))
+        side = sp.Piecewise((1, error.settled > window), (-1, error.settled < -window), (0, True))
         resting = push * (1 - direction.value**2)
-        return Signal(resting * (ahead.beyond - behind.beyond), push, push * way, sp.S.Zero)
+        return Signal(resting * (ahead.beyond - behind.beyond), push, push * side, sp.S.Zero)
 
     def dither(self) -> Signal:
         """Over the time since the last corner of the reference."""
@@ -228,8 +228,8 @@ class Continuous(Blocks):
         going, pauses = self._pausing(error) if self._integrals else (sp.S.One, ())
         for integral in self._integrals:
             share = sp.S.One
-            beside = "" if str(integral.symbol) == "integral" else f"_{integral.symbol}"
-            up = Kink(f"winding_up{beside}", integral.integrand)
+            suffix = "" if str(integral.symbol) == "integral" else f"_{integral.symbol}"
+            up = Kink(f"winding_up{suffix}", integral.integrand)
             if clamp:
                 share *= 1 - _resting(clamp.kinks, tuple(far[:2]), up, clamp.limit)
             for output, limit, name in self._limits(integral, demand):

@@ -12,6 +12,9 @@ if TYPE_CHECKING:
 
     from friso.equations.model import Control, Model
 
+HELD_FORCE = "held_force"
+"""The number in which a drive with a clock keeps its force [N] until the next sample."""
+
 
 @dataclass(frozen=True)
 class Driven:
@@ -45,12 +48,12 @@ def _sampled(form: Driven) -> Control:
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         assert form.structure.controller is not None
-        now = state("held_force")
+        held_force = state(HELD_FORCE)
         at_corner = replace(
             loop, error=loop.error.subs(TIME, 0), reference_velocity=loop.reference_velocity.subs(TIME, 0)
         )
         force, held = sampled_controller(form.structure.controller, at_corner, form.velocity_samples)
-        component = Component(outputs={"force": Output(now, "N", "actuator force")})
-        return Controller(now, component, (*held, Held(now, force)))
+        component = Component(outputs={"force": Output(held_force, "N", "actuator force")})
+        return Controller(held_force, component, (*held, Held(held_force, force)))
 
     return control

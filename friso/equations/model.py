@@ -134,8 +134,10 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     breakaway = _breakaway(structure, friction, motor_friction)
     length, rate = _scales(structure, breakaway, chain.mass)
     stage, rated = chain.measured(structure)
-    ways = direction(velocity, acceleration)  # as they are at the last corner: where it turns there is another
-    loop = Loop(reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, ways)
+    directions = direction(velocity, acceleration)  # as they are at the last corner: where it turns there is another
+    loop = Loop(
+        reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, directions
+    )
     form = structure.controller
     if control is None and form is not None:
         control = partial(continuous_controller, form)
@@ -224,8 +226,8 @@ def _positions(structure: Structure, chain: Bodies) -> list[Component]:
         return [position_outputs("", "stage", chain.stage)]
     sides = {"load": chain.stage, "motor": chain.motor}
     measured = sides.pop(structure.transmission.position)
-    own = position_outputs("", structure.transmission.position, measured)
-    return [own, *(position_outputs(f"{side}_", side, body) for side, body in sides.items())]
+    stage_outputs = position_outputs("", structure.transmission.position, measured)
+    return [stage_outputs, *(position_outputs(f"{side}_", side, body) for side, body in sides.items())]
 
 
 def _motor_friction(structure: Structure, chain: Bodies) -> Friction | None:
@@ -261,11 +263,11 @@ def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp
     stiffness = loop_stiffness(structure.controller)
     if breakaway == 0:
         bias = sum((sp.Abs(key(f"bias.{name}")) for name in structure.biased), start=sp.S.Zero)
-        length, still = MOTION_SIZE, bias / stiffness if bias else sp.S.Zero
+        length, deflection = MOTION_SIZE, bias / stiffness if bias else sp.S.Zero
     else:
-        still = breakaway / stiffness
-        length = sp.Max(sp.Min(MOTION_SIZE, still), SMALLEST_LENGTH * MOTION_SIZE)
-    length = sp.Piecewise((length, MOTION_SIZE > 0), (still, True))
+        deflection = breakaway / stiffness
+        length = sp.Max(sp.Min(MOTION_SIZE, deflection), SMALLEST_LENGTH * MOTION_SIZE)
+    length = sp.Piecewise((length, MOTION_SIZE > 0), (deflection, True))
     return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
 
 

@@ -12,15 +12,15 @@ Piece = tuple[Any, Any, Any, Any]
 
 
 def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
-    a, ramp, back = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
+    a, ramp, return_at = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
     size, top = a * ramp**2, a * ramp
     return [
         (0.0, 0.0, 0.0, a),
         (ramp, size / 2, top, -a),
         (2 * ramp, size, 0.0, 0.0),
-        (back, size, 0.0, -a),
-        (back + ramp, size / 2, -top, a),
-        (back + 2 * ramp, 0.0, 0.0, 0.0),
+        (return_at, size, 0.0, -a),
+        (return_at + ramp, size / 2, -top, a),
+        (return_at + 2 * ramp, 0.0, 0.0, 0.0),
     ]
 
 
@@ -55,8 +55,8 @@ def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
     """Reference position [m] at the times [s], of one run."""
     rows = pieces(flat, 1)[0]
     row = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
-    since = time - row[:, 0]
-    return row[:, 1] + row[:, 2] * since + row[:, 3] * since**2 / 2
+    elapsed = time - row[:, 0]
+    return row[:, 1] + row[:, 2] * elapsed + row[:, 3] * elapsed**2 / 2
 
 
 def size(flat: Mapping[str, Any]) -> Any:

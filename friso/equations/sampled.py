@@ -95,8 +95,8 @@ class Sampled(Blocks):
             replace(number, update=sp.Piecewise((number.update, due), (number.symbol, True)))
             for number in self.held[first:]
         ]
-        again = passed + 1 > self.period / SAMPLE_TIME - sp.Rational(1, 2)
-        self.held.append(Held(passed, sp.Piecewise((0, again), (passed + 1, True))))
+        next_passed = passed + 1 > self.period / SAMPLE_TIME - sp.Rational(1, 2)
+        self.held.append(Held(passed, sp.Piecewise((0, next_passed), (passed + 1, True))))
         self.period, self.due = before
 
     def handed_on(self, signal: Signal, name: str) -> Signal:

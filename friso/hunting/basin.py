@@ -90,22 +90,22 @@ def ends_in(
     target: Target,
     starts: np.ndarray | None = None,
     rtol: float = RTOL,
-    **how: Any,
+    **options: Any,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in one of the motions that attract
     the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; and
-    which were completed; both of shape (count,). The target is the same for all, or there is one for each. `how`:
+    which were completed; both of shape (count,). The target is the same for all, or there is one for each. `options`:
     `RunOptions`."""
     corner, size = np.max(last_corner(flat)), np.broadcast_to(2 * target.amplitude, (count,))
     early, after = (np.broadcast_to(corner + time, (count,)) for time in (target.early, target.lasting))
-    swing, completed = _last_swing(flat, early, target, starts, rtol, **how)
+    swing, completed = _last_swing(flat, early, target, starts, rtol, **options)
     ends = completed & np.where(early < after, np.abs(swing / size - 1) <= CAUGHT, lasts(swing, 0.0, size / 4))
-    if (on := np.flatnonzero(completed & ~ends & (early < after))).size:
-        part = {key: value[on] if np.ndim(value) else value for key, value in flat.items()}
-        still = target.of(on) if np.ndim(target.amplitude) else target
-        begin = None if starts is None else starts[on]
-        swing, completed[on] = _last_swing(part, after[on], still, begin, rtol, **how)
-        ends[on] = lasts(swing, 0.0, size[on] / 4) & completed[on]
+    if (unfinished := np.flatnonzero(completed & ~ends & (early < after))).size:
+        part = {key: value[unfinished] if np.ndim(value) else value for key, value in flat.items()}
+        aims = target.of(unfinished) if np.ndim(target.amplitude) else target
+        begin = None if starts is None else starts[unfinished]
+        swing, completed[unfinished] = _last_swing(part, after[unfinished], aims, begin, rtol, **options)
+        ends[unfinished] = lasts(swing, 0.0, size[unfinished] / 4) & completed[unfinished]
     return ends, completed
 
 
@@ -115,12 +115,12 @@ def _last_swing(
     target: Target,
     starts: np.ndarray | None,
     rtol: float,
-    **how: Any,
+    **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Peak to peak at the ends of runs [s], (count,), and which runs were completed."""
     long, count = {**flat, "motion.duration": end}, len(end)
     window = float(np.min(1 - LAST * target.period / end))
-    options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **how)
+    options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **run_options)
     swing, completed = np.zeros(count), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
         completed[runs.numbers] = runs.results.statuses == Status.DONE

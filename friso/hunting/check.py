@@ -118,7 +118,7 @@ def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
     measures = measure(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
-    judgement = judge(stage, measures, max(rtol, LONG), lambda what: work.add(int(what != WORK[0]), what))
+    judgement = judge(stage, measures, max(rtol, LONG), lambda label: work.add(int(label != WORK[0]), label))
     work.add(begun + len(WORK) - work.done, WORK[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,

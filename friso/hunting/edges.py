@@ -97,11 +97,11 @@ class _AtCrossovers:
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
     """Where an orbit may be but could not be closed, a long simulation tells whether anything hunts on."""
-    some = stages(which, crossover)
-    cycles = hunting_cycles(some)
-    attracts, failed, unsure = cycles.attracting, np.zeros(some.count, bool), np.flatnonzero(cycles.uncertain)
+    part = stages(which, crossover)
+    cycles = hunting_cycles(part)
+    attracts, failed, unsure = cycles.attracting, np.zeros(part.count, bool), np.flatnonzero(cycles.uncertain)
     if unsure.size:
-        attracts[unsure], decided = swings_from_any_distance(some.take(unsure))
+        attracts[unsure], decided = swings_from_any_distance(part.take(unsure))
         failed[unsure] = ~decided
     return _AtCrossovers(attracts, cycles.multiplier, cycles.uncertain, failed)
 
@@ -117,11 +117,11 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
     count, points = grid.shape
     at_crossovers = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
     last = points - 1 - at_crossovers.attracts[:, ::-1].argmax(axis=1)
-    some = at_crossovers.attracts.any(axis=1)
-    which = np.flatnonzero(some & (last < points - 1))
+    attracted = at_crossovers.attracts.any(axis=1)
+    which = np.flatnonzero(attracted & (last < points - 1))
     nothing = [np.full(count, np.nan) for _ in range(3)]
     windows = (np.diff(at_crossovers.attracts, axis=1, prepend=False) & at_crossovers.attracts).sum(axis=1)
-    kind = np.where(some, ABOVE, np.where(at_crossovers.failed.any(axis=1), UNKNOWN, BELOW)).astype(object)
+    kind = np.where(attracted, ABOVE, np.where(at_crossovers.failed.any(axis=1), UNKNOWN, BELOW)).astype(object)
     edges = Edges(nothing[0], kind, nothing[1], nothing[2], windows)
     if which.size:
         search = _Search(stages, which, grid, at_crossovers, last)
@@ -188,21 +188,23 @@ class _Search:
 
     def follow(self) -> None:
         """Go on upward from jumps as long as simulations hunt."""
-        on = np.flatnonzero(self.jumps)
+        jumping = np.flatnonzero(self.jumps)
         for _ in range(STEPS):
-            if not on.size:
+            if not jumping.size:
                 return
-            hunts, decided = swings_from_any_distance(self.stages(self.which[on], np.exp(self.high[on])), LONG)
-            self.failed[on] |= ~decided
-            on = on[hunts]
-            self.low[on] = self.high[on]
-            self.high[on] += np.log(STEP)
-        self.failed[on] = True
+            hunts, decided = swings_from_any_distance(
+                self.stages(self.which[jumping], np.exp(self.high[jumping])), LONG
+            )
+            self.failed[jumping] |= ~decided
+            jumping = jumping[hunts]
+            self.low[jumping] = self.high[jumping]
+            self.high[jumping] += np.log(STEP)
+        self.failed[jumping] = True
 
     def columns(self) -> dict[str, np.ndarray]:
         """The edges by the steps, under the names of `Edges`."""
-        off = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
-        crossed = self.low - off[0] * (self.flip - self.low) / (off[1] - off[0])
+        excess = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
+        crossed = self.low - excess[0] * (self.flip - self.low) / (excess[1] - excess[0])
         within = (self.low <= crossed) & (crossed <= self.high)
         surely = np.isfinite(self.outside) & ~self.jumps
         flips = within & (surely | (self.unsure & (self.inside < -MEETS[0]) & (self.flipped < 0)))

@@ -82,20 +82,20 @@ def searched(stage: Stage, attracting: bool, survey: Attractors | None = None) -
     """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `survey` is what
     attracts the stage itself, if that was surveyed."""
     flat, crossover = stage.flat(), bandwidth(stage.flat())
-    here, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
-    below = np.geomspace(1 / FARTHEST, 1.0, here, endpoint=False)
+    index, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
+    below = np.geomspace(1 / FARTHEST, 1.0, index, endpoint=False)
     factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
     grid = _Grid(flat, factors)
-    grid.know(here, survey or attractors(Ensemble.held(flat, 1), thorough=True))
-    edge = grid.last_edge(here, attracting)
-    lower = grid.lower_end(here) if attracting else None
-    contradicts = bool(grid.attracts[here]) and not attracting
+    grid.record(index, survey or attractors(Ensemble.held(flat, 1), thorough=True))
+    edge = grid.last_edge(index, attracting)
+    lower = grid.lower_end(index) if attracting else None
+    contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
-        return Searched(None, grid.windows(here), lower, contradicts)
+        return Searched(None, grid.windows(index), lower, contradicts)
     at, end, certain = edge
-    sure = certain and not contradicts
+    conclusive = certain and not contradicts
     inside = None if crossover is None else crossover * end.inside
-    outermost = Margin(end.inside, inside, sure, end.outside, end.reserve)
+    outermost = Margin(end.inside, inside, conclusive, end.outside, end.reserve)
     return Searched(outermost, grid.windows(at), lower, contradicts)
 
 
@@ -112,19 +112,19 @@ class _Grid:
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
 
-    def know(self, here: int, survey: Attractors) -> None:
+    def record(self, index: int, survey: Attractors) -> None:
         """Take over what a thorough survey of one of the stages shows."""
-        self.attracts[here], self.decided[here] = survey.attracts[0], survey.decided[0]
-        self.motions[here] = list(survey.motions)
-        self.inspected.add(here)
+        self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
+        self.motions[index] = list(survey.motions)
+        self.inspected.add(index)
 
-    def last_edge(self, here: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
+    def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
         number on if the edge is looked for `above`, else of those below it; the end of what attracts; and whether that
         is certain. None if there is no such factor."""
         while True:
             falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
-            falls = falls[falls >= here] if above else falls[falls < here]
+            falls = falls[falls >= index] if above else falls[falls < index]
             if not falls.size:
                 return None
             at = int(falls[-1])
@@ -173,11 +173,11 @@ class _Grid:
         self.inspected.add(at)
         return bool(self.attracts[at])
 
-    def lower_end(self, here: int) -> AttractionEnd | None:
+    def lower_end(self, index: int) -> AttractionEnd | None:
         """The end below of what attracts at a number; None if it attracts as far as the search goes, or if it is not
         known that nothing does below."""
-        while self.attracts[here] and not self.attracts[:here].all():
-            first = int(np.flatnonzero(~self.attracts[:here])[-1]) + 1
+        while self.attracts[index] and not self.attracts[:index].all():
+            first = int(np.flatnonzero(~self.attracts[:index])[-1]) + 1
             end = self.end(first, -1)
             if end is None:
                 continue

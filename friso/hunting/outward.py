@@ -139,8 +139,8 @@ class Outward:
         """What attracts at some factors, tried from distances [m] as well, all starts `at_once` or not. Without
         `cycles` simulations alone tell: orbits that attract from a narrow range show where they are followed from wider
         ones."""
-        tried = None if distances is None else np.tile(distances, (len(factors), 1))
-        return attractors(self._stages(factors), tried=tried, cycles=cycles, at_once=at_once)
+        begins = None if distances is None else np.tile(distances, (len(factors), 1))
+        return attractors(self._stages(factors), distances=begins, cycles=cycles, at_once=at_once)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
@@ -194,20 +194,20 @@ class Outward:
             closed = np.flatnonzero(cycles.closed)
             if closed.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[closed]) - 1)):
                 break
-            places, off = np.linspace(0, 1, SPREAD)[closed], np.abs(cycles.multiplier[closed]) - 1
-            curve = np.polyfit(places, off, 3)
+            places, excess = np.linspace(0, 1, SPREAD)[closed], np.abs(cycles.multiplier[closed]) - 1
+            curve = np.polyfit(places, excess, 3)
             roots = np.roots(curve)
             real = roots.real[np.abs(roots.imag) < 1e-9]
             inside = real[(real >= 0) & (real <= places[-1])]
             if not inside.size:
                 break
             place = float(inside.max())
-            scatter = float(np.sqrt(np.sum((off - np.polyval(curve, places)) ** 2) / max(len(places) - 4, 1)))
+            scatter = float(np.sqrt(np.sum((excess - np.polyval(curve, places)) ** 2) / max(len(places) - 4, 1)))
             slope = abs(float(np.polyval(np.polyder(curve), place)))
-            rough = 2 * scatter / slope * abs(float(np.log(outside / at)))
-            before, now = flip, float(at * (outside / at) ** place)
-            flip = now, rough if before is None else max(rough, abs(now / before[0] - 1))
-            at, outside = now / NEAR, now * NEAR  # a curve over less is closer
+            uncertainty = 2 * scatter / slope * abs(float(np.log(outside / at)))
+            before, flip_at = flip, float(at * (outside / at) ** place)
+            flip = flip_at, uncertainty if before is None else max(uncertainty, abs(flip_at / before[0] - 1))
+            at, outside = flip_at / NEAR, flip_at * NEAR  # a curve over less is closer
         return flip
 
     def _simulated(

@@ -81,5 +81,5 @@ def swings_from_any_distance(
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)
     swings, completed = (runs_of_stages.reshape(stages.count, -1) for runs_of_stages in runs)
-    some = np.any(swings, axis=1)
-    return np.asarray(some), np.asarray(some | np.all(completed, axis=1))
+    swinging = np.any(swings, axis=1)
+    return np.asarray(swinging), np.asarray(swinging | np.all(completed, axis=1))

@@ -12,7 +12,7 @@ COUNTED_AFTER = 10.0
 COUNTED_ABOVE = 1e-4
 """Height above the reference from which peaks count [m] (thesis, Sec. 3.2.2)."""
 
-APART = 0.5
+SEPARATION = 0.5
 """Time by which peaks are apart [s] (thesis, Sec. 3.2.2)."""
 
 DISTINCT = 1e-6
@@ -40,8 +40,8 @@ def maxima(values, count, kinds):
             last += 1
         rises = k == 0 or values[k - 1] < values[k]
         falls = last == count - 1 or values[last + 1] < values[k]
-        alone = k == 0 and last == count - 1
-        if rises and falls and not alone:
+        single = k == 0 and last == count - 1
+        if rises and falls and not single:
             kinds[k] = 1
         k = last + 1
 
@@ -69,8 +69,8 @@ def zigzag(values, count, least, kinds):
 
 
 def keep_tallest(times, values, count, kinds, peaks):
-    """Mark the counted peaks: of maxima late and tall enough but less than `APART` from each other the tallest stays
-    (as MATLAB's findpeaks does with MinPeakDistance)."""
+    """Mark the counted peaks: of maxima late and tall enough but less than `SEPARATION` apart the tallest
+    stays (as MATLAB's findpeaks does with MinPeakDistance)."""
     for k in range(count):
         if times[k] < COUNTED_AFTER or values[k] <= COUNTED_ABOVE:
             kinds[k] = 0
@@ -83,7 +83,7 @@ def keep_tallest(times, values, count, kinds, peaks):
             return
         peaks[tallest] = True
         for k in range(count):
-            if abs(times[k] - times[tallest]) < APART:
+            if abs(times[k] - times[tallest]) < SEPARATION:
                 kinds[k] = 0
 
 

@@ -14,7 +14,7 @@ from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load
 from friso.hunting import turning
 
-MANY = 100
+COMPILED_FROM = 100
 """Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
 
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
@@ -49,7 +49,7 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
-    scan_runs: Callable[..., None] = turning.run if counts.sum() < MANY else _compiled()
+    scan_runs: Callable[..., None] = turning.run if counts.sum() < COMPILED_FROM else _compiled()
     scan_runs(*arrays, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
 

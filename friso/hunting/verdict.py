@@ -102,7 +102,7 @@ WORK = ("what attracts the stage", "other bandwidths", "kicks and moves")
 """What is computed for a verdict, in this order; without a cycle that attracts the last is left out."""
 
 
-def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None] = lambda what: None) -> Judgement:
+def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None] = lambda label: None) -> Judgement:
     """The verdict on a stage whose motion was run and measured at a relative tolerance; `begin` is told what work is
     begun (see `WORK`)."""
     flat, motions = stage.flat(), Motions.of(ran)
@@ -194,24 +194,24 @@ def judge_runs(
     """The same where the stages' own motions were run, and what attracts is known already (None: they cannot hunt);
     `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
-    sure, attracts = motions.completed.copy(), np.zeros(count, bool)
+    decided, attracts = motions.completed.copy(), np.zeros(count, bool)
     if survey is None and why_not(shared_structure(flat)) == DITHERS:
-        sure[:] = False
+        decided[:] = False
     if survey is not None:
-        sure &= survey.decided
+        decided &= survey.decided
         attracts = survey.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
-    attracted = np.flatnonzero(sure & attracts)
+    attracted = np.flatnonzero(decided & attracts)
     if survey is not None and attracted.size:
-        in_cycle[attracted], sure[attracted] = _end_in_a_cycle(
+        in_cycle[attracted], decided[attracted] = _end_in_a_cycle(
             _part(flat, attracted), survey.take(attracted), threads, cancel
         )
-    free = np.flatnonzero(sure & ~attracts)
+    free = np.flatnonzero(decided & ~attracts)
     if free.size:
-        how = options(rtol, threads, cancel)
-        rest = _rest(_part(flat, free), motions.take(free), free.size, how, possible=survey is not None)
+        run_options = options(rtol, threads, cancel)
+        rest = _rest(_part(flat, free), motions.take(free), free.size, run_options, possible=survey is not None)
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
-    return verdicts(sure, attracts, in_cycle, rests)
+    return verdicts(decided, attracts, in_cycle, rests)
 
 
 def _end_in_a_cycle(
@@ -235,31 +235,31 @@ class _Rest:
     swing: np.ndarray
 
 
-def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: RunOptions, possible: bool) -> _Rest:
+def _rest(flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool) -> _Rest:
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
     its end is followed."""
     after, steady, followed = motions.settling.copy(), np.zeros(count, bool), np.full(count, np.nan)
     swing = motions.swing.copy()
     rests = np.isfinite(motions.settling)
     if not possible:
-        still = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
-        return _Rest(rests | still, after, steady, followed, swing)
-    if (on := np.flatnonzero(~rests)).size:
-        part = _part(flat, on)
-        stages = Ensemble.held(part, on.size, form=shared_structure(flat))
+        idle = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
+        return _Rest(rests | idle, after, steady, followed, swing)
+    if (moving := np.flatnonzero(~rests)).size:
+        part = _part(flat, moving)
+        stages = Ensemble.held(part, moving.size, form=shared_structure(flat))
         waits = SWINGS * wait(stages, loose_from(stages))
-        followed[on] = np.maximum(np.maximum(LONG, part["motion.duration"]), waits)
-        long = {**part, "motion.duration": followed[on] + last_corner(part)}
-        last, half = (_motions(long, on.size, replace(how, window=window)) for window in (0.75, 0.5))
-        after[on], swing[on] = last.settling, last.swing
-        steady[on] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
+        followed[moving] = np.maximum(np.maximum(LONG, part["motion.duration"]), waits)
+        long = {**part, "motion.duration": followed[moving] + last_corner(part)}
+        last, half = (_motions(long, moving.size, replace(run_options, window=window)) for window in (0.75, 0.5))
+        after[moving], swing[moving] = last.settling, last.swing
+        steady[moving] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
     return _Rest(rests, after, steady, followed, swing)
 
 
-def _motions(flat: Mapping[str, Any], count: int, how: RunOptions) -> Motions:
+def _motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
     """The motions of stages of one structure, run and measured."""
     columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
-    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, how):
+    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
         part = Motions.of(measure(runs.part(flat), runs))
         for column, values in zip(columns, (part.completed, part.peaks, part.swing, part.settling), strict=True):
             column[runs.numbers] = values

@@ -198,7 +198,7 @@ def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
 
 def lost_places(result: Plane) -> np.ndarray:
     """Where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
-    return _values(result.space, np.reshape(result.lost, (-1, 2)))
+    return _values(result.space, np.reshape(result.gaps, (-1, 2)))
 
 
 def _verdicts(result: Diagram | Plane) -> list[str]:

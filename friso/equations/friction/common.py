@@ -49,8 +49,8 @@ class Friction:
         modes = [kink.beyond for kink in self.component.kinks if isinstance(kink, Switch)]
         if self.sliding is not None:
             return {x: sp.sympify(self.sliding.get(x, 0)) for x in (*states, *modes)}
-        still = solved([state.derivative for state in self.component.states], states) if states else []
-        return {**dict(zip(states, still, strict=True)), **dict.fromkeys(modes, sp.S.Zero)}
+        steady = solved([state.derivative for state in self.component.states], states) if states else []
+        return {**dict(zip(states, steady, strict=True)), **dict.fromkeys(modes, sp.S.Zero)}
 
     def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
         """The force [N] in a steady motion at the velocity; None where it cannot be said."""

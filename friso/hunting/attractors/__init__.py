@@ -11,7 +11,7 @@ from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
+from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, families
 
 PERIODS, CONSTANTS = (60.0, 600.0), 8.0
 """Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
@@ -64,9 +64,9 @@ class Attractors:
     @property
     def attracts(self) -> np.ndarray:
         """Which stages something attracts, shape (count,)."""
-        some = np.zeros(len(self.decided), bool)
-        some[[motion.stage for motion in self.motions]] = True
-        return some
+        attracted = np.zeros(len(self.decided), bool)
+        attracted[[motion.stage for motion in self.motions]] = True
+        return attracted
 
     @property
     def target(self) -> Target:
@@ -84,10 +84,10 @@ class Attractors:
 
     def take(self, numbers: np.ndarray) -> Attractors:
         """Those of the stages with these numbers."""
-        of: dict[int, list[Swinging]] = {}
+        motions_of: dict[int, list[Swinging]] = {}
         for motion in self.motions:
-            of.setdefault(motion.stage, []).append(motion)
-        motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in of.get(n, ()))
+            motions_of.setdefault(motion.stage, []).append(motion)
+        motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in motions_of.get(n, ()))
         suggested = tuple(cycles.take(numbers) for cycles in self.families)
         return Attractors(tuple(motions), self.decided[numbers], self.typical[numbers], suggested, self.flips[numbers])
 
@@ -97,27 +97,27 @@ def attractors(
     stages: Ensemble,
     thorough: bool = False,
     rtol: float = RTOL,
-    tried: np.ndarray | None = None,
+    distances: np.ndarray | None = None,
     cycles: bool = True,
     at_once: bool = False,
 ) -> Attractors:
     """What attracts: everything that simulations from many starts end in, and the cycles that the return map suggests.
     Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
-    relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite. Without
+    relative tolerance. Motions begin from the `distances` [m], (count, n), too, where they are finite. Without
     `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
     Starts are tried `at_once`, and beside the cycles, by a thorough survey and where nothing is thought to attract: one
     run alone takes as long as eight together."""
-    survey, every = Survey(stages.count, thorough, rtol, prove=cycles), np.arange(stages.count)
+    survey, numbers = Survey(stages.count, thorough, rtol, prove=cycles), np.arange(stages.count)
     at_once = thorough or at_once
     suggested = families(stages, rtol) if at_once and cycles else ()
-    starts = Starts(stages) if cycles else Starts(stages, ROUGH)
-    if tried is not None:
-        starts.stuck_at(tried)
+    starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
+    if distances is not None:
+        starts.stuck_at(distances)
     starts.spread(thorough)
-    _take_notice(starts, survey, every, suggested)
-    for runs, of in starts.waves(at_once):
-        survey.follow(runs, of)
+    _take_notice(starts, survey, numbers, suggested)
+    for runs, owners in starts.waves(at_once):
+        survey.follow(runs, owners)
     if cycles and not at_once:
         _try_cycles(starts, survey, rtol)
     decided = survey.attracted | ~survey.unknown
@@ -132,7 +132,7 @@ def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested:
         survey.slow_down(numbers, cycles)
         starts.beside(cycles)
         if (attracting := np.flatnonzero(cycles.attracting)).size:
-            survey.confirm(starts.on(cycles, attracting), numbers[attracting], cycles.take(attracting))
+            survey.confirm(starts.on_cycles(cycles, attracting), numbers[attracting], cycles.take(attracting))
 
 
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
@@ -143,8 +143,8 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
         return
     starts = begun.take(left)
     _take_notice(starts, survey, left, families(starts.stages, rtol))
-    for runs, of in starts.waves(at_once=True):
-        survey.follow(runs, left[of])
+    for runs, owners in starts.waves(at_once=True):
+        survey.follow(runs, left[owners])
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
@@ -160,15 +160,15 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     starts.spread(thorough=False)
     observed = [motion for motion in first.motions if motion.stage not in proved]
     for motion in observed:
-        tried = np.full((stages.count, len(BESIDE)), np.nan)
-        tried[motion.stage] = BESIDE * motion.distance
-        starts.stuck_at(tried)
+        distances = np.full((stages.count, len(BESIDE)), np.nan)
+        distances[motion.stage] = BESIDE * motion.distance
+        starts.stuck_at(distances)
     for cycles in first.families:
         survey.slow_down(np.arange(stages.count), cycles)
-    for runs, of in starts.waves(at_once=True):
-        survey.follow(runs, of)
+    for runs, owners in starts.waves(at_once=True):
+        survey.follow(runs, owners)
     flips = first.attracts != survey.attracted
-    again = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
+    confirmed_twice = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
     confirmed = [motion for motion in observed if not flips[motion.stage]]
     decided = first.decided & (survey.attracted | ~survey.unknown) & ~flips
-    return replace(first, motions=(*again, *confirmed), decided=decided, flips=flips)
+    return replace(first, motions=(*confirmed_twice, *confirmed), decided=decided, flips=flips)

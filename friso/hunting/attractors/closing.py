@@ -38,34 +38,34 @@ def closed(
     return parts
 
 
-def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
+def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
     """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
     actuator exerts no force on a stage at rest: of several that before which the stage has stood still for longest."""
-    stages, size = some.stages, len(some.stages.kernel.states)
-    every, balance = np.arange(stages.count), stages.relaxed
+    stages, size = pending.stages, len(pending.stages.kernel.states)
+    numbers, balance = np.arange(stages.count), stages.relaxed
     ahead = np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
-    for group in (every[octave == n] for n in np.unique(octave)):
-        runs, step = some.take(group), float(times[group].min()) / SAMPLES
-        paths = runs.stages.run(runs.states, 2 * times[group], some.rtol, interval=step, least_swing=np.inf).samples
+    for group in (numbers[octave == n] for n in np.unique(octave)):
+        runs, step = pending.take(group), float(times[group].min()) / SAMPLES
+        paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step, least_swing=np.inf).samples
         for k, path in zip(group, paths, strict=True):
             crossed = _balanced(
                 path[:, stages.integral] - balance[k] * path[:, stages.sticking], path[:, stages.sticking]
             )
             ahead[k] = step * crossed
-    return stages.run(some.states, np.maximum(ahead, 1e-9 * times), some.rtol).ends[:, :size]
+    return stages.run(pending.states, np.maximum(ahead, 1e-9 * times), pending.rtol).ends[:, :size]
 
 
-def _balanced(off: np.ndarray, place: np.ndarray) -> float:
-    """The sample, and what share of the step to the next, at which the integrator is no longer `off` the state that
+def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
+    """The sample, and what share of the step to the next, at which the integrator is no longer off the state that
     exerts no force, where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
     if not np.isfinite(place).any():  # the run failed
         return 0.0
-    still = np.abs(np.diff(place)) < STILL * np.nanmax(place) - STILL * np.nanmin(place)
-    moves = np.where(~still, np.arange(len(still)), -1)
-    stood = np.arange(len(still)) - np.maximum.accumulate(moves)
-    crossed = np.flatnonzero((off[:-1] * off[1:] <= 0) & np.isfinite(off[1:]))
+    standing = np.abs(np.diff(place)) < STILL * np.nanmax(place) - STILL * np.nanmin(place)
+    moves = np.where(~standing, np.arange(len(standing)), -1)
+    stood = np.arange(len(standing)) - np.maximum.accumulate(moves)
+    crossed = np.flatnonzero((residuals[:-1] * residuals[1:] <= 0) & np.isfinite(residuals[1:]))
     if not crossed.size:
         return 0.0
     j = crossed[stood[crossed].argmax()]
-    return float(j + off[j] / (off[j] - off[j + 1]))
+    return float(j + residuals[j] / (residuals[j] - residuals[j + 1]))

@@ -24,15 +24,15 @@ CLOSER = 0.2
 class Recurrence:
     """Of runs, arrays of shape (runs,): the least number of swings after which each repeats itself, `swings` (0: it
     does not), and the number after which it does so best, `better`; the times that these take, `time` and
-    `better_time` [s]; peak to peak, `size` [m], the share of that by which it fails to repeat itself, `off`; and the
-    mean size of single swings, `mean` [m]."""
+    `better_time` [s]; peak to peak, `size` [m], the share of that by which it fails to repeat itself, `deviation`;
+    and the mean size of single swings, `mean` [m]."""
 
     swings: np.ndarray
     time: np.ndarray
     better: np.ndarray
     better_time: np.ndarray
     size: np.ndarray
-    off: np.ndarray
+    deviation: np.ndarray
     earlier: np.ndarray
     mean: np.ndarray
 
@@ -49,33 +49,33 @@ def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> R
     runs, room = values.shape
     legs = np.abs(np.diff(values, axis=1))
     mean = np.nansum(legs, axis=1) / np.maximum(np.isfinite(legs).sum(axis=1), 1)
-    there = np.isfinite(values)
-    size = np.max(values, axis=1, initial=-np.inf, where=there) - np.min(values, axis=1, initial=np.inf, where=there)
+    finite = np.isfinite(values)
+    size = np.max(values, axis=1, initial=-np.inf, where=finite) - np.min(values, axis=1, initial=np.inf, where=finite)
     swings, better = np.zeros(runs, np.int64), np.zeros(runs, np.int64)
     time, better_time, least, earlier = (np.full(runs, np.nan) for _ in range(4))
     for n in range(1, MOST + 1):
-        seen = _seen(n)
-        if room < seen + n:
+        compared = _compared(n)
+        if room < compared + n:
             break
-        off = _off(values, n, room) / size
-        takes = (times[:, room - seen :] - times[:, room - seen - n : room - n]).mean(axis=1)
-        same = (off <= SAME) & (mirrored | (n % 2 == 0))
+        deviations = _deviation(values, n, room) / size
+        takes = (times[:, room - compared :] - times[:, room - compared - n : room - n]).mean(axis=1)
+        same = (deviations <= SAME) & (mirrored | (n % 2 == 0))
         first = same & (swings == 0)
         swings[first], time[first] = n, takes[first]
-        closer = first | (same & (off < CLOSER * least))
-        better[closer], better_time[closer], least[closer] = n, takes[closer], off[closer]
-        if room - EARLIER >= seen + n:
-            earlier[closer] = (_off(values, n, room - EARLIER) / size)[closer]
+        closer = first | (same & (deviations < CLOSER * least))
+        better[closer], better_time[closer], least[closer] = n, takes[closer], deviations[closer]
+        if room - EARLIER >= compared + n:
+            earlier[closer] = (_deviation(values, n, room - EARLIER) / size)[closer]
     return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, earlier, mean)
 
 
-def _off(values: np.ndarray, swings: int, end: int) -> np.ndarray:
+def _deviation(values: np.ndarray, swings: int, end: int) -> np.ndarray:
     """By how much swings up to a number fail to repeat what was some swings before [m], shape (runs,)."""
-    seen = _seen(swings)
-    last, before = values[:, end - seen : end], values[:, end - seen - swings : end - swings]
+    compared = _compared(swings)
+    last, before = values[:, end - compared : end], values[:, end - compared - swings : end - swings]
     return np.asarray(np.abs(last - (-1) ** swings * before).max(axis=1))
 
 
-def _seen(swings: int) -> int:
+def _compared(swings: int) -> int:
     """How many swings have to repeat what was some swings before."""
     return max(swings, 4)

@@ -11,7 +11,7 @@ from friso.engine.arrays import STATISTICS
 from friso.engine.batch import CAPACITY
 from friso.hunting.attractors.recurrence import Recurrence, recurrence
 from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.find import ROUGH
+from friso.hunting.cycle.find import COARSE_RTOL
 from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import PATIENCE, follow
 from friso.hunting.cycle.swings import last_swings
@@ -102,7 +102,7 @@ def loose_from(stages: Ensemble) -> np.ndarray:
     """The distance [m] up to which a stage creeps home, and from which on it breaks away, shape (count,)."""
     distances = CREEPS * stages.length[:, None]
     sides = (1.0,) if stages.symmetric.all() else (1.0, -1.0)
-    returns = np.max([follow(stages, distances, ROUGH, side).returns for side in sides], axis=0)
+    returns = np.max([follow(stages, distances, COARSE_RTOL, side).returns for side in sides], axis=0)
     breaks = returns > ACROSS * distances
     first = np.where(breaks.any(axis=1), breaks.argmax(axis=1), len(CREEPS) - 1)
     return distances[np.arange(stages.count), first]
@@ -129,18 +129,18 @@ def one_round(runs: Pending, budget: float = BUDGET) -> tuple[Pending, Ends]:
         results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min", "attempted")
     )
     values, times = last_swings(results, np.maximum(LEG * (high - low), least), KEPT)
-    still = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
+    standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
-    return replace(runs, states=results.ends), Ends(completed, completed & still, steps, repeats, values, times)
+    return replace(runs, states=results.ends), Ends(completed, completed & standing, steps, repeats, values, times)
 
 
 def _stands_still(
     stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
 ) -> np.ndarray:
     """Which runs have moved so little, for so long, that they will not break away again."""
-    off = np.abs(ends[:, stages.sticking])
-    home = (swing < loose / 2) & (off < loose / 2) & (durations / 2 > WOUND * wait(stages, loose))
-    aside = (swing < 2 * RESOLVED * stages.length) & (durations / 2 > 2 * PATIENCE * wait(stages, off))
+    distances = np.abs(ends[:, stages.sticking])
+    home = (swing < loose / 2) & (distances < loose / 2) & (durations / 2 > WOUND * wait(stages, loose))
+    aside = (swing < 2 * RESOLVED * stages.length) & (durations / 2 > 2 * PATIENCE * wait(stages, distances))
     return home | aside
 
 

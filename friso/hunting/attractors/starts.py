@@ -11,11 +11,11 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import pushed, stuck
 
-MANY = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
+THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
 """Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: from the
 nearest most creep home, farther off they do not stick."""
 
-FEW = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
+DISTANCES = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
 """The same for many stages at once."""
 
 LIMITED = np.geomspace(500.0, 30000.0, 8)
@@ -43,7 +43,7 @@ class Starts:
         self.stages, self.rtol = stages, rtol
         self.loose = loose_from(stages) if loose is None else loose
         self.period = typical_period(stages)
-        self.of: list[np.ndarray] = []
+        self.owners: list[np.ndarray] = []
         self.states: list[np.ndarray] = []
 
     def take(self, numbers: np.ndarray) -> Starts:
@@ -52,61 +52,61 @@ class Starts:
 
     def spread(self, thorough: bool) -> None:
         """Stuck at distances on both sides (on one of symmetric stages), and pushed."""
-        spread = MANY if thorough else FEW
+        spread = THOROUGH_DISTANCES if thorough else DISTANCES
         limited = (controller := self.stages.structure.controller) is not None and controller.anti_windup is not None
         units = np.concatenate([*spread, *([LIMITED] if limited else [])])
         for side in (1.0, -1.0):
             which = np.arange(self.stages.count) if side > 0 else np.flatnonzero(~self.stages.symmetric)
             if which.size:
-                of = np.repeat(which, len(units))
-                some = self.stages.take(of)
-                distances = side * np.tile(units, which.size) * some.length
-                self._add(of, stuck(some, distances))
-                for wound in OUTER if some.outer_integrals else ():
-                    self._add(of, stuck(some, distances, wound / some.number("rate")))
+                owners = np.repeat(which, len(units))
+                stages = self.stages.take(owners)
+                distances = side * np.tile(units, which.size) * stages.length
+                self._add(owners, stuck(stages, distances))
+                for wound in OUTER if stages.outer_integrals else ():
+                    self._add(owners, stuck(stages, distances, wound / stages.number("rate")))
                 if thorough:
-                    of = np.repeat(which, len(PUSHES))
-                    some = self.stages.take(of)
-                    speeds = np.tile(PUSHES, which.size) * some.length * some.number("rate")
-                    self._add(of, pushed(some, side * speeds))
+                    owners = np.repeat(which, len(PUSHES))
+                    stages = self.stages.take(owners)
+                    speeds = np.tile(PUSHES, which.size) * stages.length * stages.number("rate")
+                    self._add(owners, pushed(stages, side * speeds))
 
     def beside(self, cycles: Cycles) -> None:
         """Beside cycles that repel."""
         which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
-        of, away = np.repeat(which, len(ASIDE)), np.tile(ASIDE, which.size)
-        size = np.abs(cycles.states[of, self.stages.sticking])
-        self._add(of, cycles.states[of] + (away * size)[:, None] * cycles.direction[of])
+        owners, away = np.repeat(which, len(ASIDE)), np.tile(ASIDE, which.size)
+        size = np.abs(cycles.states[owners, self.stages.sticking])
+        self._add(owners, cycles.states[owners] + (away * size)[:, None] * cycles.direction[owners])
 
     def stuck_at(self, distances: np.ndarray) -> None:
         """Stuck at distances [m], (count, n), those that are finite."""
-        of, which = np.nonzero(np.isfinite(distances))
-        if of.size:
-            self._add(of, stuck(self.stages.take(of), distances[of, which]))
+        owners, which = np.nonzero(np.isfinite(distances))
+        if owners.size:
+            self._add(owners, stuck(self.stages.take(owners), distances[owners, which]))
 
-    def _add(self, of: np.ndarray, states: np.ndarray) -> None:
-        self.of.append(of)
+    def _add(self, owners: np.ndarray, states: np.ndarray) -> None:
+        self.owners.append(owners)
         self.states.append(states)
 
     def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
         """The runs before their first round, and the numbers of their stages: all `at_once`, or a few first, from which
         most stages that hunt do."""
-        if not self.of:
+        if not self.owners:
             return
-        of, states = np.concatenate(self.of), np.concatenate(self.states)
-        order = np.argsort(of, kind="stable")
-        rank = np.empty(len(of), np.int64)
-        rank[order] = np.arange(len(of)) - np.searchsorted(of[order], of[order])
-        left = np.ones(len(of), bool)
-        for every in EVERY[-1:] if at_once else EVERY:
-            if (which := np.flatnonzero(left & (rank % every == every // 2))).size:
-                yield self._begun(of[which], states[which]), of[which]
+        owners, states = np.concatenate(self.owners), np.concatenate(self.states)
+        order = np.argsort(owners, kind="stable")
+        rank = np.empty(len(owners), np.int64)
+        rank[order] = np.arange(len(owners)) - np.searchsorted(owners[order], owners[order])
+        left = np.ones(len(owners), bool)
+        for step in EVERY[-1:] if at_once else EVERY:
+            if (which := np.flatnonzero(left & (rank % step == step // 2))).size:
+                yield self._begun(owners[which], states[which]), owners[which]
             left[which] = False
 
-    def on(self, cycles: Cycles, which: np.ndarray) -> Pending:
+    def on_cycles(self, cycles: Cycles, which: np.ndarray) -> Pending:
         """Runs that begin on the cycles of some stages."""
         return self._begun(which, cycles.states[which])
 
-    def _begun(self, of: np.ndarray, states: np.ndarray) -> Pending:
-        stages, mirrored = self.stages.take(of), self.stages.symmetric[of]
+    def _begun(self, owners: np.ndarray, states: np.ndarray) -> Pending:
+        stages, mirrored = self.stages.take(owners), self.stages.symmetric[owners]
         begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)
-        return Pending(stages, begins, PERIODS * self.period[of], self.loose[of], mirrored, self.rtol)
+        return Pending(stages, begins, PERIODS * self.period[owners], self.loose[owners], mirrored, self.rtol)

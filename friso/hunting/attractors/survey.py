@@ -25,7 +25,7 @@ CLOSE = 0.01
 SAME = 1e-3
 """The same of two orbits that are the same."""
 
-KINDS = 32
+MOST_KINDS = 32
 """Kinds of runs of a stage that are followed after the second round."""
 
 ENOUGH = 3
@@ -47,7 +47,7 @@ CONVERGED, APPROACHES = 1e-4, 0.7
 """The same where nothing has to be proved, and the share of what it was some swings before below which it does for
 motions that are about to repeat themselves (`SETTLED`)."""
 
-CLOSED = 3
+MOST_ORBITS = 3
 """Orbits that are tried to be closed for a stage after one round of a thorough survey, of others one."""
 
 LEAVES, LONGEST = 15.0, 20.0
@@ -92,14 +92,14 @@ _Kind = tuple[int, float, float]
 """The number of a stage, and peak to peak [m] and time [s] of a motion of it that repeats itself."""
 
 
-def _like(kinds: list[_Kind], of: np.ndarray, ends: Ends) -> np.ndarray:
-    """Which runs, of the stages with the numbers `of`, repeat themselves like one of some kinds of motion."""
+def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
+    """Which runs, of the stages with the numbers `owners`, repeat themselves like one of some kinds of motion."""
     motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
         motions_of.setdefault(stage, []).append((size, time))
-    like = np.zeros(len(of), bool)
+    like = np.zeros(len(owners), bool)
     for stage, motions in motions_of.items():
-        which = np.flatnonzero(of == stage)
+        which = np.flatnonzero(owners == stage)
         for size, time in motions:
             same = np.abs(ends.repeats.size[which] / size - 1) < ALIKE
             like[which] |= same & (np.abs(ends.repeats.time[which] / time - 1) < ALIKE)
@@ -140,7 +140,7 @@ class Survey:
     left: np.ndarray = field(init=False)
     _attracting_kinds: list[_Kind] = field(default_factory=list)
     _closed: list[_Kind] = field(default_factory=list)
-    _others: list[_Kind] = field(default_factory=list)
+    _unclosed: list[_Kind] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
@@ -149,9 +149,9 @@ class Survey:
     @property
     def attracted(self) -> np.ndarray:
         """Which stages something attracts, shape (count,)."""
-        some = np.zeros(self.count, bool)
-        some[[motion.stage for motion in self.attracting]] = True
-        return some
+        attracted = np.zeros(self.count, bool)
+        attracted[[motion.stage for motion in self.attracting]] = True
+        return attracted
 
     def add(self, motions: list[Swinging]) -> None:
         """Add motions that attract, but those that are there already."""
@@ -168,76 +168,76 @@ class Survey:
             self._closed += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
-    def follow(self, runs: Pending, of: np.ndarray) -> None:
-        """Follow runs, each of the stage with the number `of`, (runs,), to what attracts them."""
-        before = np.full(len(of), np.nan)
+    def follow(self, runs: Pending, owners: np.ndarray) -> None:
+        """Follow runs, each of the stage with the number `owners`, (runs,), to what attracts them."""
+        before = np.full(len(owners), np.nan)
         for number in range(ROUNDS):
             enough = ENOUGH if self.thorough else 0
-            keep = np.flatnonzero(~self.attracted[of] | (number < enough))
+            keep = np.flatnonzero(~self.attracted[owners] | (number < enough))
             if not keep.size:
                 return
-            of, before = of[keep], before[keep]
-            runs, ends = one_round(runs.take(keep), self.left[of].max())
-            on = self._on(runs, of, ends, early=number < PATIENCE)
-            on = self._within_budget(on, of, ends)
-            if not on.size:
+            owners, before = owners[keep], before[keep]
+            runs, ends = one_round(runs.take(keep), self.left[owners].max())
+            swinging = self._still_swinging(runs, owners, ends, early=number < PATIENCE)
+            swinging = self._within_budget(swinging, owners, ends)
+            if not swinging.size:
                 return
             if number > 0:
-                on = on[self._kinds(of[on], ends.take(on), KINDS)]
+                swinging = swinging[self._kinds(owners[swinging], ends.take(swinging), MOST_KINDS)]
             if number == ROUNDS - 1:
-                return self._last(runs.take(on), of[on], ends.take(on), before[on])
-            regular = self._exact(of[on], ends.take(on))
+                return self._last(runs.take(swinging), owners[swinging], ends.take(swinging), before[swinging])
+            regular = self._exact(owners[swinging], ends.take(swinging))
             if number >= REGULAR:
-                regular |= self._regular(of[on], ends.take(on), before[on])
-            self._observe(of[on[regular]], ends.take(on[regular]), before[on[regular]])
-            on = on[~regular]
-            if not on.size:
+                regular |= self._regular(owners[swinging], ends.take(swinging), before[swinging])
+            self._observe(owners[swinging[regular]], ends.take(swinging[regular]), before[swinging[regular]])
+            swinging = swinging[~regular]
+            if not swinging.size:
                 return
-            before, of = ends.repeats.mean[on], of[on]
-            runs = lengthened(runs.take(on), ends.repeats.swings[on] > 0)
+            before, owners = ends.repeats.mean[swinging], owners[swinging]
+            runs = lengthened(runs.take(swinging), ends.repeats.swings[swinging] > 0)
 
-    def _on(self, runs: Pending, of: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
+    def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
         from those alone that repeat themselves well, and unlike any cycle that is known to repel."""
-        self.unknown[of[~ends.completed]] = True
-        on = ends.completed & ~ends.rest & ~self._alike(of, ends)
-        ready = on & (ends.repeats.swings > 0)
+        self.unknown[owners[~ends.completed]] = True
+        swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
+        ready = swinging & (ends.repeats.swings > 0)
         if early:
-            ready &= (ends.repeats.off < SETTLED) & ~self._repels(of, ends)
+            ready &= (ends.repeats.deviation < SETTLED) & ~self._repels(owners, ends)
         if not self.prove:
-            ready &= ~self._exact(of, ends)
-        self._close(runs, of, ends, np.flatnonzero(ready))
-        return np.flatnonzero(on & ~self._alike(of, ends))
+            ready &= ~self._exact(owners, ends)
+        self._close(runs, owners, ends, np.flatnonzero(ready))
+        return np.flatnonzero(swinging & ~self._known_to_attract(owners, ends))
 
-    def _within_budget(self, on: np.ndarray, of: np.ndarray, ends: Ends) -> np.ndarray:
-        """Those of the runs with the numbers `on` whose stages have steps left after a round."""
-        np.subtract.at(self.left, of, ends.steps)
-        spent = self.left[of[on]] <= 0
-        self.unknown[of[on[spent]]] = True
-        return on[~spent]
+    def _within_budget(self, swinging: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
+        """Those of the runs with the numbers `swinging` whose stages have steps left after a round."""
+        np.subtract.at(self.left, owners, ends.steps)
+        spent = self.left[owners[swinging]] <= 0
+        self.unknown[owners[swinging[spent]]] = True
+        return swinging[~spent]
 
-    def _kinds(self, of: np.ndarray, ends: Ends, most: int) -> np.ndarray:
+    def _kinds(self, owners: np.ndarray, ends: Ends, most: int) -> np.ndarray:
         """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
         unknown what the others come to."""
-        chosen, others = _kinds(of, ends, most)
-        self.unknown[of[others]] = True
+        chosen, surplus = _kinds(owners, ends, most)
+        self.unknown[owners[surplus]] = True
         return chosen
 
-    def _repels(self, of: np.ndarray, ends: Ends) -> np.ndarray:
+    def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves like a cycle that repels, or like what no orbit that attracts could be closed
         from."""
-        return _like(self._closed, of, ends) | _like(self._others, of, ends)
+        return _like(self._closed, owners, ends) | _like(self._unclosed, owners, ends)
 
-    def _alike(self, of: np.ndarray, ends: Ends) -> np.ndarray:
+    def _known_to_attract(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves like a motion that is known already to attract their stage."""
         if not self.thorough:
-            return self.attracted[of]
-        return _like(self._attracting_kinds, of, ends)
+            return self.attracted[owners]
+        return _like(self._attracting_kinds, owners, ends)
 
-    def _close(self, runs: Pending, of: np.ndarray, ends: Ends, which: np.ndarray) -> None:
+    def _close(self, runs: Pending, owners: np.ndarray, ends: Ends, which: np.ndarray) -> None:
         """Close orbits from one of each kind of runs, of those with some numbers."""
-        most, repeats = CLOSED if self.thorough else 1, ends.repeats
-        kinds = which[_kinds(of[which], ends.take(which), most)[0]]
+        most, repeats = MOST_ORBITS if self.thorough else 1, ends.repeats
+        kinds = which[_kinds(owners[which], ends.take(which), most)[0]]
         pairs = runs.mirrored & (repeats.swings == 2)  # as swings about a symmetric cycle that approach it, too, seem
         tries = (
             (np.where(pairs, 1, 0), repeats.time / 2),
@@ -245,99 +245,101 @@ class Survey:
             (np.where(repeats.better > repeats.swings, repeats.better, 0), repeats.better_time),
         )
         for swings, times in tries:
-            on = kinds[(swings[kinds] > 0) & ~self._alike(of[kinds], ends.take(kinds))]
-            if on.size:
-                self._close_after(runs, of, ends, on, swings[on], times[on])
+            swinging = kinds[(swings[kinds] > 0) & ~self._known_to_attract(owners[kinds], ends.take(kinds))]
+            if swinging.size:
+                self._close_after(runs, owners, ends, swinging, swings[swinging], times[swinging])
 
     def _close_after(
-        self, runs: Pending, of: np.ndarray, ends: Ends, on: np.ndarray, swings: np.ndarray, times: np.ndarray
+        self, runs: Pending, owners: np.ndarray, ends: Ends, swinging: np.ndarray, swings: np.ndarray, times: np.ndarray
     ) -> None:
-        """Close orbits from the runs with the numbers `on`, after numbers of swings and times [s]."""
+        """Close orbits from the runs with the numbers `swinging`, after numbers of swings and times [s]."""
         repeats = ends.repeats
-        for group, cycles in closed(runs.take(on), swings, times, repeats.size[on], self.rtol):
-            numbers = on[group]
-            self.add(of_cycles(of[numbers], cycles, runs.stages.sticking))
-            self.slow_down(of[numbers], cycles)
-            for kinds_of, which in ((self._attracting_kinds, cycles.attracting), (self._others, ~cycles.attracting)):
-                columns = (column[numbers[which]].tolist() for column in (of, repeats.size, repeats.time))
+        for group, cycles in closed(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
+            numbers = swinging[group]
+            self.add(of_cycles(owners[numbers], cycles, runs.stages.sticking))
+            self.slow_down(owners[numbers], cycles)
+            for kinds_of, which in ((self._attracting_kinds, cycles.attracting), (self._unclosed, ~cycles.attracting)):
+                columns = (column[numbers[which]].tolist() for column in (owners, repeats.size, repeats.time))
                 kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
 
-    def _last(self, runs: Pending, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
+    def _last(self, runs: Pending, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Take runs that swing to the end for attracted, if they have not decayed; those that may be about to leave a
         cycle that repels are followed for as long as that takes."""
-        kinds = self._kinds(of, ends, CLOSED)
-        leave = LEAVES * self.slowest[of]
+        kinds = self._kinds(owners, ends, MOST_ORBITS)
+        leave = LEAVES * self.slowest[owners]
         slow = kinds[leave[kinds] > runs.durations[kinds]]
         if slow.size:
             kinds = np.setdiff1d(kinds, slow)
             longest = LONGEST * runs.durations[slow]
             longer = replace(runs.take(slow), durations=np.minimum(leave[slow], longest))
-            self.unknown[of[slow[leave[slow] > longest]]] = True
+            self.unknown[owners[slow[leave[slow] > longest]]] = True
             after, last = one_round(longer)
-            on = self._on(after, of[slow], last)
-            self._observe(of[slow[on]], last.take(on), before[slow[on]])
-        self._observe(of[kinds], ends.take(kinds), before[kinds])
+            swinging = self._still_swinging(after, owners[slow], last)
+            self._observe(owners[slow[swinging]], last.take(swinging), before[slow[swinging]])
+        self._observe(owners[kinds], ends.take(kinds), before[kinds])
 
-    def confirm(self, runs: Pending, of: np.ndarray, cycles: Cycles) -> None:
-        """Add those cycles, of the stages with the numbers `of`, (runs,), that a run which begins on them stays on."""
+    def confirm(self, runs: Pending, owners: np.ndarray, cycles: Cycles) -> None:
+        """Add those cycles, of the stages `owners` (runs,), that a run which begins on them stays on."""
         _, ends = one_round(runs)
         size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < ALIKE
         stays = size & (np.abs(ends.repeats.time / cycles.orbits.times - 1) < ALIKE)
         which = np.flatnonzero(stays)
-        self.add(of_cycles(of[which], cycles.take(which), runs.stages.sticking))
+        self.add(of_cycles(owners[which], cycles.take(which), runs.stages.sticking))
 
-    def _regular(self, of: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
+    def _regular(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> np.ndarray:
         """Which runs repeat themselves so well, and have changed so little in the last round, that they will not leave
         where they are: unless that is beside a cycle that repels."""
         same = np.abs(ends.repeats.mean / before - 1) < UNCHANGED
-        return same & (ends.repeats.off < SETTLED) & ~self._repels(of, ends)
+        return same & (ends.repeats.deviation < SETTLED) & ~self._repels(owners, ends)
 
-    def _exact(self, of: np.ndarray, ends: Ends) -> np.ndarray:
+    def _exact(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves as exactly as they do on what attracts alone, or approach that where nothing
         has to be proved, and unlike any closed cycle that repels."""
-        repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, of, ends)
+        repeats, unlike = ends.repeats, (ends.repeats.swings > 0) & ~_like(self._closed, owners, ends)
         if self.prove:
-            return unlike & (repeats.off < EXACT)
-        approaches = (repeats.off < SETTLED) & (repeats.off < APPROACHES * repeats.earlier)
-        return unlike & ((repeats.off < CONVERGED) | approaches)
+            return unlike & (repeats.deviation < EXACT)
+        approaches = (repeats.deviation < SETTLED) & (repeats.deviation < APPROACHES * repeats.earlier)
+        return unlike & ((repeats.deviation < CONVERGED) | approaches)
 
-    def _observe(self, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
+    def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         repeats = ends.repeats
         steady = (repeats.mean > 0) & ~(repeats.mean < STEADY * before)  # there is nothing before the first round
-        self.unknown[of[~steady]] = True
+        self.unknown[owners[~steady]] = True
         for k in np.flatnonzero(steady):
-            if self._alike(of[k : k + 1], ends.take(np.array([k])))[0]:
+            if self._known_to_attract(owners[k : k + 1], ends.take(np.array([k])))[0]:
                 continue
             there_and_back = ends.times[k, 2:] - ends.times[k, :-2]
             swings, time = int(repeats.swings[k]), float(repeats.time[k])
             if swings:
-                twice = 2 if swings % 2 else 1  # it is its mirror image by then
-                period, swings = twice * time, twice * swings
+                turns = 2 if swings % 2 else 1  # it is its mirror image by then
+                period, swings = turns * time, turns * swings
             elif np.isfinite(there_and_back).any():
                 period, swings = float(np.nanmean(there_and_back)), 2
             else:
-                self.unknown[of[k]] = True
+                self.unknown[owners[k]] = True
                 continue
-            motion = Swinging(int(of[k]), float(repeats.size[k] / 2), time, period, float(ends.values[k, -1]), swings)
+            motion = Swinging(
+                int(owners[k]), float(repeats.size[k] / 2), time, period, float(ends.values[k, -1]), swings
+            )
             self.add([motion])
 
 
-def _kinds(of: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarray]:
+def _kinds(owners: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarray]:
     """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, and of
     those that are like none of these. Runs that do not repeat themselves are on their way, and soon apart."""
     chosen: dict[int, list[int]] = {}
-    others: list[int] = []
+    surplus: list[int] = []
     repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
     near = np.where(repeats, ALIKE, CLOSE)
 
-    def alike(k: int, j: int) -> bool:
+    def same_kind(k: int, j: int) -> bool:
         same = abs(sizes[k] - sizes[j]) <= near[k] * sizes[j] and abs(times[k] - times[j]) <= ALIKE * times[j]
         return bool(same and repeats[k] == repeats[j])
 
     for k in np.argsort(ends.repeats.swings, kind="stable").tolist():
-        same_stage = chosen.setdefault(int(of[k]), [])
-        if not any(alike(k, j) for j in same_stage):
-            (same_stage if len(same_stage) < most else others).append(k)
+        same_stage = chosen.setdefault(int(owners[k]), [])
+        if not any(same_kind(k, j) for j in same_stage):
+            (same_stage if len(same_stage) < most else surplus).append(k)
     stand = [k for numbers in chosen.values() for k in numbers]
-    return np.array(stand, dtype=np.int64), np.array(others, dtype=np.int64)
+    return np.array(stand, dtype=np.int64), np.array(surplus, dtype=np.int64)

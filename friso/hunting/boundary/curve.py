@@ -85,11 +85,11 @@ class CurveTracer:
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol)
         point = near.special.point
         start = np.concatenate([[0.0], near.size if size is None else size])
-        along, far = np.array([1.0, 0.0, 0.0]), reach
+        direction, far = np.array([1.0, 0.0, 0.0]), reach
         if self.kind == "fold":
-            along, far = near.special.direction * [0.0, 1.0, 1.0], DEEP
-            along = along / np.linalg.norm(along)
-        special = corrected(tracer, point, start, along, self.kind, far)
+            direction, far = near.special.direction * [0.0, 1.0, 1.0], DEEP
+            direction = direction / np.linalg.norm(direction)
+        special = corrected(tracer, point, start, direction, self.kind, far)
         if special is None or abs(special.point.place) > reach:
             return None
         return Spot(origin + special.point.place * across, special, across)
@@ -98,10 +98,10 @@ class CurveTracer:
         """The whole curve through a point; None if no second point is found next to it."""
         aside = first.across[::-1] * [1.0, -1.0]
         for side in (BESIDE, -BESIDE):
-            beside = first.at + side * aside
-            if np.any((beside < 0) | (beside > 1)):
+            neighbour = first.at + side * aside
+            if np.any((neighbour < 0) | (neighbour > 1)):
                 continue
-            second = self.on_line(beside, first.across, first, 20 * BESIDE)
+            second = self.on_line(neighbour, first.across, first, 20 * BESIDE)
             if second is not None:
                 break
         else:
@@ -142,8 +142,8 @@ class CurveTracer:
                 direction > 0, (1 - last.at) / direction, np.where(direction < 0, -last.at / direction, np.inf)
             )
         side = int(np.argmin(times))
-        along = np.array([0.0, 1.0]) if side == 0 else np.array([1.0, 0.0])
-        spot = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), along, last, 2 * step)
+        across = np.array([0.0, 1.0]) if side == 0 else np.array([1.0, 0.0])
+        spot = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), across, last, 2 * step)
         inside = spot is not None and bool(np.all((spot.at >= 0) & (spot.at <= 1)))
         return [spot] if spot is not None and inside else []
 

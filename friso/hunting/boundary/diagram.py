@@ -70,10 +70,10 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     for cycles in sought:
         for k in np.flatnonzero(cycles.closed).tolist():
             follow(k, cycles.take(np.array([k])))
-    others = 0
+    skipped = 0
     for motion in surveyed.motions:
-        if motion.cycles is not None and others < OTHERS:
-            others += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
+        if motion.cycles is not None and skipped < OTHERS:
+            skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     attracts = surveyed.attracts | sought[0].attracting
     return Diagram(
         space, tuple(branches), tuple(special), places, sought[0], attracts, surveyed.decided | sought[0].attracting

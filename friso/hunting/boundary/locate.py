@@ -61,8 +61,8 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedP
     points = _enclosed(tracer, first, second, kind, PRECISE)
     if points is None:
         return None
-    along = min(points, key=lambda place: abs(distance_to(kind, points[place])))
-    return _special_point(tracer, kind, points[along], direction, _slope(kind, points))
+    nearest = min(points, key=lambda place: abs(distance_to(kind, points[place])))
+    return _special_point(tracer, kind, points[nearest], direction, _slope(kind, points))
 
 
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> Point | None:
@@ -85,18 +85,18 @@ def _enclosed(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: 
     direction, length = _towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
 
-    def off(along: float) -> float:
-        if along not in points:
-            nearest = min(points, key=lambda place: abs(place - along))
-            point = tracer.solve(points[nearest], first.vector + along * direction, direction)
+    def distance(place_along: float) -> float:
+        if place_along not in points:
+            nearest = min(points, key=lambda place: abs(place - place_along))
+            point = tracer.solve(points[nearest], first.vector + place_along * direction, direction)
             if point is None:
                 raise Unreached
-            points[along] = point
-        return distance_to(kind, points[along])
+            points[place_along] = point
+        return distance_to(kind, points[place_along])
 
     try:
-        along = float(brentq(off, 0.0, length, xtol=precise, maxiter=TRIES))  # type: ignore[arg-type]
-        off(along)
+        root = float(brentq(distance, 0.0, length, xtol=precise, maxiter=TRIES))  # type: ignore[arg-type]
+        distance(root)
     except (Unreached, RuntimeError):
         return None
     return points
@@ -127,24 +127,24 @@ def corrected(
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
     time), not farther from it than `reach`, from a cycle near it; None if there is none."""
     points: dict[float, Point] = {}
-    along, other = 0.0, ASIDE
-    for place in (along, other):
+    latest, other = 0.0, ASIDE
+    for place in (latest, other):
         point = tracer.solve(near, origin + place * direction, direction)
         if point is None:
             return None
         points[place] = point
     for _ in range(TRIES):
-        slope = (distance_to(kind, points[along]) - distance_to(kind, points[other])) / (along - other)
-        step = -distance_to(kind, points[along]) / slope if slope else np.inf
-        if not abs(along + step) <= reach:
+        slope = (distance_to(kind, points[latest]) - distance_to(kind, points[other])) / (latest - other)
+        step = -distance_to(kind, points[latest]) / slope if slope else np.inf
+        if not abs(latest + step) <= reach:
             return None
         if abs(step) < PRECISE:
-            return _special_point(tracer, kind, points[along], direction, slope)
-        other, along = along, along + step
-        point = tracer.solve(points[other], origin + along * direction, direction)
+            return _special_point(tracer, kind, points[latest], direction, slope)
+        other, latest = latest, latest + step
+        point = tracer.solve(points[other], origin + latest * direction, direction)
         if point is None:
             return None
-        points[along] = point
+        points[latest] = point
     return None
 
 

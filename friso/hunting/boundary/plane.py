@@ -36,7 +36,7 @@ class Plane:
     cycles: Cycles
     attracts: np.ndarray
     decided: np.ndarray
-    lost: tuple[np.ndarray, ...]
+    gaps: tuple[np.ndarray, ...]
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -46,7 +46,7 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     curves: list[Curve] = []
-    lost: list[np.ndarray] = []
+    gaps: list[np.ndarray] = []
     stages = space.stages(points[allowed])
     hunting, searches = _searches(stages, rtol)
     for cycles, inside, outside in searches:
@@ -62,20 +62,20 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
             if curve:
                 new_curves.append(curve)
             else:
-                lost.append((points[a] + points[b]) / 2)
+                gaps.append((points[a] + points[b]) / 2)
         curves += new_curves
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
-    others = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
-    if others.size:
-        surveyed = attractors(stages.take(others), rtol=rtol)
-        attracts[others], decided[others] = surveyed.attracts, surveyed.decided
+    undecided = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
+    if undecided.size:
+        surveyed = attractors(stages.take(undecided), rtol=rtol)
+        attracts[undecided], decided[undecided] = surveyed.attracts, surveyed.decided
     sides = (_on_grid(allowed[decided & which], nodes) for which in (attracts, ~attracts))
     for a, b in _changes(*sides):  # of what attracts, whatever it is
         middle = (points[a] + points[b]) / 2
-        known_lost = any(np.array_equal(middle, at) for at in lost)
-        if not known_lost and not any(_crossed(curve, points[a], points[b]) for curve in curves):
-            lost.append(middle)
-    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, tuple(lost))
+        known_gap = any(np.array_equal(middle, at) for at in gaps)
+        if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
+            gaps.append(middle)
+    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, tuple(gaps))
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:
@@ -85,8 +85,10 @@ def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles,
     outside = ~hunting.attracting & ~hunting.uncertain
     searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
     for pair in pairs:
-        beside = hunting.attracting & ~pair.uncertain
-        searches.append((pair, np.flatnonzero(beside & pair.closed), np.flatnonzero(beside & ~pair.closed)))
+        beside_attracting = hunting.attracting & ~pair.uncertain
+        searches.append(
+            (pair, np.flatnonzero(beside_attracting & pair.closed), np.flatnonzero(beside_attracting & ~pair.closed))
+        )
     return hunting, searches
 
 

@@ -2,9 +2,9 @@
 (`run_outcome`), and the thesis's peak count of a run (`peak_count`)."""
 
 from friso.hunting.criteria.peak_count import (
-    APART,
     COUNTED_ABOVE,
     COUNTED_AFTER,
+    SEPARATION,
     counted_peaks,
     distinct_peaks,
     peaks_in_traces,
@@ -13,12 +13,12 @@ from friso.hunting.criteria.run_outcome import BAND, OUTCOMES, End, end_of_trace
 from friso.hunting.criteria.stage_verdict import ATTRACTED, VERDICTS, Verdict, verdicts
 
 __all__ = [
-    "APART",
     "ATTRACTED",
     "BAND",
     "COUNTED_ABOVE",
     "COUNTED_AFTER",
     "OUTCOMES",
+    "SEPARATION",
     "VERDICTS",
     "End",
     "Verdict",

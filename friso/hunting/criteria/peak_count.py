@@ -16,23 +16,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.turning import APART, COUNTED_ABOVE, COUNTED_AFTER, DISTINCT
+from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, DISTINCT, SEPARATION
 from friso.hunting.turns import scan
 
 __all__ = [
-    "APART",
     "COUNTED_ABOVE",
     "COUNTED_AFTER",
     "CRITERION",
     "DISTINCT",
     "DISTINCT_CRITERION",
     "RULE",
+    "SEPARATION",
     "counted_peaks",
     "distinct_peaks",
     "peaks_in_traces",
 ]
 
-RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {APART:g} s apart"
+RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {SEPARATION:g} s apart"
 """Which maxima count."""
 
 CRITERION = f"peak count of the thesis: maxima {RULE}, the tallest kept first"
@@ -63,10 +63,10 @@ def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
 
     From a peak the deviation falls on both sides: where a trace ends on its way up, its highest sample is none.
     """
-    some = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)  # what is long before the first that may count is idle
-    values = np.ascontiguousarray(deviation[:, some])
+    counting = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)  # what is long before the first that may count is idle
+    values = np.ascontiguousarray(deviation[:, counting])
     counts = _until_last_fall(values)
-    return distinct_peaks(np.tile(time[some], (len(values), 1)), values, counts).sum(axis=1)
+    return distinct_peaks(np.tile(time[counting], (len(values), 1)), values, counts).sum(axis=1)
 
 
 def _until_last_fall(values: np.ndarray) -> np.ndarray:

@@ -37,9 +37,9 @@ class Ensemble:
     cancel: np.ndarray | None = None
 
     @classmethod
-    def held(cls, flat: Mapping[str, Any], count: int, **how: Any) -> Ensemble:
+    def held(cls, flat: Mapping[str, Any], count: int, **options: Any) -> Ensemble:
         """The stages with their reference held at 0 instead of their motion."""
-        return cls({**without_motion(flat), "motion.kind": "release"}, count, **how)
+        return cls({**without_motion(flat), "motion.kind": "release"}, count, **options)
 
     def take(self, numbers: np.ndarray) -> Ensemble:
         """The stages with these numbers, any of them as often as wanted."""
@@ -66,7 +66,7 @@ class Ensemble:
     def symmetric(self) -> np.ndarray:
         """Whether the mirror image of every motion is one, shape (count,): tried on states drawn at random."""
         states = np.random.default_rng(0).normal(size=(8, 1, self.scales.shape[1])) * self.scales
-        pairs = ((self.rates(some), self.rates(-some)) for some in states)
+        pairs = ((self.rates(family), self.rates(-family)) for family in states)
         return np.all([np.all(np.abs(a + b) <= 1e-9 * np.abs(a), axis=1) for a, b in pairs], axis=0)
 
     @cached_property
@@ -149,11 +149,11 @@ class Ensemble:
         rtol: float,
         variational: bool = False,
         with_modes: bool = False,
-        **how: Any,
+        **run_options: Any,
     ) -> Results:
-        """Run each stage from its state for its duration [s]; `how` as in `RunOptions`. Modes that remember are those
-        in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too."""
-        options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **how)
+        """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`. Modes that remember are
+        those in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too."""
+        options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
         parts = list(run_chunks(kernel(self.structure, variational), flat, self.count, options, starts))
         order = np.argsort(np.concatenate([part.numbers for part in parts]))

@@ -18,13 +18,13 @@ from friso.hunting.cycle.swings import swings
 RTOL = 1e-9
 """Default relative tolerance for following cycles."""
 
-ROUGH = 1e-6
+COARSE_RTOL = 1e-6
 """Relative tolerance that does for guesses."""
 
 TRIES = ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0))
 """Shares of the guessed distance and time from which orbits are tried to be closed, one after the other."""
 
-APART = 0.05
+MOST_ASYMMETRY = 0.05
 """Share by which the two distances of an asymmetric cycle of a symmetric stage differ at least to be guessed."""
 
 LEANING = 1e-3
@@ -113,8 +113,8 @@ class Cycles:
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
     """The cycle of every stage that is its own mirror image, of stages whose equations are."""
-    positive = positive or return_map(stages, ROUGH)
-    return _closed(stages, symmetric_guess(stages, positive, ROUGH), -1.0, rtol)
+    positive = positive or return_map(stages, COARSE_RTOL)
+    return _closed(stages, symmetric_guess(stages, positive, COARSE_RTOL), -1.0, rtol)
 
 
 def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
@@ -138,7 +138,7 @@ def joined(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
 def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
     """The cycles that the return maps suggest: the symmetric one and one of an asymmetric pair, or the one over a whole
     period where some of the stages are not symmetric."""
-    positive = return_map(stages, ROUGH)
+    positive = return_map(stages, COARSE_RTOL)
     if stages.symmetric.all():
         return symmetric_cycles(stages, rtol, positive), asymmetric_cycles(stages, positive, rtol)
     return (whole_cycles(stages, rtol, positive),)
@@ -148,7 +148,7 @@ def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
 def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
     """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
     cycle; from its return map."""
-    cycles = _closed(stages, whole_guess(stages, positive, positive, APART), 1.0, rtol)
+    cycles = _closed(stages, whole_guess(stages, positive, positive, MOST_ASYMMETRY), 1.0, rtol)
     same = np.abs(cycles.middle) < LEANING * cycles.amplitude
     cycles.closed[same], cycles.reasons[same] = False, NO_PAIR
     return cycles
@@ -158,8 +158,8 @@ def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL)
 def whole_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
     """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `positive` is the
     return map of stages that stick on the positive side."""
-    positive = positive or return_map(stages, ROUGH)
-    return _closed(stages, whole_guess(stages, positive, return_map(stages, ROUGH, -1.0)), 1.0, rtol)
+    positive = positive or return_map(stages, COARSE_RTOL)
+    return _closed(stages, whole_guess(stages, positive, return_map(stages, COARSE_RTOL, -1.0)), 1.0, rtol)
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
@@ -177,21 +177,21 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         missing = guess.numbers[~orbits.closed[guess.numbers]]
         if not missing.size:
             break
-        some, distances = stages.take(missing), guess.distances[missing] * distance
-        tried = close(some, stuck(some, distances), guess.times[missing] * time, sign, rtol)
-        _accept(stages, orbits, missing, tried, guess)
+        subset, distances = stages.take(missing), guess.distances[missing] * distance
+        trial = close(subset, stuck(subset, distances), guess.times[missing] * time, sign, rtol)
+        _accept(stages, orbits, missing, trial, guess)
     if stages.chatters:
         _close_simulated(stages, guess, orbits, rtol)
     reasons = np.where(np.isfinite(guess.times), NOT_CLOSED, NO_RETURN)
     return described(stages, orbits, rtol, reasons)
 
 
-def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, tried: Orbits, guess: Guess) -> None:
+def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
     """Take over the orbits that are closed where they were expected."""
-    sticks = np.abs(tried.states[:, stages.sticking] / guess.distances[which] - 1) < KEPT
-    good = tried.closed & sticks
+    sticks = np.abs(trial.states[:, stages.sticking] / guess.distances[which] - 1) < KEPT
+    good = trial.closed & sticks
     for name in ("states", "times", "gaps", "closed"):
-        getattr(orbits, name)[which[good]] = getattr(tried, name)[good]
+        getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
@@ -199,29 +199,29 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:
         return
-    some, sign = stages.take(missing), orbits.sign
-    starts = stuck(some, guess.distances[missing])
-    extrema = swings(some, starts, REPEATED * guess.times[missing], 4 * REPEATED, ROUGH)
-    every, step = np.arange(some.count), 1 if sign < 0 else 2
+    subset, sign = stages.take(missing), orbits.sign
+    starts = stuck(subset, guess.distances[missing])
+    extrema = swings(subset, starts, REPEATED * guess.times[missing], 4 * REPEATED, COARSE_RTOL)
+    rows, step = np.arange(subset.count), 1 if sign < 0 else 2
     last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
-    last -= (sign > 0) & (extrema.values[every, last] < 0)  # on the side that it is followed from
-    heights = np.abs(np.stack([extrema.values[every, last], extrema.values[every, last - step]]))
-    times = extrema.times[every, last] - extrema.times[every, last - step]
+    last -= (sign > 0) & (extrema.values[rows, last] < 0)  # on the side that it is followed from
+    heights = np.abs(np.stack([extrema.values[rows, last], extrema.values[rows, last - step]]))
+    times = extrema.times[rows, last] - extrema.times[rows, last - step]
     fine = np.flatnonzero((last > REPEATED // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY))
     if not fine.size:
         return
-    ends_at = extrema.times[every, last] + UNWINDING * wait(some, heights[0])
-    ends = some.take(fine).run(starts[fine], ends_at[fine], ROUGH).ends
+    ends_at = extrema.times[rows, last] + UNWINDING * wait(subset, heights[0])
+    ends = subset.take(fine).run(starts[fine], ends_at[fine], COARSE_RTOL).ends
     if sign < 0:
         ends *= np.sign(ends[:, stages.sticking])[:, None]
-    _accept(stages, orbits, missing[fine], close(some.take(fine), ends, times[fine], sign, rtol), guess)
+    _accept(stages, orbits, missing[fine], close(subset.take(fine), ends, times[fine], sign, rtol), guess)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray | str = NOT_CLOSED) -> Cycles:
     """Cycles from closed orbits: their size and their multipliers; `reasons` of those that are not closed."""
     which = np.flatnonzero(orbits.closed)
-    some, shut = stages.take(which), orbits.take(which)
+    subset, shut = stages.take(which), orbits.take(which)
     periods = shut.times * (2.0 if shut.sign < 0 else 1.0)
     count, size = stages.count, len(stages.kernel.states)
     cycles = Cycles(
@@ -236,13 +236,13 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     )
     if not which.size:
         return cycles
-    floquet = multipliers(some, shut, rtol)
+    floquet = multipliers(subset, shut, rtol)
     high, low = floquet.high, floquet.low
     if shut.sign < 0:
         high, low = np.maximum(high, -low), np.minimum(low, -high)
     first = floquet.local[:, 0]
     complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
-    decisive = floquet.slope if some.chatters else np.where(complex_pair, np.abs(first), np.real(first))
+    decisive = floquet.slope if subset.chatters else np.where(complex_pair, np.abs(first), np.real(first))
     values = {
         "period": periods,
         "amplitude": (high - low) / 2,
@@ -255,8 +255,8 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     }
     for name, value in values.items():
         getattr(cycles, name)[which] = value
-    if some.kernel.switches:
-        elsewhere = which[~some.same_modes(shut.states, some.run(shut.states, periods, rtol, with_modes=True).ends)]
+    if subset.kernel.switches:
+        elsewhere = which[~subset.same_modes(shut.states, subset.run(shut.states, periods, rtol, with_modes=True).ends)]
         cycles.closed[elsewhere], cycles.reasons[elsewhere] = False, NOT_CLOSED
     unknown = cycles.closed & ~(np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude))
     cycles.closed[unknown], cycles.reasons[unknown] = False, NO_MULTIPLIER

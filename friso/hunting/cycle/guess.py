@@ -41,11 +41,11 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
     numbers = np.flatnonzero(np.isfinite(low))
     distances, times = np.full(stages.count, np.nan), np.full(stages.count, np.nan)
     if numbers.size:
-        some = stages.take(numbers)
+        subset = stages.take(numbers)
         between = np.linspace(low[numbers], high[numbers], REFINED, axis=1)
-        finer = follow(some, between, rtol, 1.0)
+        finer = follow(subset, between, rtol, 1.0)
         distances[numbers] = root = _crossing(finer.distances, finer.returns - finer.distances)
-        times[numbers] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(some, root)
+        times[numbers] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(subset, root)
     return Guess(distances, times)
 
 
@@ -80,8 +80,8 @@ def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.nd
         differ = np.abs(np.log(far[crosses] / start[crosses]))
         i = crosses[differ.argmax() if apart else differ.argmin()]
         return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
-    off = np.abs(np.log(end[goes] / start[goes]))
-    return float(start[goes[off.argmin()]]) if goes.size and off.min() < ALMOST else None
+    change = np.abs(np.log(end[goes] / start[goes]))
+    return float(start[goes[change.argmin()]]) if goes.size and change.min() < ALMOST else None
 
 
 def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,9 +93,9 @@ def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.nd
     """The neighbouring distances between which a function falls through zero, the last such; NaN where none are."""
     falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
-    every = np.arange(len(rise))
+    rows = np.arange(len(rise))
     none = ~falls.any(axis=1)
-    return np.where(none, np.nan, distances[every, last]), np.where(none, np.nan, distances[every, last + 1])
+    return np.where(none, np.nan, distances[rows, last]), np.where(none, np.nan, distances[rows, last + 1])
 
 
 def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ from friso.equations.roles import Role
 from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, time_constant
+from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.stage import Stage
@@ -180,7 +180,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
         cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
         reason=reason if not certain or not (closed or repelling) else "",
         certain=certain,
-        returns=return_map(stages, ROUGH),
+        returns=return_map(stages, COARSE_RTOL),
         observed=tuple(
             Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in survey.motions if not m.cycles
         ),
@@ -243,7 +243,7 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
     """Growth of a small deviation from one return to the next, in a simulation near the cycle."""
     away = np.array([[0.0, AWAY, -AWAY]])
-    heights = returns_of(stages, cycles.orbits, cycles.direction, away, FOLLOWED, ROUGH / 100)[0]
+    heights = returns_of(stages, cycles.orbits, cycles.direction, away, FOLLOWED, COARSE_RTOL / 100)[0]
     deviations = (heights[1:] - heights[0]) / cycles.amplitude[0]
     before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
     small = (np.abs(before) < LINEAR) & (np.abs(after) < LINEAR)  # and no NaN
@@ -254,7 +254,7 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
 
 def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
     period = float(cycles.period[0])
-    results = stages.run(cycles.states, cycles.period, ROUGH / 100, interval=period / SAMPLES)
+    results = stages.run(cycles.states, cycles.period, COARSE_RTOL / 100, interval=period / SAMPLES)
     time = np.arange(results.samples.shape[1]) * (period / SAMPLES)
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
     return {**output_variables(stages.kernel, flat, results.samples[0].T, time), **time_axis(time)}

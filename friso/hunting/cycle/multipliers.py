@@ -77,8 +77,8 @@ def _straight(pairs: np.ndarray) -> float:
         return np.nan
     first, second = (pairs - np.median(pairs, axis=0)).T
     earlier, later = np.triu_indices(len(first), 1)
-    rough = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))  # that of Theil and Sen
-    near = np.abs(second - rough * first) < NEAR * np.ptp(first)
+    slope = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))  # that of Theil and Sen
+    near = np.abs(second - slope * first) < NEAR * np.ptp(first)
     if np.count_nonzero(near) < ENOUGH:
         return np.nan
     return float(np.polyfit(first[near], second[near], 1)[0])

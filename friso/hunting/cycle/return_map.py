@@ -40,8 +40,8 @@ def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     coarse = np.geomspace(*RANGE, POINTS)[None, :] * stages.length[:, None]
     first = follow(stages, coarse, rtol, side)
     gain = np.argmax(first.returns / first.distances, axis=1)
-    every = np.arange(stages.count)
-    low, high = (first.distances[every, np.clip(gain + step, 0, POINTS - 1)] for step in (-1, 1))
+    rows = np.arange(stages.count)
+    low, high = (first.distances[rows, np.clip(gain + step, 0, POINTS - 1)] for step in (-1, 1))
     finer = np.geomspace(low, high, POINTS // 2 + 2, axis=1)[:, 1:-1]
     second = follow(stages, finer, rtol, side)
     parts = (np.hstack(pair) for pair in zip(_columns(first), _columns(second), strict=True))

@@ -74,22 +74,22 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     to those at the end. A state alone does not tell the rates where modes remember: then all are followed.
     """
     count, size = states.shape
-    every, before = np.arange(count)[:, None], stages.rates(states)
+    rows, before = np.arange(count)[:, None], stages.rates(states)
     last = np.argmax(np.abs(before) / stages.scales, axis=1)
     order = np.argsort(np.arange(size) == last[:, None], axis=1, kind="stable")
     followed = size if stages.kernel.switches else size - 1
-    others = order[:, :followed]
+    replaced = order[:, :followed]
     runs = np.repeat(np.arange(count), followed)
-    starts = np.hstack([states[runs], np.eye(size)[others].reshape(-1, size)])
+    starts = np.hstack([states[runs], np.eye(size)[replaced].reshape(-1, size)])
     results = stages.take(runs).run(starts, times[runs], rtol, variational=True, window=0.0)
     both = results.ends.reshape(count, followed, 2 * size)
     ends, columns = both[:, 0, :size], both[:, :, size:]
     flows = np.empty((count, size, size))
-    flows[every, :, others] = columns
+    flows[rows, :, replaced] = columns
     if followed < size:
         with np.errstate(divide="ignore", invalid="ignore"):
-            left = stages.rates(ends) - np.einsum("kj,kji->ki", before[every, others], columns)
-            flows[every[:, 0], :, last] = left / before[every[:, 0], last, None]
+            left = stages.rates(ends) - np.einsum("kj,kji->ki", before[rows, replaced], columns)
+            flows[rows[:, 0], :, last] = left / before[rows[:, 0], last, None]
     extremes = (STATISTICS.index(name) for name in ("deviation_max", "deviation_min"))
     high, low = (results.statistics[::followed, column] for column in extremes)
     return Shot(sign * ends, sign * flows, high, low, np.all(done(results).reshape(count, followed), axis=1))
@@ -195,8 +195,8 @@ class _Shooting:
         misses = ends - states
         gaps = np.max(np.abs(misses) / stages.scales, axis=1)
         self._keep_best(which, np.where(fine, gaps, np.inf))
-        off = self._off(which, stages)
-        for k, miss, other in zip(which, misses, off, strict=True):
+        residual = self._residual(which, stages)
+        for k, miss, other in zip(which, misses, residual, strict=True):
             self._step(k, self.inverses[k] @ -np.concatenate([miss, other]), stages.sticking)
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
@@ -209,7 +209,7 @@ class _Shooting:
         jacobians[:, size, stages.sticking] = -stages.relaxed
         return jacobians
 
-    def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+    def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
         """By how much the phase is off, shape (orbits, 1): the integrator's state that exerts no force is wanted."""
         states = self.states[which]
         return (states[:, stages.integral] - stages.relaxed * states[:, stages.sticking])[:, None]
@@ -218,8 +218,8 @@ class _Shooting:
         """Keep what is closer than before; what is closed, fails or gets no closer rests."""
         better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
-        for best, now in ((self.best_states, self.states), (self.best_times, self.times)):
-            best[better] = now[better]
+        for best, current in ((self.best_states, self.states), (self.best_times, self.times)):
+            best[better] = current[better]
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = STALLED
@@ -268,13 +268,13 @@ class _Following(_Shooting):
         nudge = np.repeat([-NUDGE, NUDGE], len(which))
         stages = self.family(both, self.places[both] + nudge)
         ends = self.sign * stages.run(self.states[both], self.times[both], self.rtol).ends
-        return np.hstack([ends, super()._off(both, stages)]).reshape(2, len(which), -1)
+        return np.hstack([ends, super()._residual(both, stages)]).reshape(2, len(which), -1)
 
-    def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+    def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
         sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])
         where = np.stack([self.places[which], *np.log(sizes)], axis=1)
-        off = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
-        return np.hstack([super()._off(which, stages), off[:, None]])
+        residual = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
+        return np.hstack([super()._residual(which, stages), residual[:, None]])
 
 
 def _solved(shooting: _S) -> _S:

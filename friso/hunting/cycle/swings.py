@@ -56,18 +56,18 @@ def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarr
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
     """Follow the zigzags column by column; `side` is that on which they start."""
     runs = len(values)
-    every = np.arange(runs)
+    rows = np.arange(runs)
     extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))
     count, sign = np.zeros(runs, np.int64), side.copy()  # sign: the side on which the next extremum lies
     best, when = values[:, 0].copy(), times[:, 0].copy()
     for value, time in zip(values.T[1:], times.T[1:], strict=True):
         turned = (sign * (best - value) >= least) & (count <= most)
-        extrema.values[every[turned], count[turned]] = best[turned]
-        extrema.times[every[turned], count[turned]] = when[turned]
+        extrema.values[rows[turned], count[turned]] = best[turned]
+        extrema.times[rows[turned], count[turned]] = when[turned]
         count[turned] += 1
         sign = np.where(turned, -sign, sign)
         farther = turned | (sign * (value - best) > 0)
         best, when = np.where(farther, value, best), np.where(farther, time, when)
     last = (count > 0) & (count <= most)
-    extrema.values[every[last], count[last]], extrema.times[every[last], count[last]] = best[last], when[last]
+    extrema.values[rows[last], count[last]], extrema.times[rows[last], count[last]] = best[last], when[last]
     return Swings(extrema.values[:, 1:], extrema.times[:, 1:])

@@ -14,7 +14,7 @@ from friso.engine.arrays import Status
 from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
-from friso.equations.driven import Driven
+from friso.equations.driven import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
 from friso.identification.inverse_model import SMOOTH, motion
@@ -155,7 +155,7 @@ class Problem:
     def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
         position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
         held = self.kernel.held
-        force = runs.held[:, :, held.index("held_force")] if "held_force" in held else self._force(flat, runs)
+        force = runs.held[:, :, held.index(HELD_FORCE)] if HELD_FORCE in held else self._force(flat, runs)
         failed = runs.statuses != Status.DONE
         return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 

@@ -95,7 +95,7 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     curves = listed([f"{kind}{f' ({number} curves)' if number > 1 else ''}" for kind, number in kinds.items()], "and")
     if kinds:
         return f"{possible} Boundaries: {curves}."
-    if traced.lost or UNKNOWN in verdicts:
+    if traced.gaps or UNKNOWN in verdicts:
         return f"{possible} No curve could be followed."
     return f"{possible} {_no_boundary(traced.space, keys)}"
 
