@@ -213,7 +213,7 @@ def test_what_back_calculation_does_at_38_and_at_40_hz(rtol: float) -> None:
 def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulations at a hundredth of the tolerance decide where no orbit was closed: here they are made to fail to see
     what the others do, by beginning at rest."""
-    monkeypatch.setattr(starts, "FEW", (np.array([1e-6, 2e-6]),))
+    monkeypatch.setattr(starts, "DISTANCES", (np.array([1e-6, 2e-6]),))
     monkeypatch.setattr(friso.hunting.attractors, "BESIDE", np.array([1e-6]))
     found = attractors(held(CREEPING), thorough=True)
     assert found.flips.tolist() == [True]
@@ -226,7 +226,7 @@ def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch
     which one alone is followed on, and that settles, nothing is known."""
     above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
     assert attractors(above).decided.all()
-    monkeypatch.setattr(survey, "KINDS", 1)
+    monkeypatch.setattr(survey, "MOST_KINDS", 1)
     assert not attractors(above).decided.any()
 
 

@@ -16,12 +16,12 @@ from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting.criteria import (
-    APART,
     ATTRACTED,
     BAND,
     COUNTED_ABOVE,
     COUNTED_AFTER,
     OUTCOMES,
+    SEPARATION,
     VERDICTS,
     End,
     counted_peaks,
@@ -192,7 +192,7 @@ def sampled_peaks(values: np.ndarray) -> list[float]:
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]
     spikes[late] = values[late]
-    return TIME[find_peaks(spikes, distance=round(APART / STEP))[0]].tolist()
+    return TIME[find_peaks(spikes, distance=round(SEPARATION / STEP))[0]].tolist()
 
 
 waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats(0, 6.28)), min_size=1, max_size=4)
@@ -215,7 +215,7 @@ def prominent_peaks(values: np.ndarray) -> int:
     spikes = np.zeros(len(values))
     late = maxima[TIME[maxima] >= COUNTED_AFTER]
     spikes[late] = values[late]
-    return len(find_peaks(spikes, distance=round(APART / STEP))[0])
+    return len(find_peaks(spikes, distance=round(SEPARATION / STEP))[0])
 
 
 def test_where_a_trace_ends_is_no_peak() -> None:
@@ -241,7 +241,7 @@ def test_distinct_peaks_are_fewer(gaps: list[tuple[float, int]]) -> None:
     for marks in (plain, distinct):
         assert (times[0, marks] >= COUNTED_AFTER).all()
         assert (values[0, marks] > COUNTED_ABOVE).all()
-        assert (np.diff(times[0, marks]) >= APART - 1e-12).all()
+        assert (np.diff(times[0, marks]) >= SEPARATION - 1e-12).all()
     assert bool(plain.any()) >= bool(distinct.any())
     if (np.abs(np.diff(values[0])) >= 1e-6).all():
         assert plain.tolist() == distinct.tolist()

@@ -76,7 +76,7 @@ def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
 @pytest.mark.parametrize("many", [0, np.inf])
 def test_period_of_a_cycle_with_ringing_on_top(many: float, monkeypatch: pytest.MonkeyPatch) -> None:
     """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own; compiled and plain."""
-    monkeypatch.setattr(scanning, "MANY", many)
+    monkeypatch.setattr(scanning, "COMPILED_FROM", many)
     time = np.linspace(0.0, 20.0, 200_001)
     wave = np.sin(np.pi * time) + 0.1 * np.sin(40 * np.pi * time)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(wave)))) + 1
@@ -129,7 +129,7 @@ def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatc
     values[::2] = 2e-4 + 1e-3 * values[::2]  # ripple
     counts, amplitude = rng.integers(0, 41, 300), rng.uniform(0, 1e-3, 300)
     compiled = scan(times, values, counts, amplitude, np.full(300, 20.0))
-    monkeypatch.setattr(scanning, "MANY", np.inf)
+    monkeypatch.setattr(scanning, "COMPILED_FROM", np.inf)
     plain = scan(times, values, counts, amplitude, np.full(300, 20.0))
     for name in ("peaks", "distinct", "period", "turned", "earlier"):
         assert np.array_equal(getattr(compiled, name), getattr(plain, name), equal_nan=name == "period")

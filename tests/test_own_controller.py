@@ -2,9 +2,11 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import own_controller
+import pandas as pd
 import pytest
 from inside import friso_inside
 from patched import patched
@@ -16,19 +18,13 @@ from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
 from friso.frequency import crossover
-from friso.hunting import Case
-from friso.identification.moves import identify_moves
 from friso.identification.output_error.problem import closed_loop
 from friso.identification.readings.common import record
-from friso.progress import silent
+from friso.virtual_rig.run import as_built_keys
 from friso.stage import Stage, save
 from friso.studies.compare import study
-from friso.studies.compare.study import compare
 from friso.studies.rig.experiments import hunting
 from friso.studies.rig.moves_on_rails import rails
-from friso.views.compare.words import sentences as comparison_sentences
-from friso.views.rig.page import sentences
-from friso.virtual_rig.run import as_built_keys
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 CONTROLLER = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg", "force_limit": "200 N"}
@@ -79,94 +75,94 @@ SLOW = {"kind": "there_and_back", "duration": "2 s", "acceleration": "1 m/s^2", 
         "return_at": "1 s"}  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def checked(locked: Stage) -> dict[str, Case]:
-    return friso.check(locked)
+def answer(folder: Path, stage: Stage, command: str, *arguments: object, status: int = 0) -> dict[str, Any]:
+    """The JSON document of a command, called with the file of a stage."""
+    save(stage, folder / "stage.toml")
+    run = friso_inside(folder, command, "stage.toml", *arguments, "--json")
+    assert run.returncode == status, run.stderr
+    return json.loads(run.stdout)
 
 
-def test_check(checked: dict[str, Case]) -> None:
-    """Its cycle's multiplier is that of a simulation beside it; the remedy is told in its own word and number."""
-    case = checked["given"]
-    cycle, margin = case.judgement.cycle, case.judgement.margin
-    assert case.verdict in ("hunts", "bistable")
-    assert cycle is not None
-    assert cycle.growth == pytest.approx(cycle.multiplier, rel=1e-3)
-    assert margin is not None
-    assert margin.crossover == pytest.approx(EDGE, rel=2e-3)
-    assert margin.factor == pytest.approx(EDGE / 6.0, rel=2e-3)
+def test_check(locked: Stage, tmp_path: Path) -> None:
+    """Its cycle's multiplier is that of a simulation beside it; the remedy is in its own word and number."""
+    document = answer(tmp_path, locked, "check")
+    case = document["cases"]["given"]
+    assert case["verdict"] in ("hunts", "bistable")
+    assert case["cycle"]["growth"] == pytest.approx(case["cycle"]["multiplier"], rel=1e-3)
+    assert case["margin"]["crossover_hz"] == pytest.approx(EDGE, rel=2e-3)
+    assert case["margin"]["factor"] == pytest.approx(EDGE / 6.0, rel=2e-3)
+    assert "aise the bandwidth by" in document["conclusion"]
 
 
-def test_check_in_words(
-    locked: Stage, checked: dict[str, Case], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    save(locked, tmp_path / "stage.toml")
-    monkeypatch.setattr("friso.hunting.check", lambda stage, **how: checked if stage == locked else {})
-    done = friso_inside(tmp_path, "check", "stage.toml")
-    assert done.returncode == 0, done.stderr
-    assert "aise the bandwidth by" in " ".join(done.stdout.split())
-
-
-def test_boundary(locked: Stage) -> None:
+def test_boundary(locked: Stage, tmp_path: Path) -> None:
     """Of all cycles of the stage none attracts beyond the edge."""
-    found = friso.boundary(locked, {BANDWIDTH: "8 Hz..13 Hz"})
-    ends = [found.value(point.point.place) for points in found.special for point in points]
-    assert found.branches
-    assert min(abs(end - EDGE) for end in ends) < 0.05
+    document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=8 Hz..13 Hz")
+    assert document["branches"]
+    assert min(abs(point["value"] - EDGE) for point in document["points"]) < 0.05
 
 
-def test_map_of_multipliers(locked: Stage) -> None:
-    runs = friso.sweep(locked, {BANDWIDTH: ([EDGE * 0.97, EDGE * 1.03], "Hz")}, metrics=["multiplier"])
-    inside, outside = np.abs(runs["multiplier"].values)
+def test_map_of_multipliers(locked: Stage, tmp_path: Path) -> None:
+    places = f"{BANDWIDTH}={EDGE * 0.97} Hz, {EDGE * 1.03} Hz"
+    document = answer(tmp_path, locked, "map", "--x", places, "--metric", "multiplier", "--out", "map")
+    assert document["axes"][BANDWIDTH]["unit"] == "Hz"
+    inside, outside = np.abs(friso.read_store(tmp_path / "map")["multiplier"].values)
     assert inside < 1
     assert not outside < 1
 
 
 def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
-    save(whole, tmp_path / "stage.toml")
-    done = friso_inside(tmp_path, "bode", "stage.toml", "--json")
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
-    said = friso_inside(tmp_path, "bode", "stage.toml")
-    assert said.returncode == 0, said.stderr
-    assert "At 6.00 Hz" in " ".join(said.stdout.split())
+    document = answer(tmp_path, whole, "bode")
+    words = friso_inside(tmp_path, "bode", "stage.toml")
+    assert words.returncode == 0, words.stderr
+    assert "At 6.00 Hz" in " ".join(words.stdout.split())
     slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
-    assert found["highest_stable_crossover_hz"] < slow.limits["free"].highest_stable
+    assert document["highest_stable_crossover_hz"] < slow.limits["free"].highest_stable
 
 
 def small(stage: Stage) -> np.ndarray:
     return rails(stage)[:2]
 
 
-def test_rig_hunting(whole: Stage) -> None:
+def test_rig_hunting(whole: Stage, tmp_path: Path) -> None:
+    save(whole, tmp_path / "stage.toml")
     sizes = {"CROSSOVERS": np.array([1.0, 3.0]), "SHOWN": (0, 1), "DISPLACEMENTS": (0.02,), "rails": small}
     with patched({hunting: sizes}):
-        outcome = hunting.run_experiment(whole, 1, silent)
-    assert outcome.result.crossovers == pytest.approx([6.0, 18.0])
-    assert all(sentences(outcome))
+        run = friso_inside(tmp_path, "rig", "hunting", "stage.toml", "--json")
+    assert run.returncode == 0, run.stderr
+    document = json.loads(run.stdout)
+    assert document["results"]["crossovers_hz"] == pytest.approx([6.0, 18.0])
     assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
 
 
-def test_compare(whole: Stage) -> None:
+def test_compare(whole: Stage, tmp_path: Path) -> None:
     with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
-        found = compare(whole, 20, 1)
-    letters = {result.option.letter: result.option for result in found.results}
-    assert {"a", "c", "d", "e", "f"} <= {*letters}
-    assert all(comparison_sentences(found))
-    if "b" in letters:
-        assert letters["b"].stage.flat()[BANDWIDTH] == pytest.approx(6.0 * letters["b"].factor)
+        document = answer(tmp_path, whole, "compare", "--machines", 20, "--seed", 1)
+    options = document["options"]
+    assert {"a", "c", "d", "e", "f"} <= {*options}
+    assert document["conclusion"]
+    if "b" in options:
+        assert options["b"]["crossover_hz"] == pytest.approx(6.0 * options["b"]["bandwidth_factor"])
 
 
-def test_identify_in_its_own_loop(locked: Stage) -> None:
+def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})
-    flat, time = rigid.flat(), np.arange(4000) * 1e-3
+    time = np.arange(4000) * 1e-3
     reference = 0.02 * (1 - np.cos(2 * np.pi * time))
-    blank = record("given", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
-    problem = closed_loop(flat, blank, blank.segments[0], ())
+    blank = record("blank", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
+    problem = closed_loop(rigid.flat(), blank, blank.segments[0], ())
     assert problem.form.velocity_samples == 1
-    one = problem.record(np.zeros(0))
-    log = record("moves", 1e-3, reference=reference, position=one.position, force=one.force)
-    found = identify_moves(log, flat, own_loop=True)
-    estimates = {each.name: each.value for each in found.estimates}
-    assert sum(estimates[key] for key in flat if key.startswith("masses.")) == pytest.approx(1.7, rel=0.01)
+    simulated = problem.record(np.zeros(0))
+    columns = {"time": time, "reference": reference, "position": simulated.position, "force": simulated.force}
+    pd.DataFrame(columns).to_csv(tmp_path / "log.csv", index=False)
+    save(rigid, tmp_path / "stage.toml")
+    run = friso_inside(
+        tmp_path, "identify", "log.csv", "--stage", "stage.toml", "--as", "moves", *UNITS, "--out", "out", "--json"
+    )
+    assert run.returncode == 0, run.stderr
+    estimates = {estimate["key"]: estimate["value"] for estimate in json.loads(run.stdout)["estimates"]}
+    assert sum(value for key, value in estimates.items() if key.startswith("masses.")) == pytest.approx(1.7, rel=0.01)
     assert estimates["friction.coulomb"] == pytest.approx(1.0, rel=0.05)
+
+
+UNITS = tuple(word for pair in ("time=s", "reference=m", "position=m", "force=N") for word in ("--unit", pair))
