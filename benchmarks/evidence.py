@@ -1,9 +1,9 @@
 """Findings on file: `python -m benchmarks.evidence [NAME ...] [--equations]`.
 
 Without arguments, the entries of friso/evidence.toml are listed with their dates, and those that are older than the
-equations are marked. NAME computes an entry again and writes it back with today's date and the revision of the
-equations; "quick" stands for all that take less than a few minutes each. Documents that state a finding are listed
-where the value has changed: they are edited by hand.
+equations or than the code they rest on are marked. NAME computes an entry again and writes it back with today's date,
+the revision of the equations and the digest of that code; "quick" stands for all that take less than a few minutes
+each. Documents that state a finding are listed where the value has changed: they are edited by hand.
 
 `--equations` compares the reference numbers of the equations (`benchmarks.canonical`) with those on file and, if they
 differ, begins a new revision: every entry is then older than the equations.
@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.canonical import differ, reference_numbers
+from benchmarks.code import code_digest
 from benchmarks.report import print_table
 from friso import evidence
 from friso.evidence import Entry, Equations
@@ -32,7 +33,7 @@ ROOT = Path(__file__).parent.parent
 DRIVE = "examples/thesis_drive.toml"
 
 HEAD = """# Findings of our own computations that take too long to repeat where they are stated (friso.evidence).
-# Written by `python -m benchmarks.evidence`; only `about`, `stated` and `note` are edited by hand.
+# Written by `python -m benchmarks.evidence`; only `about`, `rests_on`, `stated` and `note` are edited by hand.
 """
 
 Values = dict[str, float]
@@ -200,13 +201,19 @@ BY_HAND = ("rig.loop", "identify.known-truth", "hunting.limiter", "hunting.super
 def renewed(entry: Entry, values: Values) -> Entry:
     """The entry with values computed now."""
     revision = evidence.equations().revision
-    return replace(entry, values=values, computed=date.today(), equations=revision, note="")
+    code = code_digest(entry.rests_on)
+    return replace(entry, values=values, computed=date.today(), equations=revision, code=code, note="")
 
 
 def old(entries: Mapping[str, Entry]) -> list[str]:
     """Names of the entries that were computed with other equations than those on file."""
     revision = evidence.equations().revision
     return [name for name, entry in entries.items() if entry.equations != revision]
+
+
+def older_than_code(entries: Mapping[str, Entry]) -> list[str]:
+    """Names of the entries that were computed with other criteria, methods or experiments than those of today."""
+    return [name for name, entry in entries.items() if entry.code != code_digest(entry.rests_on)]
 
 
 def written(entries: Mapping[str, Entry], equations: Equations) -> str:
@@ -220,6 +227,8 @@ def written(entries: Mapping[str, Entry], equations: Equations) -> str:
         texts = {"about": entry.about, "command": entry.command, "note": entry.note}
         lines += [f"{key} = {_quoted(text)}" for key, text in texts.items() if text]
         lines += [f"computed = {entry.computed}", f"equations = {entry.equations}"]
+        if entry.rests_on:
+            lines += [f"rests_on = {json.dumps(entry.rests_on)}", f"code = {_quoted(entry.code)}"]
         lines.append(f"values = {{ {', '.join(f'{key} = {_number(value)}' for key, value in entry.values.items())} }}")
         if entry.stated:
             lines.append(f"[finding.{_quoted(name)}.stated]")
@@ -253,11 +262,9 @@ def main() -> None:
             key for key, value in entries[name].values.items() if _number(value) != _number(before.values.get(key, NAN))
         ]
         print(f"{name}: {f'changed: {changed}; see {[*before.stated]}' if changed else 'as before'}", flush=True)
-    outdated = old(entries)
-    rows = [
-        [name, str(each.computed), "yes" if name in outdated else "", each.command] for name, each in entries.items()
-    ]
-    print_table(("finding", "computed", "older than the equations", "command"), rows)
+    marks = dict.fromkeys(older_than_code(entries), "code") | dict.fromkeys(old(entries), "equations")
+    rows = [[name, str(entry.computed), marks.get(name, ""), entry.command] for name, entry in entries.items()]
+    print_table(("finding", "computed", "older than", "command"), rows)
 
 
 if __name__ == "__main__":

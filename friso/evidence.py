@@ -1,8 +1,8 @@
 """Findings of our own computations that take too long to repeat where they are stated.
 
 A number that we computed ourselves is either computed where it is stated or kept in `evidence.toml`: with the
-command that computes it again, the date, and the revision of the equations it was computed with.
-``python -m benchmarks.evidence`` lists the entries, computes them again and says which are older than the equations.
+command that computes it again, the date, the revision of the equations and a digest of the code it was computed with.
+``python -m benchmarks.evidence`` lists the entries, computes them again and says which are older than either.
 """
 
 from __future__ import annotations
@@ -20,9 +20,11 @@ class Entry:
     """A finding: what it is (`about`), its `values` by name (the unit in the name's suffix), and the `command` that
     computes them.
 
-    `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with. `stated`
-    holds, per document of the repository, the phrases that state the finding there. `note` says where the values come
-    from when the command did not write them itself.
+    `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with, and
+    `code` the digest (`benchmarks.code`) of the modules that it `rests_on` besides: criteria, methods and experiments,
+    as folders and files of the package (empty: it was computed before there were digests). `stated` holds,
+    per document of the repository, the phrases that state the finding there. `note` says where the values come from
+    when the command did not write them itself.
     """
 
     name: str
@@ -31,6 +33,8 @@ class Entry:
     command: str
     computed: date
     equations: int
+    rests_on: tuple[str, ...] = ()
+    code: str = ""
     stated: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     note: str = ""
 
@@ -65,7 +69,7 @@ def value(entry: str, name: str) -> float:
 
 def _entry(name: str, row: dict) -> Entry:
     stated = {document: tuple(phrases) for document, phrases in row.pop("stated", {}).items()}
-    return Entry(name=name, stated=stated, **row)
+    return Entry(name=name, stated=stated, rests_on=tuple(row.pop("rests_on", ())), **row)
 
 
 def _file() -> dict:

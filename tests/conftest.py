@@ -9,7 +9,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from refusals import Refused
+from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
@@ -74,3 +74,9 @@ def snapshots(pytestconfig: pytest.Config) -> Snapshots:
 def refused(request: pytest.FixtureRequest, snapshots: Snapshots) -> Refused:
     """Inputs that this test has refused."""
     return Refused(request.node.nodeid.removeprefix("tests/"), snapshots)
+
+
+@pytest.fixture
+def wording(refused: Refused) -> Wording:
+    """What this test's warnings, reasons and sentences say: kept with the messages."""
+    return refused.says

@@ -1,8 +1,8 @@
-"""Inputs that are refused: by which key, in one message, which tests/snapshots/messages.txt keeps."""
+"""Messages, which tests/snapshots/messages.txt keeps: those of inputs that are refused, by which key, and others."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -10,6 +10,9 @@ import pytest
 from snapshots import Snapshots, masked
 
 from friso.errors import InputError
+
+Wording = Callable[[str], None]
+"""Compares the next text of a test with what is kept of it."""
 
 
 @dataclass

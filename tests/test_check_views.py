@@ -27,6 +27,7 @@ from made_up import (
     settles,
 )
 from pages import Page, packed_values
+from refusals import Wording
 from snapshots import Snapshots
 
 from friso.hunting import Judgement, Kick, Margin
@@ -427,12 +428,12 @@ def test_conclusion_names_what_the_joint_does(snapshots):
     assert conclusion({"locked": hunting, "free": failed}) is None
 
 
-def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it() -> None:
+def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it(wording: Wording) -> None:
     """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz, which is rounded upward."""
     sure, unsure = (Margin(1.2187, 9.7496, certain, 1.2248) for certain in (True, False))
     for edge in (sure, unsure):
         assert "to 9.80 Hz" in sentence(hunts(margin=edge))
-    assert "not certain" in sentence(hunts(margin=unsure))
+    wording(sentence(hunts(margin=unsure)))
     assert row("Edge of hunting", hunts(margin=unsure)) == "somewhere between 9.749 Hz and 9.799 Hz (not certain)"
     below = sentence(settles(margin=replace(unsure, factor=0.91234, crossover=7.29872, quiet=0.92)))
     assert "7.298 Hz" in below

@@ -8,6 +8,7 @@ from snapshots import Snapshots
 
 from benchmarks import evidence as command
 from benchmarks.canonical import differ, reference_numbers
+from benchmarks.code import DIGITS, code_digest, computed
 from friso.evidence import entries, equations, value
 from friso.studies.guideline.parasitic import ParasiticLimits
 from friso.views.guideline.words import parasitic_sentences
@@ -26,6 +27,30 @@ def test_the_equations_are_those_on_file() -> None:
 def test_no_finding_is_older_than_the_equations() -> None:
     outdated = command.old(entries())
     assert not outdated, f"compute again by python -m benchmarks.evidence {' '.join(outdated)}"
+
+
+def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
+    """Where criteria, methods or experiments have changed since, every document that states it says of which day it is;
+    `python -m benchmarks.evidence` computes it again."""
+    old = {name: entries()[name] for name in command.older_than_code(entries())}
+    undated = [
+        (name, document)
+        for name, entry in old.items()
+        for document in entry.stated
+        if f"{entry.computed.day} {entry.computed:%B %Y}"
+        not in " ".join((ROOT / document).read_text(encoding="utf-8").split())
+    ]
+    assert undated == []
+
+
+def test_a_digest_holds_what_is_computed_and_not_its_words() -> None:
+    source = 'def f(x, y=2):\n    """Doc."""\n    z = x + y\n    return np.mean(z), f"mean {z}"\n'
+    words = source.replace("z", "total").replace("Doc", "Other").replace('"mean ', '"average ')
+    assert computed(source) == computed(words)
+    others = [source.replace(*pair) for pair in (("=2", "=3"), ("np.mean", "np.median"), ("+", "-"), ("y=2", "y"))]
+    assert len({computed(source), *map(computed, others)}) == 5
+    assert len(code_digest(["hunting/criteria"])) == DIGITS
+    assert code_digest([]) == ""
 
 
 def test_a_finding_of_an_earlier_revision_is_outdated(monkeypatch: pytest.MonkeyPatch) -> None:

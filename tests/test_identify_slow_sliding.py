@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import Refused, Wording
 from rig_machines import EXAMPLE, built
 
 import friso
@@ -144,31 +144,29 @@ def reason(log: Log, known: MassOnBristles | None = KNOWN) -> str:
     return found.estimates[2].reason
 
 
-def test_what_a_log_cannot_show_is_told(refused: Refused) -> None:
+def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> None:
     assert "--as presliding" in reason(sliding(), None)
     assert "delay" in stribeck_from_slow_sliding(sliding(), replace(THERE, delay=None), KNOWN).estimates[0].reason
     short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
     assert "1500 samples" in reason(short)
     still = record("x", DT, position=np.full(5000, 0.1), force=np.arange(5000.0))
-    assert "stand out from the noise" in reason(still)
-    assert "force does not change" in reason(
-        replace(sliding(), signals={**sliding().signals, "force": np.zeros(20000)})
-    )
+    wording(reason(still))
+    wording(reason(replace(sliding(), signals={**sliding().signals, "force": np.zeros(20000)})))
     quick = record("x", DT, position=1e-6 * np.sin(2 * np.pi * 1500 * DT * np.arange(9000)), force=np.arange(9000.0))
-    assert "or less is needed" in reason(quick)
-    assert "no faster than" in reason(sliding(swing=0.4e-3, mean=0.4e-3))
+    wording(reason(quick))
+    wording(reason(sliding(swing=0.4e-3, mean=0.4e-3)))
     unlike = sliding()
     unlike = replace(unlike, signals={**unlike.signals, "force": np.roll(unlike["force"], 150)})
-    assert "not explained" in reason(unlike)
+    wording(reason(unlike))
     with refused("force"):
         stribeck_from_slow_sliding(record("x", DT, position=np.zeros(9000)), THERE, KNOWN)
 
 
-def test_level_friction_shows_its_level_alone() -> None:
+def test_level_friction_shows_its_level_alone(wording: Wording) -> None:
     found = stribeck_from_slow_sliding(sliding(coulomb=STATIC), THERE, KNOWN)
     coulomb, static, stribeck = found.estimates
     assert coulomb.value == pytest.approx(STATIC, rel=0.02)
-    assert "no rise" in static.reason
+    wording(static.reason)
     assert not stribeck.determined
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from refusals import Refused
+from refusals import Refused, Wording
 from scipy.io import savemat
 
 from friso.errors import InputError
@@ -48,7 +48,7 @@ def message(tmp_path: Path, names: list[str], values: list[np.ndarray], mapping:
     return str(caught.value)
 
 
-def test_a_log_in_si_units(tmp_path: Path) -> None:
+def test_a_log_in_si_units(tmp_path: Path, wording: Wording) -> None:
     log = log_of(tmp_path, NAMES, columns())
     assert log.name == "a"
     assert log.sample_time == pytest.approx(1e-3, rel=1e-12)
@@ -56,8 +56,7 @@ def test_a_log_in_si_units(tmp_path: Path) -> None:
     for role in ("position", "velocity", "force"):
         assert log[role] == pytest.approx(M[role], rel=1e-12, abs=1e-15)
         assert log.unit(role) == ROLES[role]
-    assert told(log.read, "delimiter comma")
-    assert told(log.read, 'the name says "position"')
+    wording("\n".join(log.read))
     assert not log.warnings
 
 
@@ -77,9 +76,9 @@ def test_roles_by_name(name: str, role: str | None) -> None:
     assert (role_of(name) or (None,))[0] == role
 
 
-def test_two_candidates_are_listed(tmp_path: Path) -> None:
+def test_two_candidates_are_listed(tmp_path: Path, wording: Wording) -> None:
     text = message(tmp_path, ["time [s]", "enc1 [mm]", "enc2 [mm]", "force [N]"], columns())
-    assert '2 candidates: "enc1" and "enc2"' in text
+    wording(text)
     assert "--map position=enc1" in text
 
 
@@ -95,10 +94,8 @@ def test_an_exact_name_wins(first: str, others: list[str], tmp_path: Path) -> No
     assert told(log.read, f'the name is "{first}"')
 
 
-def test_two_names_that_are_alike_are_still_asked_for(tmp_path: Path) -> None:
-    assert '2 candidates: "force a" and "force b"' in message(
-        tmp_path, [*NAMES[:3], "force a [N]", "force b [N]"], [*columns(), M["force"]]
-    )
+def test_two_names_that_are_alike_are_still_asked_for(tmp_path: Path, wording: Wording) -> None:
+    wording(message(tmp_path, [*NAMES[:3], "force a [N]", "force b [N]"], [*columns(), M["force"]]))
 
 
 def test_velocities_of_which_none_is_needed_are_left_out(tmp_path: Path) -> None:
@@ -133,9 +130,9 @@ def test_time_is_never_proposed_for_another_role(tmp_path: Path) -> None:
     assert caught.value.options == ()
 
 
-def test_no_candidate_lists_the_channels(tmp_path: Path) -> None:
+def test_no_candidate_lists_the_channels(tmp_path: Path, wording: Wording) -> None:
     text = message(tmp_path, ["time [s]", "a [mm]", "b", "force [N]"], columns())
-    assert "one of the channels time [s], a [mm], b, force [N]" in text
+    wording(text)
 
 
 def test_a_mapped_name_that_is_not_there(tmp_path: Path) -> None:
@@ -144,9 +141,9 @@ def test_a_mapped_name_that_is_not_there(tmp_path: Path) -> None:
     assert '--map position="position"' in text
 
 
-def test_no_units(tmp_path: Path) -> None:
+def test_no_units(tmp_path: Path, wording: Wording) -> None:
     text = message(tmp_path, ["time [s]", "position", "velocity [m/s]", "force [N]"], columns())
-    assert '"position", which has no unit' in text
+    wording(text)
     assert "--unit position=mm" in text
     log = log_of(
         tmp_path,
@@ -169,13 +166,13 @@ def test_current_needs_a_scale(tmp_path: Path) -> None:
     assert log["force"] == pytest.approx(M["force"] * 1e-3)
 
 
-def test_disturbance_in_volts(tmp_path: Path) -> None:
+def test_disturbance_in_volts(tmp_path: Path, wording: Wording) -> None:
     pulses = np.where(M["time"] % 0.5 < 0.05, 0.4, 0.0)
     names = ["time [s]", "position [mm]", "pulses_N", "force [N]"]
     mapping = from_options(["disturbance=pulses_N"], scales=["disturbance=35.15 N/V"])
     log = log_of(tmp_path, names, [M["time"], M["position"] * 1e3, pulses, M["force"]], mapping)
     assert log["disturbance"] == pytest.approx(35.15 * pulses)
-    assert told(log.read, "taken to be in V as the scale implies")
+    wording("\n".join(log.read))
 
 
 def test_unknown_units_are_kept_where_allowed(tmp_path: Path) -> None:
@@ -245,10 +242,10 @@ def test_no_counter_is_left_as_it_is() -> None:
         assert unwrapped(values)[1] == 0
 
 
-def test_the_log_tells_of_the_counter(tmp_path: Path) -> None:
+def test_the_log_tells_of_the_counter(tmp_path: Path, wording: Wording) -> None:
     counts = (np.arange(2000.0) * 40) % 65536
     log = log_of(tmp_path, ["time [s]", "position [mm]"], [M["time"], counts])
-    assert told(log.warnings, "a 16-bit counter")
+    wording("\n".join(log.warnings))
     assert log["position"][-1] == pytest.approx(1999 * 40e-3)
 
 
@@ -260,41 +257,43 @@ def test_gaps_split_and_are_not_bridged(tmp_path: Path) -> None:
     assert log.time == pytest.approx(M["time"][keep])
 
 
-def test_nan_splits_and_is_counted(tmp_path: Path) -> None:
+def test_nan_splits_and_is_counted(tmp_path: Path, wording: Wording) -> None:
     values = columns()
     values[3] = values[3].copy()
     values[3][500:503] = np.nan
     log = log_of(tmp_path, NAMES, values)
     assert log.segments == (slice(0, 500), slice(500, 1997))
-    assert told(log.read, "force: 3 samples that are not numbers")
+    wording("\n".join(log.read))
     assert all(np.isfinite(each).all() for each in log.signals.values())
     values[3][100:1400] = np.nan
     assert "1300 of 2000" in message(tmp_path, NAMES, values)
 
 
-def test_decreasing_time(tmp_path: Path) -> None:
+def test_decreasing_time(tmp_path: Path, wording: Wording) -> None:
     time = M["time"].copy()
     time[900:] -= 0.3
     assert "decreases" in message(tmp_path, NAMES, [time, *columns()[1:]])
-    assert "at sample 901" in message(tmp_path, NAMES, [time, *columns()[1:]])
+    text = message(tmp_path, NAMES, [time, *columns()[1:]])
+    assert "901" in text
+    wording(text)
 
 
-def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path) -> None:
+def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path, wording: Wording) -> None:
     again = np.sort(np.r_[0:2000, 300, 301])
     log = log_of(tmp_path, NAMES, [each[again] for each in columns()])
     assert log.time.size == 2000
-    assert told(log.read, "2 samples repeated")
+    wording("\n".join(log.read))
     text = message(tmp_path, NAMES, [np.round(M["time"], 2), *columns()[1:]])
     assert "--dt" in text
 
 
-def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
+def test_jitter_is_interpolated_and_told(tmp_path: Path, wording: Wording) -> None:
     rng = np.random.default_rng(1)
     time = M["time"] + 1e-4 * rng.uniform(-1, 1, 2000)
     exact = log_files.motion(2000)["position"]
     late = np.interp(time, M["time"], exact)
     log = log_of(tmp_path, ["time [s]", "position [m]"], [time, late])
-    assert told(log.warnings, "interpolated onto uniform time stamps")
+    wording("\n".join(log.warnings))
     assert np.diff(log.time) == pytest.approx(log.sample_time)
     assert np.abs(log["position"] - np.interp(log.time, M["time"], exact)).max() < 1e-4 * np.abs(M["velocity"]).max()
 
@@ -322,11 +321,11 @@ def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
     assert clipped_share(values[3]) == 0
 
 
-def test_values_held(tmp_path: Path) -> None:
+def test_values_held(tmp_path: Path, wording: Wording) -> None:
     assert held(np.repeat(M["position"][:200], 4)) == 4
     assert held(M["position"]) == 1
     log = log_of(tmp_path, NAMES, [*columns()[:3], np.repeat(M["force"][::5], 5)])
-    assert told(log.warnings, "holds each value for 5 samples")
+    wording("\n".join(log.warnings))
 
 
 @pytest.mark.parametrize(
@@ -337,10 +336,10 @@ def test_velocity_against_position(tmp_path: Path, factor: float, said: str) -> 
     assert told(log.warnings, said)
 
 
-def test_velocity_of_another_body(tmp_path: Path) -> None:
+def test_velocity_of_another_body(tmp_path: Path, wording: Wording) -> None:
     rng = np.random.default_rng(2)
     log = log_of(tmp_path, NAMES, [*columns()[:2], np.cumsum(rng.standard_normal(2000)), columns()[3]])
-    assert told(log.warnings, "does not follow")
+    wording("\n".join(log.warnings))
 
 
 @pytest.mark.parametrize("true", [-3.4, 0.0, 0.5, 7.25])
@@ -373,7 +372,7 @@ def test_friction_is_no_delay(tmp_path: Path) -> None:
     assert float(rest.split()[0]) == pytest.approx(4, abs=0.1)
 
 
-def test_channels_of_different_rates(tmp_path: Path) -> None:
+def test_channels_of_different_rates(tmp_path: Path, wording: Wording) -> None:
     fast = 0.25e-3 * np.arange(8000)
     groups = [
         (0.25, [("ActPos", "mm", 50 * np.sin(7 * fast))]),
@@ -384,7 +383,7 @@ def test_channels_of_different_rates(tmp_path: Path) -> None:
     assert log.time.size == 1800  # the common span
     assert log["position"] == pytest.approx(0.05 * np.sin(7 * log.time), rel=1e-9, abs=1e-12)
     assert log["force"] == pytest.approx(np.cos(7 * log.time), rel=1e-9, abs=1e-12)
-    assert told(log.warnings, "without an anti-aliasing filter")
+    wording("\n".join(log.warnings))
 
 
 def test_no_common_span(refused: Refused) -> None:
@@ -490,19 +489,19 @@ def test_a_mapping_that_names_a_channel_that_is_gone(tmp_path: Path) -> None:
     assert '"gone"' in message(tmp_path, NAMES, columns(), from_options(["cart_position=gone"]))
 
 
-def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path) -> None:
+def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path, wording: Wording) -> None:
     log = log_of(tmp_path, ["time", *NAMES[1:]], columns(), from_options(units=["time=ms"]))
     assert log.sample_time == pytest.approx(1e-6)
     log = log_of(tmp_path, NAMES, columns(), from_options(units=["time=ms"]))  # over what the file says
     assert log.sample_time == pytest.approx(1e-6)
-    assert told(log.read, "time: time (column 1), in ms")
+    wording("\n".join(log.read))
 
 
-def test_two_time_columns_without_units(tmp_path: Path) -> None:
+def test_two_time_columns_without_units(tmp_path: Path, wording: Wording) -> None:
     slow = 4.0 * np.arange(500)
     values = [M["time"] * 1e3, M["position"] * 1e3, slow, np.cos(slow)]
     names = ["t1", "position [mm]", "t2", "force [N]"]
-    assert '2 candidates: "t1" and "t2"' in message(tmp_path, names, values)
+    wording(message(tmp_path, names, values))
     log = log_of(tmp_path, names, values, from_options(units=["t1=ms", "t2=ms"]))
     assert log.sample_time == pytest.approx(4e-3)
     assert log["position"] == pytest.approx(M["position"][::4])
@@ -514,9 +513,9 @@ def test_a_damaged_number(tmp_path: Path) -> None:
     assert "values up to 1e+197 m" in message(tmp_path, NAMES, values)
 
 
-def test_a_scale_without_a_channel(tmp_path: Path) -> None:
+def test_a_scale_without_a_channel(tmp_path: Path, wording: Wording) -> None:
     mapping = from_options(scales=["acceleration=9.81 m/s^2/V"])
-    assert "a scale for acceleration, which has no channel" in message(tmp_path, NAMES, columns(), mapping)
+    wording(message(tmp_path, NAMES, columns(), mapping))
 
 
 def record(name: str) -> Path:
@@ -525,7 +524,7 @@ def record(name: str) -> Path:
     return DATA / name
 
 
-def test_emps() -> None:
+def test_emps(wording: Wording) -> None:
     options = ["time=t", "reference=qg", "position=qm", "force=vir"]
     log = read_log(record("emps/DATA_EMPS.mat"), from_options(options, scales=["force=35.1507 N/V"]))
     assert log.time.size == 24841
@@ -534,7 +533,7 @@ def test_emps() -> None:
     assert np.ptp(log["position"]) == pytest.approx(0.2464, abs=1e-4)
     assert log.scalars["gtau"] == pytest.approx(35.1507, abs=1e-4)
     assert log.scalars["kp"] == pytest.approx(160.18, abs=0.01)
-    assert told(log.warnings, "qm has no unit")
+    wording("\n".join(log.warnings))
 
 
 def test_ku_leuven() -> None:
@@ -547,7 +546,7 @@ def test_ku_leuven() -> None:
     assert np.abs(log["force"]).max() == pytest.approx(0.5, abs=1e-3)
 
 
-def test_tokyo_bench() -> None:
+def test_tokyo_bench(wording: Wording) -> None:
     path = record("utokyo_motorbench/MultisineTypeA.mat")
     options = from_options(["position=theta_mx", "force=iq_adx"], ["theta_mx=rad", "iq_adx=A"])
     with pytest.raises(InputError, match=r'--dt "0\.4 ms", if fs = 2500'):
@@ -556,10 +555,10 @@ def test_tokyo_bench() -> None:
     assert log.time.size == 50000
     assert log.units == {"position": "rad", "force": "A"}
     assert log.scalars["nrofs"] == 2500
-    assert told(log.read, "BA (tf)")
+    wording("\n".join(log.read))
 
 
-def test_twincat_filled_with_the_previous_value(tmp_path: Path) -> None:
+def test_twincat_filled_with_the_previous_value(tmp_path: Path, wording: Wording) -> None:
     """Scope can repeat the samples of a slow group, stamp and value, to have all rows full."""
     again = np.repeat(np.arange(500), 4)
     slow = np.cos(4e-3 * np.arange(500))
@@ -578,4 +577,4 @@ def test_twincat_filled_with_the_previous_value(tmp_path: Path) -> None:
     assert log.sample_time == pytest.approx(4e-3)
     assert log["force"] == pytest.approx(np.cos(log.time))
     assert log["position"] == pytest.approx(0.05 * np.sin(7 * log.time))
-    assert told(log.read, "1500 samples repeated")
+    wording("\n".join(log.read))

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from refusals import Refused
+from refusals import Refused, Wording
 
 import friso
 from friso.identification.kind import as_set_up
@@ -50,8 +50,8 @@ def test_friction_without_what_is_looked_for_is_refused(built: Stage, refused: R
         presliding.run_experiment(none, 1, silent)
 
 
-def test_a_loop_that_swings_between_its_limits_is_told(built: Stage) -> None:
+def test_a_loop_that_swings_between_its_limits_is_told(built: Stage, wording: Wording) -> None:
     """Logs that end at once show no passes: their page is written all the same."""
     outcome = constant_speed.run_experiment(built.replace({"controller.crossover": "500 Hz"}), 1, silent)
     assert all(log.failure for log in outcome.logs)
-    assert "0 steady passes: the log stopped after" in " ".join(sentences(outcome))
+    wording(" ".join(sentences(outcome)))
