@@ -1,6 +1,7 @@
 """Findings on file: with which equations they were computed, and that documents state what is on file."""
 
 import copy
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -8,7 +9,8 @@ from snapshots import Snapshots
 
 from benchmarks import evidence as command
 from benchmarks.canonical import differ, reference_numbers
-from benchmarks.code import DIGITS, code_digest, computed
+from benchmarks.code import DIGITS, code_digest
+from benchmarks.code import computed as syntax
 from friso.evidence import entries, equations, value
 from friso.studies.guideline.parasitic import ParasiticLimits
 from friso.views.guideline.words import parasitic_sentences
@@ -29,16 +31,19 @@ def test_no_finding_is_older_than_the_equations() -> None:
     assert not outdated, f"compute again by python -m benchmarks.evidence {' '.join(outdated)}"
 
 
+def day(computed: date) -> str:
+    """As documents write it."""
+    return f"{computed.day} {computed:%B %Y}"
+
+
 def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
     """Where criteria, methods or experiments have changed since, every document that states it says of which day it is;
     `python -m benchmarks.evidence` computes it again."""
-    old = {name: entries()[name] for name in command.older_than_code(entries())}
     undated = [
         (name, document)
-        for name, entry in old.items()
-        for document in entry.stated
-        if f"{entry.computed.day} {entry.computed:%B %Y}"
-        not in " ".join((ROOT / document).read_text(encoding="utf-8").split())
+        for name in command.older_than_code(entries())
+        for document in entries()[name].stated
+        if day(entries()[name].computed) not in " ".join((ROOT / document).read_text(encoding="utf-8").split())
     ]
     assert undated == []
 
@@ -46,9 +51,9 @@ def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
 def test_a_digest_holds_what_is_computed_and_not_its_words() -> None:
     source = 'def f(x, y=2):\n    """Doc."""\n    z = x + y\n    return np.mean(z), f"mean {z}"\n'
     words = source.replace("z", "total").replace("Doc", "Other").replace('"mean ', '"average ')
-    assert computed(source) == computed(words)
+    assert syntax(source) == syntax(words)
     others = [source.replace(*pair) for pair in (("=2", "=3"), ("np.mean", "np.median"), ("+", "-"), ("y=2", "y"))]
-    assert len({computed(source), *map(computed, others)}) == 5
+    assert len({syntax(source), *map(syntax, others)}) == 5
     assert len(code_digest(["hunting/criteria"])) == DIGITS
     assert code_digest([]) == ""
 
