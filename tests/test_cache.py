@@ -18,6 +18,7 @@ from friso.engine import building, cache, private, prune
 from friso.engine.cache import DAY
 from friso.engine.prune import KEPT_FOR
 from friso.engine.seal import LENGTH, SECRET, read_sealed, write_sealed
+from friso.whole_file import PARTIAL
 
 BUILDER = """
 import os
@@ -239,7 +240,7 @@ def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
-    drafts = [copied / "kernels" / f"{name}.kernel.x{private.DRAFT}" for name in ("old", "new")]
+    drafts = [copied / "kernels" / f"{name}.kernel.x{PARTIAL}" for name in ("old", "new")]
     for draft in drafts:
         draft.write_bytes(b"half")
     aged(2 * DAY, drafts[0])

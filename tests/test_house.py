@@ -16,7 +16,7 @@ PACKAGE = Path(friso.__file__).parent
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "CONTRIBUTING.md"
 
-KNOW_CONTROLLERS = ("equations/controllers/", "stage/", "templates/")
+KNOW_CONTROLLERS = ("equations/controllers/", "stage/stage.py", "stage/standstill.py", "templates/")
 """Where keys of a controller may be named: its own files, the stage file's schema, and the template of one."""
 
 SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.py"}

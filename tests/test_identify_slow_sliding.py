@@ -150,7 +150,7 @@ def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> N
     short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
     assert "1500 samples" in reason(short)
     still = record("x", DT, position=np.full(5000, 0.1), force=np.arange(5000.0))
-    wording(reason(still))
+    assert "noise" in reason(still)
     wording(reason(replace(sliding(), signals={**sliding().signals, "force": np.zeros(20000)})))
     quick = record("x", DT, position=1e-6 * np.sin(2 * np.pi * 1500 * DT * np.arange(9000)), force=np.arange(9000.0))
     wording(reason(quick))

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 import stat
-import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from friso.system import closed_to_others, foreign_writers, replace_file
+from friso.system import closed_to_others, foreign_writers
+from friso.whole_file import FOR_USER, whole_file
 
 
 def make_private(folder: Path) -> None:
@@ -54,16 +54,5 @@ def read_private(path: Path) -> bytes:
 
 def write_private(path: Path, content: bytes) -> None:
     """Write a file for this user alone, whole or not at all. Raises OSError."""
-    descriptor, name = tempfile.mkstemp(prefix=f"{path.name}.", suffix=DRAFT, dir=path.parent)
-    draft = Path(name)
-    try:
-        with open(descriptor, "wb") as file:
-            file.write(content)
-        replace_file(draft, path)
-    except BaseException:
-        draft.unlink(missing_ok=True)
-        raise
-
-
-DRAFT = ".draft"
-"""How the name of a file ends that is being written."""
+    with whole_file(path, FOR_USER) as file:
+        file.write(content)

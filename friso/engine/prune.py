@@ -9,7 +9,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
-from friso.engine.private import DRAFT
+from friso.whole_file import PARTIAL
 
 KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
 """How long [s] what is not used is kept, and how much [bytes]; what was used within a day is kept in any case."""
@@ -24,7 +24,7 @@ def prune(folder: Path) -> None:
             for used, file, length in sorted(_used(folder), reverse=True):
                 size += length
                 age = now - used
-                unfinished = file.suffix == DRAFT and age > DAY
+                unfinished = file.suffix == PARTIAL and age > DAY
                 if unfinished or age > KEPT_FOR or (age > DAY and size > KEPT_IN_ALL):
                     _delete(file)
     except (Timeout, OSError) as error:  # another process is at it; it is no reason to stop
@@ -34,7 +34,7 @@ def prune(folder: Path) -> None:
 def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
     """When each entry, request and draft was used last [s], and its size [bytes]."""
     for file in folder.iterdir():
-        if file.suffix in (ENTRY, REQUEST, DRAFT):
+        if file.suffix in (ENTRY, REQUEST, PARTIAL):
             status = file.lstat()
             yield status.st_mtime, file, status.st_size
 

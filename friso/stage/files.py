@@ -11,7 +11,7 @@ from friso.errors import InputError, StageError
 from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.stage import Stage
-from friso.system import replace_file
+from friso.whole_file import whole_file
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -54,14 +54,11 @@ def write_whole(text: str, path: Path, overwrite: bool) -> None:
     """Write a text file, all of it or nothing. Raises InputError as `save` does."""
     if path.exists() and not overwrite:
         raise InputError("", "a file that already exists", "a new file, or permission to overwrite", origin=str(path))
-    draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        draft.write_text(text, encoding="utf-8", newline="\n")
-        replace_file(draft, path)
+        with whole_file(path) as file:
+            file.write(text.encode())
     except OSError as error:
         raise InputError("", _reason(error), "a writable location", origin=str(path)) from error
-    finally:
-        draft.unlink(missing_ok=True)
 
 
 def parse_set(text: str) -> tuple[str, Any]:

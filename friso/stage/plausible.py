@@ -35,7 +35,6 @@ _TIME = _Usual(1e-7, 1e5, "s", ("ms", "us", "ns", "s"))
 _USUAL: Mapping[str, _Usual] = {
     "masses.cart": _MASS,
     "masses.stage": _MASS,
-    "controller.crossover": _FREQUENCY,
     "parasitic.frequency": _FREQUENCY,
     "joint.stroke": _LENGTH,
     "motion.size": _LENGTH,
@@ -63,7 +62,9 @@ _ROTARY: Mapping[str, _Usual] = {
 def doubts(stage: Stage) -> Iterator[str]:
     """A sentence on each value that is hardly meant: key, value, and the unit that probably was."""
     flat = stage.flat()
-    usual_values = _ROTARY if stage.axis_kind == ROTARY else _usual(flat)
+    usual_values = dict(_ROTARY) if stage.axis_kind == ROTARY else _usual(flat)
+    if (bandwidth := stage.controller and stage.controller.bandwidth_key) is not None:
+        usual_values[bandwidth] = _FREQUENCY
     for key, usual in usual_values.items():
         value = flat.get(key)
         if value and not usual.low <= value <= usual.high:

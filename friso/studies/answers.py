@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import uuid
 import zipfile
 import zlib
 from itertools import count
@@ -13,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from friso.studies.cells import WORDS, Columns
-from friso.studies.metadata import PARTIAL
 from friso.studies.refine import Ask
-from friso.system import replace_file
+from friso.whole_file import whole_file
 
 
 class Answers:
@@ -34,11 +32,9 @@ class Answers:
             if (stored := _answer(file, cells)) is not None:
                 return stored
             columns = ask(cells)
-            draft = file.with_name(f"{file.name}.{uuid.uuid4().hex}{PARTIAL}")
-            with draft.open("wb") as stream:
+            with whole_file(file) as stream:
                 arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
                 np.savez_compressed(stream, cells=cells, **arrays)
-            replace_file(draft, file)
             return columns
 
         return answer

@@ -9,15 +9,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
-import uuid
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from friso.errors import StoreError
-from friso.system import replace_file
+from friso.whole_file import whole_file
 
 FORMAT = 2
 """Version of what friso writes into a store."""
@@ -136,20 +134,8 @@ def is_store(path: Path) -> bool:
 
 def put(file: Path, content: bytes) -> None:
     """Write a file of a store, whole or not at all, for whom the user lets read files. Raises OSError."""
-    draft = file.with_name(f"{file.name}.{uuid.uuid4().hex}{PARTIAL}")
-    try:
-        with draft.open("wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        replace_file(draft, file)
-    except BaseException:
-        draft.unlink(missing_ok=True)
-        raise
-
-
-PARTIAL = ".partial"
-"""How the names of files end that are being written, these and Zarr's, after 32 digits."""
+    with whole_file(file) as stream:
+        stream.write(content)
 
 
 def digest_of(file: Path) -> str | None:

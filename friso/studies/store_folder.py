@@ -7,7 +7,6 @@ Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a f
 
 from __future__ import annotations
 
-import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
@@ -20,8 +19,8 @@ from filelock import FileLock, Timeout
 from friso.errors import StoreError
 from friso.interrupts import held
 from friso.leftovers import is_leftover, remove_leftover
-from friso.studies.metadata import PARTIAL
 from friso.system import MOVES_OPEN_FOLDERS, rename_folder
+from friso.whole_file import PARTIAL, is_partial
 
 LOCK = ".friso.lock"
 """The file that is locked while a store is written to."""
@@ -76,11 +75,8 @@ def remove_partial_files(path: Path) -> None:
     """Remove files that were being written when their process was killed, from a store that is locked: whoever writes
     into it holds the lock."""
     for file in path.rglob(f"*{PARTIAL}"):
-        if _PARTIAL.fullmatch(file.name):
+        if is_partial(file):
             file.unlink(missing_ok=True)
-
-
-_PARTIAL = re.compile(rf".*\.[0-9a-f]{{32}}{re.escape(PARTIAL)}")
 
 
 @contextmanager

@@ -20,8 +20,8 @@ from friso.hunting.edges import ROUNDS, Edges, find_edges, joined
 from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
-from friso.system import replace_file
 from friso.version import VERSION
+from friso.whole_file import whole_file
 
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
 
@@ -126,11 +126,9 @@ class Keep:
                 return Edges(**{field.name: stored[field.name] for field in fields(Edges)})
         edges = make()
         self.folder.mkdir(parents=True, exist_ok=True)
-        half = path.with_suffix(".part")
-        with half.open("wb") as file:
+        with whole_file(path) as file:
             words = {"kind": edges.kind.astype(str)}
             np.savez(file, allow_pickle=False, **(vars(edges) | words))
-        replace_file(half, path)  # whole, or not there
         return edges
 
 

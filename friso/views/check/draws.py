@@ -58,7 +58,8 @@ def _sentence(fates: Fates, draws: Draws) -> str:
         f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}."
     ]
     if failed:
-        sentences.append(f"{failed} draws failed; the intervals cover both outcomes for them.")
+        draws, them = ("draw", "it") if failed == 1 else ("draws", "them")
+        sentences.append(f"{failed} {draws} failed; the intervals cover both outcomes for {them}.")
     if keys:
         key, how = next(iter(keys.items()))
         sentences.append(f"{key} matters most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")

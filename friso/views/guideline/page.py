@@ -25,7 +25,7 @@ from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STU
 from friso.version import VERSION
 from friso.views.files import Content, pictures
 from friso.views.guideline.figures import guideline_figures
-from friso.views.guideline.words import formulas, number, parasitic_edges, parasitic_sentences, percent
+from friso.views.guideline.words import formulas, log_error, number, parasitic_edges, parasitic_sentences
 from friso.views.pages import environment
 
 PAGE, TABLE = "guideline.md", "guideline_edges.csv"
@@ -87,7 +87,7 @@ def guideline_page(guideline: Guideline) -> str:
         errors_of=_errors(guideline),
         number=number,
         span=_span_text,
-        percent=percent,
+        log_error=log_error,
         studied=STUDIED,
         rows=_rows,
         worst=_worst(guideline),

@@ -66,7 +66,7 @@ def number(value: float | None, digits: int = 3) -> str:
     return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
-def percent(off: float) -> str:
+def log_error(off: float) -> str:
     """An error of a logarithm as a share: 0.1 is 11 %."""
     return f"{100 * math.expm1(off):.0f} %"
 
@@ -76,7 +76,7 @@ def accuracy(guideline: Guideline) -> list[str]:
     fits = (("locked", guideline.locked.on_test), ("free", guideline.free.on_test))
     return [
         f"The law for the {case} joint predicts the edge of hunting of {errors.count} stages that it was not fitted to "
-        f"with an RMS error of {percent(errors.rms)}, {percent(errors.worst)} at worst."
+        f"with an RMS error of {log_error(errors.rms)}, {log_error(errors.worst)} at worst."
         for case, errors in fits
     ]
 

@@ -103,11 +103,6 @@ def digits(value: float, unit: str, count: int = 3) -> str:
     return f"{value * factor:.{count}g} {text}".rstrip()
 
 
-def percent(share: float) -> str:
-    """A share, to three digits."""
-    return f"{100 * share:.3g} %" if math.isfinite(share) else NOTHING
-
-
 def _scale(estimate: Estimate) -> tuple[float, str]:
     """Factor and unit with prefix that suit the value, or else the range that is possible."""
     finite = [estimate.low, estimate.high]

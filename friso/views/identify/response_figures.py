@@ -25,8 +25,9 @@ from friso.views.drawing.figure import (
     Panel,
     Series,
 )
+from friso.views.drawing.prefixes import percent
 from friso.views.identify.kind_view import AREA
-from friso.views.identify.numbers import percent, unit_of, with_interval
+from friso.views.identify.numbers import unit_of, with_interval
 
 FACTOR_COLOURS = (GREEN, BLUE, PINK)
 
@@ -178,7 +179,7 @@ def _amplitudes(bench: Bench, name: str) -> Figure:
     panel = Panel("", Axis.of_frequency(measured[0]), size, tuple(lines), limits=(level,))
     caption = (
         f"A mass with a Coulomb friction of {with_interval(bench.drag.coulomb)} on a spring, simulated with the "
-        f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left)} of the "
+        f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left, 3)} of the "
         "departure. The response depends on the size of the input: it is not linear."
     )
     return Figure(f"{name}_amplitudes", "Friction at low frequency", caption, (panel,))

@@ -10,10 +10,10 @@ import numpy as np
 from friso.identification.response.analysis import Bench
 from friso.identification.response.departure import Drag
 from friso.identification.response.mass_line import StraightLine
-from friso.views.drawing.prefixes import range_with_unit
+from friso.views.drawing.prefixes import percent, range_with_unit
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
-from friso.views.identify.numbers import digits, name_of, percent, with_interval
+from friso.views.identify.numbers import digits, name_of, with_interval
 from friso.views.identify.response_figures import response_figures
 
 
@@ -32,7 +32,7 @@ def _friction(bench: Bench) -> str:
     assert bench.explanation is not None
     share = 1 - bench.explanation.left
     verb = "explains" if share > 0.5 else "does not explain"
-    accounted = percent(max(share, 0.0))
+    accounted = percent(max(share, 0.0), 3)
     return f"A simulated mass with Coulomb friction on a spring {verb} this: it accounts for {accounted}."
 
 
@@ -78,7 +78,7 @@ def _headline(bench: Bench) -> str:
 def _outputs(errors: Sequence[float]) -> str:
     """Relative errors of the outputs, the driven mass's first."""
     names = ("driven mass", "other mass")
-    return ", ".join(f"{percent(error)} ({name})" for name, error in zip(names, errors, strict=False))
+    return ", ".join(f"{percent(error, 3)} ({name})" for name, error in zip(names, errors, strict=False))
 
 
 def _numbers(bench: Bench) -> dict[str, Any]:

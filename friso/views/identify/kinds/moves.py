@@ -10,11 +10,11 @@ from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.profile import Profile
 from friso.views.drawing.figure import Figure
-from friso.views.drawing.prefixes import range_with_unit
+from friso.views.drawing.prefixes import percent, range_with_unit
 from friso.views.identify.estimates import ends_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
 from friso.views.identify.moves_figures import FORCE, moves_figures, record_panels
-from friso.views.identify.numbers import digits, listed, percent, with_interval, within
+from friso.views.identify.numbers import digits, listed, with_interval, within
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
@@ -50,8 +50,8 @@ def _facts(moves: IdentifiedMoves) -> Facts:
         ("Bandwidth of the motion", digits(moves.inverse.bandwidth, "Hz")),
         ("Relative errors of the simulation", _errors(moves)),
         ("Residual force", f"{digits(residual.rms, moves.force_unit)} RMS, {correlation}"),
-        ("Share of its power explained", f"{percent(residual.by_position)} by position along the rail, "
-         f"{percent(residual.by_velocity)} by speed"),
+        ("Share of its power explained", f"{percent(residual.by_position, 3)} by position along the rail, "
+         f"{percent(residual.by_velocity, 3)} by speed"),
     )  # fmt: skip
 
 
@@ -59,15 +59,15 @@ def _errors(moves: IdentifiedMoves) -> str:
     """The relative errors of the simulated record; along the logged position, that of the force alone is meaningful."""
     errors = moves.errors
     if moves.loop is None:
-        return f"force {percent(errors.force)}"
+        return f"force {percent(errors.force, 3)}"
     return (
-        f"position {percent(errors.position)}, velocity {percent(errors.velocity)}, acceleration "
-        f"{percent(errors.acceleration)}, force {percent(errors.force)}"
+        f"position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, acceleration "
+        f"{percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}"
     )
 
 
 def _inverse_text(model: InverseModel) -> str:
-    return f"{listed(model.estimates)}; force error {percent(model.error)}"
+    return f"{listed(model.estimates)}; force error {percent(model.error, 3)}"
 
 
 def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
@@ -141,8 +141,8 @@ def _headline(moves: IdentifiedMoves) -> str:
 def _prediction_sentence(simulated: SimulatedLog) -> str:
     errors = simulated.errors
     return (
-        f"relative errors of position {percent(errors.position)}, velocity {percent(errors.velocity)}, acceleration "
-        f"{percent(errors.acceleration)}, force {percent(errors.force)}."
+        f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
+        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}."
     )
 
 
@@ -150,7 +150,7 @@ def _prediction_figures(log: Log, simulated: SimulatedLog, number: int) -> list[
     """The log as measured and as simulated."""
     caption = (
         f"{log.name}: simulated with the values identified from the other logs; relative error of the position "
-        f"{percent(simulated.errors.position)}, of the force {percent(simulated.errors.force)}."
+        f"{percent(simulated.errors.position, 3)}, of the force {percent(simulated.errors.force, 3)}."
     )
     panels = record_panels(log, simulated.part, simulated.simulated)
     return [Figure(f"identify_prediction{number}", f"Predicted: {log.name}", caption, panels)]
