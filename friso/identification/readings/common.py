@@ -209,3 +209,11 @@ def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """Either direction by name, with the mask of what belongs to it."""
     yield "forward", directions > 0
     yield "backward", directions < 0
+
+
+def stribeck_curve(
+    speeds: np.ndarray, coulomb: float, static: float, velocity: float, exponent: float = 2.0
+) -> np.ndarray:
+    """Friction [N] at steady speeds [m/s] without the viscous, of the shape of the speeds: Eq. 4 of the thesis, with
+    Coulomb and static friction [N], the Stribeck velocity [m/s] and the exponent."""
+    return coulomb + (static - coulomb) * np.exp(-((speeds / velocity) ** exponent))

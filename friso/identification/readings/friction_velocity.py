@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, by_t, t_value, ways
+from friso.identification.readings.common import Mean, by_t, stribeck_curve, t_value, ways
 from friso.identification.readings.passes import CUTOFF, Pass, on_common_places, passes, places_of
 from friso.intervals import COVERAGE
 
@@ -229,8 +229,8 @@ def _stribeck(
     plain = float(np.sum(((friction - line[0] - line[1] * speeds) / deviations) ** 2))
 
     def off(p: np.ndarray) -> np.ndarray:
-        rise = (p[2] - p[0]) * np.exp(-((speeds / np.exp(p[3])) ** 2))
-        return ((p[0] + p[1] * speeds / speeds.max() + rise) * scale - friction) / deviations
+        dry = stribeck_curve(speeds, p[0], p[2], np.exp(p[3]))
+        return ((dry + p[1] * speeds / speeds.max()) * scale - friction) / deviations
 
     def start(at: float) -> list[float]:
         return [line[0] / scale, line[1] * speeds.max() / scale, float(friction[np.argmin(speeds)]) / scale, np.log(at)]

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.readings.common import Mean, by_t, correlated_mean, t_value
+from friso.identification.readings.common import Mean, by_t, correlated_mean, stribeck_curve, t_value
 
 BRISTLE_RATE = 100.0
 """sigma_0 v_s [N/s] taken as the least there is where nothing better is known: that of Canudas de Wit et al. 1995; the
@@ -41,7 +41,7 @@ def break_away(
     exponent: float = 2.0,
 ) -> float:
     """Least force [N] at which LuGre friction breaks away while the force rises at `force_rate` [N/s]."""
-    level = coulomb + (static - coulomb) * np.exp(-(_SPEEDS**exponent))
+    level = stribeck_curve(_SPEEDS, coulomb, static, 1.0, exponent)
     creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
     return float(max(np.max(level * creep), coulomb))
 

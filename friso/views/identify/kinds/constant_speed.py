@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
+from friso.identification.readings.common import stribeck_curve
 from friso.identification.readings.friction_position import FrictionPosition
 from friso.identification.readings.friction_velocity import Direction, FrictionVelocity
 from friso.views.drawing.figure import (
@@ -112,11 +113,10 @@ def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
     """The curve fitted to one direction, over the velocities it was fitted to."""
     if not (direction.coulomb.determined and direction.viscous.determined):
         return []
-    size = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200)
-    friction = direction.coulomb.value + direction.viscous.value * size
-    if direction.static.determined and direction.stribeck_velocity.determined:
-        rise = direction.static.value - direction.coulomb.value
-        friction = friction + rise * np.exp(-((size / direction.stribeck_velocity.value) ** 2))
+    size, coulomb = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200), direction.coulomb.value
+    curved = direction.static.determined and direction.stribeck_velocity.determined
+    static, stribeck = (direction.static.value, direction.stribeck_velocity.value) if curved else (coulomb, np.inf)
+    friction = stribeck_curve(size, coulomb, static, stribeck) + direction.viscous.value * size
     sign = 1.0 if word == "forward" else -1.0
     return [Series(sign * size, sign * friction, f"fit, {word}", WAYS[word], "dashed")]
 

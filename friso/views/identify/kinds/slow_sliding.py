@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.identification.experiments.slow_sliding import SlowSliding
 from friso.identification.kind import Source
+from friso.identification.readings.common import stribeck_curve
 from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import TIME, Facts, KindView
@@ -70,7 +71,7 @@ def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
     if not all(estimate.determined for estimate in result.estimates):
         return ()
     speeds = np.linspace(0, float(np.abs(result.velocity).max()), CURVE)
-    level = coulomb + (static - coulomb) * np.exp(-((speeds / stribeck) ** result.exponent))
+    level = stribeck_curve(speeds, coulomb, static, stribeck, result.exponent)
     velocities, forces = (np.concatenate([-values[::-1], [np.nan], values]) for values in (speeds, level))
     return (Series(velocities, forces, "at steady velocity", BLUE, width=2.0),)
 
