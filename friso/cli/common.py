@@ -29,7 +29,7 @@ AS_BUILT = ("drive", "rail", "cable", "floor")
 
 StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
 Overrides = Annotated[
-    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: controller.crossover="12 Hz".')
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: masses.stage="0.6 kg".')
 ]
 RTOL_HELP = "Relative tolerance of the solver, 1e-12 to 1e-2."
 Tolerance = Annotated[str, typer.Option("--rtol", metavar="NUMBER", help=RTOL_HELP)]

@@ -65,7 +65,7 @@ def parse_set(text: str) -> tuple[str, Any]:
     """Key and value of a command line's KEY=VALUE; a value that is no TOML is a text. Raises InputError."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise InputError("", quoted(text), "KEY=VALUE", 'controller.crossover="12 Hz"', origin="--set")
+        raise InputError("", quoted(text), "KEY=VALUE", 'masses.stage="0.6 kg"', origin="--set")
     return key.strip(), _value(value.strip())
 
 

@@ -401,7 +401,7 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
     for depth, name in enumerate(path):
         place = place[_number(place, key, depth)] if isinstance(place, list) else place.setdefault(name, {})
         if not isinstance(place, dict | list):
-            raise StageError(key, "an unknown key", f"{name} is not a table", 'controller.crossover="12 Hz"')
+            raise StageError(key, "an unknown key", f"{name} is not a table", 'masses.stage="0.6 kg"')
     if isinstance(place, list):
         number = _number(place, key, len(path))
         if value is None:
