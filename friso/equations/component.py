@@ -87,7 +87,7 @@ class Clock:
 
 
 class gaussian(sp.Function):
-    """A normal deviate for a seed and the number of a sample, the same wherever it is asked for (`friso.engine`)."""
+    """A normal deviate for a seed and the number of a sample, the same in every lane and thread (`friso.engine`)."""
 
     nargs = 2
 

@@ -1,4 +1,4 @@
-"""What states are, and the motion from which runs begin, for all who use the equations without knowing their names."""
+"""What states are, and the motion from which runs begin, for modules that use states by role."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table [controller]: what the house asks of any controller, and the registry of controllers."""
+"""The table [controller]: what every controller declares, and the registry of controllers."""
 
 from collections.abc import Hashable, Mapping, Sequence
 from inspect import get_annotations
@@ -165,6 +165,6 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a controller that follow other keys of the stage, with the values that they have now: it is set once,
-    and knows nothing of machines that differ from the stage file."""
+    """The keys of a controller that follow other keys of the stage, with their present values: it is tuned once, for the
+    machine of the stage file."""
     return {key: flat[key] for key in controller_of(flat).with_defaults(flat)}

@@ -1,4 +1,4 @@
-"""Values of a stage file that are possible, but hardly meant: another unit is the likely reason."""
+"""Values of a stage file that are possible, but implausible: another unit is the likely reason."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ _ROTARY: Mapping[str, _Usual] = {
 
 
 def doubts(stage: Stage) -> Iterator[str]:
-    """A sentence on each value that is hardly meant: key, value, and the unit that probably was."""
+    """A sentence on each implausible value: key, value, and the unit that probably was."""
     flat = stage.flat()
     usual_values = dict(_ROTARY) if stage.axis_kind == ROTARY else _usual(flat)
     if (bandwidth := stage.controller and stage.controller.bandwidth_key) is not None:
