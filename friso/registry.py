@@ -42,7 +42,7 @@ class Registry(Generic[Declared]):
             return self.added[name][0]
         if name not in self:
             raise KeyError(name)
-        return getattr(import_module(self._module(name)), self.attribute)
+        return getattr(import_module(f"{self.package}.{name.replace('-', '_')}"), self.attribute)
 
     def one_line(self, name: str) -> str:
         """What is declared under a name, in one line without a full stop. Raises KeyError for an unknown name."""
@@ -63,6 +63,3 @@ class Registry(Generic[Declared]):
             return name
         nearest = next(iter(get_close_matches(name, names, 1, 0)), "")
         raise InputError(option, quoted(name), f"one of {', '.join(names)}", example.format(nearest))
-
-    def _module(self, name: str) -> str:
-        return f"{self.package}.{name.replace('-', '_')}"

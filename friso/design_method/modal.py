@@ -48,15 +48,12 @@ class Modal:
         return np.array([self._margin(float(value)) for value in np.atleast_1d(crossover)])
 
     def _margin(self, crossover: float) -> float:
-        keys = self._at(np.array(crossover))
+        keys = faster(self.flat, np.array(crossover) / bandwidth(self.flat))
         shape = controller(keys, self.omega)
         bare, loop = self.bare * shape, self.with_modes * shape
         settled = stability_by_poles(keys, self.members).abscissa < 0
         stable = settled & (np.abs(_turns((1 + loop) / (1 + bare))) < 0.5)
         return float(distance_to_lines(loop).min()) if stable.all() else 0.0
-
-    def _at(self, crossover: np.ndarray) -> dict[str, Any]:
-        return faster(self.flat, crossover / bandwidth(self.flat))
 
     @property
     def comfortable(self) -> tuple[Range, ...]:

@@ -165,6 +165,6 @@ def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
 
 
 def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The keys of a controller that follow other keys of the stage, with their present values: it is tuned once, for the
-    machine of the stage file."""
+    """The keys of a controller that follow other keys of the stage, with their present values: it is tuned once, for
+    the machine of the stage file."""
     return {key: flat[key] for key in controller_of(flat).with_defaults(flat)}

@@ -156,15 +156,11 @@ def _settled(
             continue
         bent, creep = _drifting(position[chosen])
         beyond, drift = _drifting(force[chosen] - secant * position[chosen])
-        if creep <= allowed * scale and drift <= SETTLED * abs(_force_scale(force)):
+        if creep <= allowed * scale and drift <= SETTLED * float(np.subtract(*np.percentile(force, [95, 5]))):
             time = log.time[[chosen.start, chosen.stop - 1]]
             level = beyond.value + secant * bent.value
             return Window(time[0], time[1], bent.value, level, float(np.hypot(beyond.error, drift / 12**0.5)))
     return None
-
-
-def _force_scale(force: np.ndarray) -> float:
-    return float(np.subtract(*np.percentile(force, [95, 5])))
 
 
 def _drifting(values: np.ndarray) -> tuple[Mean, float]:

@@ -251,8 +251,5 @@ def _end(case: Case) -> str:
     """What is left of the motion in its last quarter."""
     if case.peak_to_peak < _TEN_MICRON:
         return "at rest, but off its reference"
-    return f"still {at_the_end(case)} peak to peak{_every(case)}"
-
-
-def _every(case: Case) -> str:
-    return f" every {with_unit(case.period, 's')}" if case.period else ""
+    every = f" every {with_unit(case.period, 's')}" if case.period else ""
+    return f"still {at_the_end(case)} peak to peak{every}"

@@ -41,13 +41,12 @@ def formulas(guideline: Guideline) -> str:
 def _rates(law: FittedLaw) -> list[str]:
     return [
         f"{f'omega_{rate.name}':<12} = {number(law.factors[place])} {BASES[rate.name]}"
-        + "".join(f"  {_power(group, value)}" for group, value in sorted(law.of(place).items(), key=_order))
+        + "".join(
+            f"  {_power(group, value)}"
+            for group, value in sorted(law.of(place).items(), key=lambda item: [*GROUPS].index(item[0]))
+        )
         for place, rate in enumerate(law.law.rates)
     ]
-
-
-def _order(item: tuple[str, float]) -> int:
-    return list(GROUPS).index(item[0])
 
 
 def _power(group: str, exponent: float) -> str:

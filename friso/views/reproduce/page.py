@@ -84,7 +84,7 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tupl
     return tuple(
         FigureSection(
             f"section-{place}",
-            figures[number].title if number in figures else _untitled(number),
+            figures[number].title if number in figures else f"Figure {number}" if number.isdigit() else number,
             figures.get(number),
             tuple(group),
         )
@@ -98,10 +98,6 @@ def _printed(figure: Figure) -> str:
         return print_image(figure)
     pixels = matplotlib_renderer.image(replace(figure, title="", note=""), "png")
     return "data:image/png;base64," + base64.b64encode(pixels).decode("ascii")
-
-
-def _untitled(number: str) -> str:
-    return f"Figure {number}" if number.isdigit() else number
 
 
 def _counts(verdicts: Iterable[Verdict]) -> dict[str, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friso.studies.rig.outcome import Outcome, RigLog
+from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
@@ -57,10 +57,9 @@ def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
         sentences=sentences(outcome),
         notes=outcome.notes,
         columns=("Kind", "Seed", "Sample time", "Ended"),
-        rows=[(log.name, _log_row(log)) for log in outcome.logs],
+        rows=[
+            (log.name, [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"])
+            for log in outcome.logs
+        ],
         computed=f" on a drive as built, seed {outcome.seed}; {len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}",
     ).html()
-
-
-def _log_row(log: RigLog) -> list[str]:
-    return [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"]

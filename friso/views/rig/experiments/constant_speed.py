@@ -156,13 +156,12 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
     result: ConstantSpeedResult = outcome.result
     return {"speeds_m_per_s": [*result.speeds], "cases": {case.name: _numbers(case) for case in result.cases}} | {
-        "many_speeds": _many_numbers(result),
+        "many_speeds": {
+            "crossover_hz": result.many.crossover,
+            "places": [_place_numbers(place) for place in result.many.places],
+        },
         "slow_sliding": [_shown(sliding.result.estimates) for sliding in result.slow],
     }
-
-
-def _many_numbers(result: ConstantSpeedResult) -> dict[str, Any]:
-    return {"crossover_hz": result.many.crossover, "places": [_place_numbers(place) for place in result.many.places]}
 
 
 def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:

@@ -130,14 +130,16 @@ def _locked_and_free(moves: HuntingResult) -> Figure:
         "The position that the drive logs (Fig. 24).",
         (
             Panel("A: position", TIME, Axis("Position", "m"), lines),
-            Panel("B: about its end", TIME, Axis("Position", "m", zoom), lines, limits=(_end(moves.distance),)),
+            Panel(
+                "B: about its end",
+                TIME,
+                Axis("Position", "m", zoom),
+                lines,
+                limits=(Limit((moves.distance,), "reference", INK, "dotted"),),
+            ),
         ),
         columns=2,
     )
-
-
-def _end(place: float) -> Limit:
-    return Limit((place,), "reference", INK, "dotted")
 
 
 def _on(moves: HuntingResult) -> str:
