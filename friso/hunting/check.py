@@ -103,6 +103,13 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     return {name: judged[different.index(variant)] for name, variant in variants.items()}
 
 
+def check_given(stage: Stage, rtol: float = RTOL) -> Case:
+    """The case "given" alone. Raises ValueError for an `rtol` that is not usable."""
+    checked_rtol(rtol)
+    kernels(_needed(stage))
+    return _case(stage, rtol, False, Tally(silent, len(WORK)))
+
+
 def _needed(stage: Stage) -> set[KernelRequest]:
     """The kernels for a case."""
     shape = structure(stage.flat())

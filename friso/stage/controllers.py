@@ -51,6 +51,8 @@ class ControllerSection(AgainstFriction):
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({})
     """Names of the keys to the powers of the factor by which they change in a controller that is so many times faster,
     all its poles and zeros being scaled."""
+    shaped_by: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    """Names of the keys that shape a controller without making it faster, to the ranges in which they are tuned."""
     loop_gain: ClassVar[tuple[str, ...]] = ()
     """Names of the keys in proportion to all of which the gain of the loop goes."""
     decisive: ClassVar[tuple[str, ...]] = ()

@@ -19,9 +19,9 @@ from friso.hunting.turning import WINDOW
 from friso.stage import Stage
 from friso.virtual_rig.run import Recorded
 
-DENSITY, SLOWEST = 100, 0.1
+DENSITY, SLOWEST, FASTEST = 100, 0.1, 10.0
 """Frequencies per decade at which loops are looked at, besides those about resonances, and the lowest, as a share of
-the slowest pole; the highest is half that of sampling."""
+the slowest pole; the highest is half that of sampling, or so many times the fastest pole."""
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,8 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobus
         machines = limit_case.repeated(count)
         loop_poles, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
         size = np.abs(loop_poles.continuous)
-        low, high = SLOWEST * float(np.median(size.min(axis=1))), drive.highest
+        low = SLOWEST * float(np.median(size.min(axis=1)))
+        high = min(drive.highest, FASTEST * float(size.max()))
         omega = np.geomspace(low, high, int(DENSITY * np.log10(high / low)) + 2)
         shared = loop_poles.distance(np.broadcast_to(omega, (count, len(omega)))).min(axis=1)
         stable &= looked.abscissa < 0

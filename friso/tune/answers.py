@@ -1,0 +1,152 @@
+"""What became of a way: its stage, verified by cycles and on machines that the optimiser did not see."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from friso.equations.bandwidth import proportional_stiffness
+from friso.frequency.crossover import settled_margin
+from friso.frequency.stiffness import in_series
+from friso.hunting.check import Case, check_given
+from friso.stage import Stage
+from friso.studies.shares import Share, share
+from friso.tune.goal import Goal
+from friso.tune.machines import Machines
+from friso.tune.search import Settings
+from friso.tune.trials import Attraction, Moves, attraction, margins, moved, quantile
+from friso.tune.ways import Way
+from friso.tune.window import Window
+
+ONE = np.zeros((1, 0))
+"""The shares of the one setting of a way without variables."""
+
+Sure = Literal["works", "unsure", "does not work"]
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A stage on machines: its `moves`, modulus margins and what attracts, in rows of one; and of the stage itself the
+    least modulus margin in all settled states, `own_margin`, and the stiffness [N/m] against a load before the integral
+    acts: that of loop and joint in series."""
+
+    moves: Moves
+    margin: np.ndarray
+    attraction: Attraction
+    own_margin: float
+    stiffness: float
+
+    @property
+    def count(self) -> int:
+        return self.margin.size
+
+    def slowest(self, goal: Goal) -> float:
+        """The settling time [s] of the slowest twentieth of machines and moves; infinite where that is never."""
+        return float(self.moves.slowest(goal.share)[0])
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.moves.settling))
+
+    def force(self, goal: Goal) -> float:
+        """The largest force [N] of all but a twentieth of the machines."""
+        return float(quantile(self.moves.force, goal.share)[0])
+
+    def least_margin(self, goal: Goal) -> float:
+        """The modulus margin that all but a twentieth of the machines have at least."""
+        return float(-quantile(-self.margin, goal.share)[0])
+
+    def meets(self, goal: Goal) -> Mapping[str, np.ndarray]:
+        """Which machines meet each part of the goal, by its name."""
+        late = np.inf if goal.settle is None else goal.settle
+        most = np.inf if goal.force_limit is None else goal.force_limit
+        return {
+            "hunting": self.attraction.clear[0],
+            "settling": np.isfinite(self.moves.settling[0]) & (self.moves.settling[0] <= late),
+            "margin": self.margin[0] >= goal.margin,
+            "force": self.moves.force[0] <= most,
+        }
+
+    def share(self, goal: Goal) -> Share:
+        """The probability that a machine meets all of the goal, with its interval."""
+        meets = np.all([*self.meets(goal).values()], axis=0)
+        return share(meets, np.ones(meets.shape, bool))
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A way's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work, or
+    does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted` were given up because something
+    attracted machines with them."""
+
+    way: Way
+    stage: Stage | None
+    measured: Measured | None
+    case: Case | None
+    doubts: tuple[str, ...]
+    windows: tuple[Window, ...] = ()
+    settings: Settings | None = None
+    attracted: int = 0
+    interrupted: bool = False
+
+    @property
+    def sure(self) -> Sure:
+        """Whether it works: all was verified, or not."""
+        if self.stage is None:
+            return "does not work"
+        return "unsure" if self.doubts or self.interrupted else "works"
+
+
+@np.errstate(all="ignore")
+def measure(stage: Stage, machines: Machines, goal: Goal, drive: Stage) -> Measured:
+    """A stage on machines, with the sampling and delay of the stage `drive` for its margins."""
+    way = Way.settled_on("", stage)
+    flat = stage.flat()
+    timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
+    stiffness = proportional_stiffness(flat)
+    if flat.get("joint.locked") is False:
+        stiffness = in_series(stiffness, flat["joint.stiffness"])
+    return Measured(
+        moved(way, ONE, machines, goal),
+        margins(way, ONE, machines, drive),
+        attraction(way, ONE, machines, goal),
+        settled_margin({**flat, **timing}),
+        float(stiffness),
+    )
+
+
+def verified(stage: Stage) -> Case:
+    """The verdict of `friso check` on the stage as it is, by its cycles."""
+    return check_given(stage)
+
+
+def doubts(case: Case, measured: Measured, goal: Goal) -> tuple[str, ...]:
+    """What of the goal a stage does not meet, or not surely: names of `friso.views.tune.words.DOUBTS`."""
+    judgement, edge = case.judgement, case.judgement.margin
+    listed: list[str] = []
+    if judgement.verdict != "settles":
+        listed.append("verdict")
+    elif not judgement.hunting.certain:
+        listed.append("certain")
+    if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
+        listed.append("distance")
+    if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
+        listed.append("window")
+    if case.unstable or measured.own_margin < goal.margin * (1 - ROUNDED):
+        listed.append("own margin")
+    listed += [name for name, meets in measured.meets(goal).items() if np.mean(meets) < goal.share]
+    return tuple(listed)
+
+
+ROUNDED = 2e-3
+"""Share by which a margin may be below its goal because the tuned numbers are rounded."""
+
+
+def _near(low: object, high: object, distance: float) -> bool:
+    """Whether a window of bandwidths, its ends factors (None: as far as the search goes), comes within the distance."""
+    first = getattr(low, "outside", 0.0) if low is not None else 0.0
+    last = getattr(high, "outside", np.inf) if high is not None else np.inf
+    return bool(first < distance and last > 1 / distance)

@@ -1,0 +1,31 @@
+"""What a tuned machine has to do, and what may be changed for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from friso.frequency.crossover import WANTED
+
+DISTANCE = 1.2
+"""Factor in bandwidth over which nothing may attract below that of a tuned stage."""
+
+SHARE = 0.95
+"""Share of the machines, each with a move of its own, that have to meet the goal."""
+
+
+@dataclass(frozen=True)
+class Goal:
+    """In position is `within` [m]; the slowest twentieth of machines and moves has to be there `settle` [s] after the
+    reference stands (None: before the run ends) with at most `force_limit` [N] of the actuator (None: any); the
+    bandwidth does not exceed `bandwidth_limit` [Hz] (None: only what the stage file tells limits it). Modulus
+    `margin` and `distance` from hunting hold for all settled states. `controller` and `joint` may be changed."""
+
+    within: float = 1e-6
+    settle: float | None = None
+    force_limit: float | None = None
+    bandwidth_limit: float | None = None
+    margin: float = WANTED
+    distance: float = DISTANCE
+    share: float = SHARE
+    controller: bool = True
+    joint: bool = True

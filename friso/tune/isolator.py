@@ -1,0 +1,53 @@
+"""A rigid stage on an isolator: its mass split, a joint between the parts, friction on the cart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from friso.stage import Stage
+from friso.stage.controllers import as_tuned
+
+STAGE_SHARE = 0.3
+"""Share of the moving mass that the joint carries where the stage file does not tell: the thesis's rig has 0.29."""
+
+STROKE, FORCE_SHARE, DAMPING_RATIO = 1e-3, 0.5, 0.05
+"""The joint that a search begins with: stroke [m], force at the stroke over static friction, damping ratio."""
+
+LIMITER = {"joint.limiter_stiffness": 2e7, "joint.limiter_damping": 100.0}
+"""The thesis's stroke limiter [N/m, N s/m]."""
+
+
+def least_friction(flat: Mapping[str, Any]) -> float:
+    """The force [N] at which a cart breaks away in its weaker direction, less what a bias force takes of it."""
+    key = "friction.static" if "friction.static" in flat else "friction.coulomb"
+    return float(flat.get(key, 0.0) * (1 - abs(flat.get("friction.asymmetry", 0.0))) - abs(flat.get("bias.cart", 0.0)))
+
+
+def split(flat: Mapping[str, Any]) -> dict[str, float]:
+    """Masses of cart and stage [kg]: those of the file, or shares of the only one."""
+    masses = {key: flat[key] for key in ("masses.cart", "masses.stage") if key in flat}
+    if len(masses) == 2:
+        return masses
+    (whole,) = masses.values()
+    return {"masses.cart": (1 - STAGE_SHARE) * whole, "masses.stage": STAGE_SHARE * whole}
+
+
+def isolated(stage: Stage) -> Stage:
+    """The stage with a free joint: its own, or one to begin a search with; its controller as tuned for the whole mass.
+    Raises StageError where the result is no stage."""
+    free = stage.variants().get("free")
+    if free is not None:
+        return free
+    flat = stage.flat()
+    masses = split(flat)
+    stiffness = FORCE_SHARE * least_friction(flat) / STROKE
+    numbers = {
+        **masses,
+        **as_tuned(flat),
+        "joint.stiffness": stiffness,
+        "joint.damping": 2 * DAMPING_RATIO * (stiffness * masses["masses.stage"]) ** 0.5,
+        "joint.stroke": STROKE,
+        **LIMITER,
+    }
+    return stage.with_numbers(numbers)

@@ -1,0 +1,97 @@
+"""Machines drawn around a stage, each with a move of its own, and laid over any way in which the stage is changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.stage import Stage
+from friso.stage.controllers import as_tuned
+from friso.stage.correlations import Correlations
+from friso.studies.compare.machines import LEAST, SPREADS, draw_machines
+
+SHORTEST = 0.25
+"""Travel of the shortest move, as a share of that of the stage file."""
+
+TRAVEL = {"there_and_back": ("motion.acceleration_time", 0.5), "step": ("motion.size", 1.0)}
+TRAVEL |= {"release": ("motion.displacement", 1.0)}
+"""The key that decides on the travel of a motion, and the power of the travel with which it goes."""
+
+ADDED = int.from_bytes(b"joint")
+"""Which of a seed's random numbers decide on a joint that the stage file does not have (second half of Philox's key)."""
+
+HALF_WIDTHS = 1.959963984540054
+"""Standard deviations in the half-width of a 95 % interval."""
+
+ADDED_KEYS = ("joint.stiffness", "joint.damping")
+
+
+@dataclass(frozen=True)
+class Machines:
+    """Keys of the stage to what they are multiplied by on each machine (`ratios`), or what is added where they are 0
+    (`shifts`), and its share of the travel, all of shape (count,); which keys the file calls uncertain, and the default
+    spreads [%] of others."""
+
+    ratios: Mapping[str, np.ndarray]
+    shifts: Mapping[str, np.ndarray]
+    travel: np.ndarray
+    from_file: tuple[str, ...]
+    spreads: Mapping[str, float]
+    seed: int
+
+    @property
+    def count(self) -> int:
+        return len(self.travel)
+
+    def take(self, numbers: np.ndarray) -> Machines:
+        """The machines with these numbers."""
+        ratios, shifts = (
+            {key: value[numbers] for key, value in column.items()} for column in (self.ratios, self.shifts)
+        )
+        return replace(self, ratios=ratios, shifts=shifts, travel=self.travel[numbers])
+
+    def laid_over(self, stage: Stage, changes: Mapping[str, Any], settings: int) -> dict[str, Any]:
+        """Flat keys of all machines with all `settings`, which are arrays of shape (settings,): those of the first on
+        all machines come first. The controller is tuned for the stage and does not know what was drawn."""
+        flat = stage.flat()
+        tuned = as_tuned(flat)
+        for key, value in {**tuned, **changes}.items():
+            flat[key] = np.repeat(np.broadcast_to(value, (settings,)), self.count)
+        for key, ratio in self._of(flat).items():
+            flat[key] = flat[key] * np.tile(ratio, settings)
+        for key, shift in self.shifts.items():
+            flat[key] = flat.get(key, 0.0) + np.tile(shift, settings)
+        key, power = TRAVEL[flat["motion.kind"]]
+        flat[key] = flat[key] * np.tile(self.travel, settings) ** power
+        return flat
+
+    def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """The ratios of the keys that the stage has; both parts of a mass that was split are as heavy as that."""
+        ratios = {key: ratio for key, ratio in self.ratios.items() if key in flat}
+        masses = [key for key in self.ratios if key.startswith("masses.")]
+        for key in ("masses.cart", "masses.stage"):
+            if key in flat and key not in ratios and masses:
+                ratios[key] = self.ratios[masses[0]]
+        return ratios
+
+
+def drawn(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
+    """Machines drawn as `friso compare` draws them; the first is that of the stage file, with its own move. Joints that
+    the file does not have vary by the default spreads. Raises InputError."""
+    sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
+    keys = {key: values[:count] for key, values in sample.keys.items() if key in flat and not key.startswith("rail.")}
+    ratios = {key: values / flat[key] for key, values in keys.items() if flat[key]}
+    shifts = {key: values.copy() for key, values in keys.items() if not flat[key]}
+    random = np.random.Generator(np.random.Philox(key=[seed, ADDED]))
+    for key in ADDED_KEYS:
+        spread = SPREADS[key] / 100 / HALF_WIDTHS * random.standard_normal(count)
+        ratios.setdefault(key, np.maximum(1 + spread, 1 - SPREADS[key] / 100))
+    travel = SHORTEST ** random.random(count)
+    for values in (*ratios.values(), travel):
+        values[0] = 1.0
+    for values in shifts.values():
+        values[0] = 0.0
+    return Machines(ratios, shifts, travel, sample.from_file, dict(sample.spreads), seed)

@@ -1,0 +1,176 @@
+"""The method of `friso tune`: every way optimised by itself, its best settings verified, the least change first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.engine.kernel import KernelRequest, kernels
+from friso.equations.motion import last_corner
+from friso.equations.structure import structure
+from friso.errors import InputError
+from friso.frequency.crossover import Limits, limits
+from friso.hunting.check import Case
+from friso.progress import Progress, silent
+from friso.stage import Stage
+from friso.stage.correlations import Correlations
+from friso.studies.compare.options import linear_flat
+from friso.tune.answers import Answer, Measured, doubts, measure, verified
+from friso.tune.goal import Goal
+from friso.tune.machines import TRAVEL, Machines, drawn
+from friso.tune.relax import Relaxed, relaxations
+from friso.tune.search import Budget, Search
+from friso.tune.ways import Way, ways
+from friso.tune.window import windows
+
+TRIES = 3
+"""Settings of a way that are verified at most: the next best ones where the best are not sure to work."""
+
+FRESH = 1000
+"""What is added to the seed for the machines that the optimiser does not see."""
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """The answers, those that change least first, for a stage that was checked and measured itself (`present`); the
+    bandwidths with which it keeps its margin; what to relax where nothing works; whether it was interrupted."""
+
+    stage: Stage
+    goal: Goal
+    case: Case
+    present: Measured
+    limits: Limits
+    answers: tuple[Answer, ...]
+    relaxed: tuple[Relaxed, ...]
+    machines: Machines
+    seed: int
+    interrupted: bool = False
+
+    @property
+    def needed(self) -> bool:
+        """Whether the stage as it is does not meet the goal."""
+        return bool(doubts(self.case, self.present, self.goal))
+
+    @property
+    def working(self) -> tuple[Answer, ...]:
+        """The ways that work."""
+        return tuple(answer for answer in self.answers if answer.sure == "works")
+
+    @property
+    def fastest(self) -> Answer | None:
+        """The way that works and settles soonest."""
+        return min(self.working, key=lambda answer: _slowest(answer, self.goal), default=None)
+
+
+def _slowest(answer: Answer, goal: Goal) -> float:
+    return np.inf if answer.measured is None else answer.measured.slowest(goal)
+
+
+def tune(
+    stage: Stage,
+    goal: Goal | None = None,
+    seed: int = 1,
+    correlations: Correlations | None = None,
+    budget: Budget | None = None,
+    progress: Progress = silent,
+) -> Tuning:
+    """The best settings of every way that the goal allows. Raises InputError for a stage whose reference never stands
+    still, or that has no travel."""
+    goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
+    _moves(stage)
+    ideal = _ideal(stage)
+    listed = ways(ideal, goal)
+    report = _Report(progress, sum(_steps(way, budget) for way in listed) + 2)
+    report("compiling")
+    kernels({KernelRequest(structure(way.stage.flat())) for way in [Way.settled_on("", ideal), *listed]})
+    fresh = drawn(ideal, correlations, budget.fresh, seed + FRESH)
+    machines = drawn(ideal, correlations, budget.machines, seed)
+    report("the stage as it is")
+    case, present = verified(ideal), measure(ideal, fresh, goal, stage)
+    answers: list[Answer] = []
+    relaxed: tuple[Relaxed, ...] = ()
+    interrupted = False
+    try:
+        for way in listed:
+            search = Search(way, goal, machines, stage, budget, report)
+            answers.append(Answer(way, None, None, None, (), interrupted=True))  # as long as it is not there
+            answers[-1] = _answer(search, fresh, stage, answers)
+            report.after(_steps(way, budget))
+        if not any(answer.sure == "works" for answer in answers):
+            report("what to relax")
+            relaxed = relaxations(answers, goal, machines)
+    except KeyboardInterrupt:
+        interrupted = True
+    return Tuning(
+        ideal,
+        goal,
+        case,
+        present,
+        limits(linear_flat(stage, stage.flat())),
+        tuple(answers),
+        relaxed,
+        fresh,
+        seed,
+        interrupted,
+    )
+
+
+def _answer(search: Search, fresh: Machines, drive: Stage, answers: list[Answer]) -> Answer:
+    """The best settings of a way that are verified, or else the best that are not sure to work; `answers` ends with
+    what is known of it so far."""
+    way, goal = search.way, search.goal
+    search.optimise()
+    unsure: Answer | None = None
+    for number, shares in enumerate(search.surveyed()):
+        tuned = way.tuned(shares)
+        search.report(f"{way.name}: cycles")
+        measured = measure(tuned, fresh, goal, drive)
+        case = verified(tuned)
+        around = windows(search, shares)
+        answer = Answer(
+            way, tuned, measured, case, doubts(case, measured, goal), around, search.settings, search.attracted
+        )
+        if answer.sure == "works":
+            return answer
+        unsure = unsure or answer
+        answers[-1] = unsure
+        if number + 1 == TRIES:
+            break
+    return unsure or Answer(way, None, None, None, (), (), search.settings, search.attracted)
+
+
+def _moves(stage: Stage) -> None:
+    """Raises InputError for a motion after which nothing has to settle."""
+    flat = stage.flat()
+    kind = flat["motion.kind"]
+    corner, duration = float(last_corner(flat)), flat["motion.duration"]
+    if kind not in TRAVEL or not flat[TRAVEL[kind][0]] or corner >= duration:
+        example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
+        raise InputError("motion.kind", f'"{kind}"', "a move whose reference stands in the end", example)
+
+
+def _ideal(stage: Stage) -> Stage:
+    """The stage without what cycles leave out: rail, cable, floor, sampling and delay."""
+    return stage.replace({table: None for table in ("drive", "rail", "cable", "floor") if getattr(stage, table)})
+
+
+def _steps(way: Way, budget: Budget) -> int:
+    """How many reports a way makes, about."""
+    return (2 if len(way.variables) == 1 else budget.generations) + 4
+
+
+class _Report:
+    """Counts the steps of all ways."""
+
+    def __init__(self, progress: Progress, total: int) -> None:
+        self.progress, self.total, self.done, self.base = progress, total, 0, 2
+
+    def __call__(self, label: str) -> None:
+        self.done = min(self.done + 1, self.total)
+        self.progress(self.done, self.total, label)
+
+    def after(self, steps: int) -> None:
+        """A way of so many steps has ended."""
+        self.base += steps
+        self.done = self.base

@@ -1,0 +1,114 @@
+"""Settings tried on machines: all of them at once in the engine's lanes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.bandwidth import faster
+from friso.equations.motion import last_corner
+from friso.equations.structure import shared_structure
+from friso.hunting.attractors import attractors
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.verdict import can_hunt
+from friso.stage import Stage
+from friso.studies.compare.measures import linear_loops
+from friso.studies.compare.options import linear_flat
+from friso.tune.goal import Goal
+from friso.tune.machines import Machines
+from friso.tune.ways import Way
+
+RTOL = 1e-6
+"""Relative tolerance of the moves that are tried."""
+
+LOOSER = 10.0
+"""The other tolerance, in units of that of the goal, in which moves are measured: what a looser one would bring."""
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Moves of settings on machines, all of shape (settings, machines): the time of `settling` [s] within the tolerance
+    from the last corner of the reference on, and within the looser one, infinite where the stage is not in position at
+    the end; and the largest `force` [N]."""
+
+    settling: np.ndarray
+    looser: np.ndarray
+    force: np.ndarray
+
+    def slowest(self, share: float) -> np.ndarray:
+        """The settling time [s] of all but the slowest machines of each setting, shape (settings,)."""
+        return quantile(self.settling, share)
+
+
+def quantile(values: np.ndarray, share: float) -> np.ndarray:
+    """Of each row, the least value that so large a share of it does not exceed."""
+    ordered = np.sort(values, axis=-1)
+    return np.asarray(ordered[..., int(np.ceil(share * values.shape[-1])) - 1])
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities behind
+def moved(way: Way, shares: np.ndarray, machines: Machines, goal: Goal, slower: float = 1.0) -> Moves:
+    """The moves of settings, as shares of the ranges of a way (settings, variables), with a bandwidth lower by a factor
+    `slower`."""
+    count = len(shares) * machines.count
+    flat = faster(machines.laid_over(way.stage, way.changes(shares), len(shares)), 1 / slower)
+    settling, looser, force = (np.full(count, np.inf) for _ in range(3))
+    options = RunOptions(rtol=RTOL, bands=(goal.within, LOOSER * goal.within), record_from=np.inf)
+    corner = np.broadcast_to(last_corner(flat), (count,))
+    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, options):
+        done = np.equal(runs.results.statuses, Status.DONE)
+        ended = runs.statistic("ended")
+        for column, name in ((settling, "inner_exit"), (looser, "outer_exit")):
+            left = runs.statistic(name)
+            after = np.maximum(left - corner[runs.numbers], 0.0)
+            column[runs.numbers] = np.where(done & (left < ended), after, np.inf)
+        force[runs.numbers] = np.where(done, runs.statistic("force_peak"), np.inf)
+    shape = len(shares), machines.count
+    return Moves(settling.reshape(shape), looser.reshape(shape), force.reshape(shape))
+
+
+@np.errstate(all="ignore")
+def margins(way: Way, shares: np.ndarray, machines: Machines, drive: Stage) -> np.ndarray:
+    """The least modulus margin of the limit cases (0: not stable), shape (settings, machines), with the sampling and
+    delay of the stage `drive`."""
+    timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
+    flat = {**machines.laid_over(way.stage, way.changes(shares), len(shares)), **timing}
+    count = len(shares) * machines.count
+    return linear_loops(way.stage, linear_flat(drive, flat), count).margin.reshape(len(shares), machines.count)
+
+
+@dataclass(frozen=True)
+class Attraction:
+    """Whether anything hunting attracts machines at their bandwidth or down to the distance below it (`attracts`), and
+    whether simulations decided that, both of shape (settings, machines)."""
+
+    attracts: np.ndarray
+    decided: np.ndarray
+
+    @property
+    def clear(self) -> np.ndarray:
+        """Which machines surely have nothing that attracts."""
+        return ~self.attracts & self.decided
+
+
+@np.errstate(all="ignore")
+def attraction(way: Way, shares: np.ndarray, machines: Machines, goal: Goal) -> Attraction:
+    """What attracts the machines with settings, at the bandwidth and below it by the distance of the goal, by
+    simulations from many starts; closed orbits have to confirm it for the answer."""
+    flat = machines.laid_over(way.stage, way.changes(shares), len(shares))
+    shape = len(shares), machines.count
+    if not can_hunt(flat):
+        return Attraction(np.zeros(shape, bool), np.ones(shape, bool))
+    attracts, decided = np.zeros(shape, bool), np.ones(shape, bool)
+    for factor in (1.0, goal.distance**-0.5, 1 / goal.distance):
+        slower = faster(flat, factor)
+        survey = attractors(
+            Ensemble.held(slower, len(shares) * machines.count, form=shared_structure(slower)), cycles=False
+        )
+        attracts |= survey.attracts.reshape(shape)
+        decided &= survey.decided.reshape(shape)
+    return Attraction(attracts, decided)

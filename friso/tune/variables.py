@@ -1,0 +1,94 @@
+"""What an optimiser may change of a stage: numbers on logarithmic scales, and the keys that follow from them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import bandwidth, sped_up
+from friso.frequency.margins import margins
+from friso.frequency.members import member
+from friso.stage import Stage
+from friso.stage.controllers import controller_of
+
+Change = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
+"""From the flat keys so far and the values of a variable to the keys that change."""
+
+BANDWIDTH = "bandwidth"
+"""Name of the variable that makes a controller faster as a whole."""
+
+WIDE = 4.0
+"""Factor by which a gain may change against the others."""
+
+FASTEST, SLOWEST = 10.0, 0.3
+"""Factors up to and down to which the bandwidth is changed."""
+
+FORCE_SHARE = (0.2, 0.8)
+"""Force of the joint at its stroke, as a share of the least static friction: above it the cart moves before the joint
+touches its limiter on the weakest machines."""
+
+STROKES = (1e-5, 3e-3)
+"""Strokes of a joint that are tried [m]."""
+
+DAMPING_RATIOS = (0.01, 0.3)
+"""Damping ratios of the stage on its joint that are tried."""
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number between `low` and `high` (SI), tried evenly in its logarithm."""
+
+    name: str
+    low: float
+    high: float
+    change: Change
+
+    def at(self, share: np.ndarray) -> np.ndarray:
+        """Its values at shares of the range."""
+        return np.asarray(self.low * (self.high / self.low) ** share)
+
+
+def of_key(key: str, low: float, high: float) -> Variable:
+    """A key of the stage file itself."""
+    return Variable(key, low, high, lambda flat, value: {key: value})
+
+
+def bandwidth_factor(stage: Stage, limit: float | None) -> Variable:
+    """How fast the controller is as a whole, as a factor of what it is, up to a limit of the bandwidth [Hz]."""
+    high = FASTEST if limit is None else min(FASTEST, limit / crossover(stage))
+    return Variable(BANDWIDTH, min(SLOWEST, high / 2), high, sped_up)
+
+
+def crossover(stage: Stage) -> float:
+    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1."""
+    flat = stage.flat()
+    stated = bandwidth(flat)
+    return float(margins(flat, member()).crossovers[-1] if stated is None else stated)
+
+
+def gains(stage: Stage, bandwidth: Variable) -> tuple[Variable, ...]:
+    """The gains of a controller against each other, then its bandwidth."""
+    flat, law = stage.flat(), controller_of(stage.flat())
+    shape = [of_key(law.key(name), low, high) for name, (low, high) in law.shaped_by.items()]
+    keys = [law.key(name) for name in law.speeds_up if flat.get(law.key(name))]
+    against = [of_key(key, flat[key] / WIDE, flat[key] * WIDE) for key in keys[1:]]
+    return (*shape, *against, bandwidth)
+
+
+def joint(friction: float) -> tuple[Variable, ...]:
+    """Stroke, stiffness and damping of an isolator for the least static friction [N]."""
+
+    def stiffness(flat: Mapping[str, Any], share: np.ndarray) -> dict[str, Any]:
+        return {"joint.stiffness": share * friction / flat["joint.stroke"]}
+
+    def damping(flat: Mapping[str, Any], ratio: np.ndarray) -> dict[str, Any]:
+        return {"joint.damping": 2 * ratio * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])}
+
+    return (
+        of_key("joint.stroke", *STROKES),
+        Variable("force of the joint at its stroke", *FORCE_SHARE, stiffness),
+        Variable("damping ratio of the joint", *DAMPING_RATIOS, damping),
+    )

@@ -1,0 +1,135 @@
+"""The ways to cure a stage: what each changes, from the least change to the greatest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.stage import Stage
+from friso.stage.controllers import controller_of
+from friso.tune import variables
+from friso.tune.goal import Goal
+from friso.tune.isolator import isolated, least_friction
+from friso.tune.variables import Variable, bandwidth_factor, of_key
+
+LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
+"""Ranges of the integral limit, in units of the static friction, and of the leak, in units of the bandwidth or, where
+no key states one, of 1 Hz."""
+
+DEADBANDS, EXITS = (0.1, 0.9), (1.0, 10.0)
+"""Ranges of the deadband, in tolerances, and of the error that ends it, in deadbands."""
+
+WINDOWS, FACTORS = (0.5, 100.0), (0.05, 4.0)
+"""Ranges of the standstill window, in tolerances, and of the gains in it."""
+
+WIDTHS, DEPTH = (0.1, 1.5), 0.9
+"""Range of the width of a notch, as a share of its frequency, and its depth."""
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way by its `name`, the stage it begins with, and its variables, which are applied in this order; whether it
+    changes the controller alone, or a joint is needed (`buys_joint`)."""
+
+    name: str
+    stage: Stage
+    variables: tuple[Variable, ...]
+    buys_joint: bool = False
+
+    def changes(self, shares: np.ndarray) -> dict[str, Any]:
+        """The keys that change at shares of the ranges, (settings, variables), to arrays of shape (settings,)."""
+        flat, changed = self.stage.flat(), dict[str, Any]()
+        for variable, share in zip(self.variables, shares.T, strict=True):
+            change = variable.change({**flat, **changed}, variable.at(share))
+            changed |= change
+        return changed
+
+    @classmethod
+    def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Way:
+        """A stage as it is, with nothing to vary."""
+        return cls(name, stage, (), buys_joint)
+
+    def tuned(self, shares: np.ndarray) -> Stage:
+        """The stage at shares of the ranges, (variables,), its numbers rounded to four digits."""
+        return self.stage.with_numbers({k: float(f"{v[0]:.4g}") for k, v in self.changes(shares[None]).items()})
+
+
+def ways(stage: Stage, goal: Goal) -> list[Way]:
+    """The ways that a goal allows, those that change least first."""
+    listed: list[Way] = []
+    speed = bandwidth_factor(stage, goal.bandwidth_limit)
+    if goal.controller:
+        listed += [Way("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
+        listed += [*_notch(stage, speed), *_against_friction(stage, goal)]
+    if goal.joint and least_friction(stage.flat()) > 0:
+        listed += _isolators(stage, goal, speed)
+    return listed
+
+
+def _gains(
+    name: str, stage: Stage, speed: Variable, first: tuple[Variable, ...] = (), buys_joint: bool = False
+) -> list[Way]:
+    """All gains, where there are more than the bandwidth tells."""
+    several = (*first, *variables.gains(stage, speed))
+    return [Way(name, stage, several, buys_joint)] if len(several) > 1 else []
+
+
+def _notch(stage: Stage, speed: Variable) -> Iterator[Way]:
+    """A notch at the parasitic mode, with which the bandwidth can be higher."""
+    flat = stage.flat()
+    if "parasitic.frequency" not in flat:
+        return
+    frequency = flat["parasitic.frequency"]
+    filters = [*stage.as_written()["controller"].get("filters", [])]
+    notch = {"kind": "notch", "frequency": f"{frequency!r} Hz", "width": f"{frequency / 2!r} Hz", "depth": DEPTH}
+    try:
+        with_notch = stage.replace({"controller.filters": [*filters, notch]})
+    except InputError:  # as many filters as there may be
+        return
+    key = f"controller.filters.{len(filters) + 1}.width"
+    width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
+    yield Way("notch at the parasitic mode, and bandwidth", with_notch, (width, speed))
+
+
+def _against_friction(stage: Stage, goal: Goal) -> Iterator[Way]:
+    """Each setting against friction that the stage has not got, by itself."""
+    flat = stage.flat()
+    law = controller_of(flat)
+    friction, within = least_friction(flat), goal.within
+    if not law.integrates(flat) or friction <= 0:
+        return
+    hertz = flat[law.bandwidth_key] if law.bandwidth_key else 1.0
+    scales = {
+        "integral limit": {"integral_limit": (friction, LIMITS)},
+        "leak of the integral": {"integral_leak": (hertz, LEAKS)},
+        "deadband of the integral": {
+            "integral_deadband": (within, DEADBANDS),
+            "integral_deadband_exit": (within, EXITS),
+        },
+        "gains at standstill": {"standstill_window": (within, WINDOWS), "standstill_factor": (1.0, FACTORS)},
+    }
+    for name, keys in scales.items():
+        ranges = {f"controller.{key}": (scale * low, scale * high) for key, (scale, (low, high)) in keys.items()}
+        if not any(key in flat for key in ranges):
+            numbers = {key: float(np.sqrt(low * high)) for key, (low, high) in ranges.items()}
+            yield Way(name, stage.with_numbers(numbers), tuple(of_key(key, *ends) for key, ends in ranges.items()))
+
+
+def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Way]:
+    """An isolator, alone and with the gains; leaf springs of the file give way to a joint stated by its numbers."""
+    try:
+        free = isolated(stage)
+    except InputError:
+        return
+    flat = free.flat()
+    if free.flexure:
+        kept = {key: flat[key] for key in flat if key.startswith(("joint.stiffness", "parasitic."))}
+        free = free.with_numbers(kept, without=("flexure",))
+    joint = variables.joint(least_friction(flat))
+    yield Way("isolator", free, joint, True)
+    if goal.controller:
+        yield from _gains("isolator and gains", free, speed, joint, True)
