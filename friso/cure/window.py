@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.tune.search import Search
+from friso.cure.search import Search
 
 POINTS = 16
 """Values of each number that are tried."""

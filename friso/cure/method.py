@@ -16,13 +16,13 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.options import linear_flat
-from friso.tune.answers import Answer, Measured, doubts, measure, verified
-from friso.tune.goal import Goal
-from friso.tune.machines import TRAVEL, Machines, drawn
-from friso.tune.relax import Relaxed, relaxations
-from friso.tune.search import Budget, Search
-from friso.tune.ways import Way, ways
-from friso.tune.window import windows
+from friso.cure.answers import Answer, Measured, doubts, measure, verified
+from friso.cure.goal import Goal
+from friso.cure.machines import TRAVEL, Machines, drawn
+from friso.cure.relax import Relaxed, relaxations
+from friso.cure.search import Budget, Search
+from friso.cure.ways import Way, ways
+from friso.cure.window import windows
 
 TRIES = 3
 """Settings of a way that are verified at most: the next best ones where the best are not sure to work."""

@@ -14,12 +14,12 @@ from friso.frequency.stiffness import in_series
 from friso.hunting.check import Case, check_given
 from friso.stage import Stage
 from friso.studies.shares import Share, share
-from friso.tune.goal import Goal
-from friso.tune.machines import Machines
-from friso.tune.search import Settings
-from friso.tune.trials import Attraction, Moves, attraction, margins, moved, quantile
-from friso.tune.ways import Way
-from friso.tune.window import Window
+from friso.cure.goal import Goal
+from friso.cure.machines import Machines
+from friso.cure.search import Settings
+from friso.cure.trials import Attraction, Moves, attraction, margins, moved, quantile
+from friso.cure.ways import Way
+from friso.cure.window import Window
 
 ONE = np.zeros((1, 0))
 """The shares of the one setting of a way without variables."""

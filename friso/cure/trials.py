@@ -18,9 +18,9 @@ from friso.hunting.verdict import can_hunt
 from friso.stage import Stage
 from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
-from friso.tune.goal import Goal
-from friso.tune.machines import Machines
-from friso.tune.ways import Way
+from friso.cure.goal import Goal
+from friso.cure.machines import Machines
+from friso.cure.ways import Way
 
 RTOL = 1e-6
 """Relative tolerance of the moves that are tried."""

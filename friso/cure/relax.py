@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from friso.stage import Stage
-from friso.tune.answers import Answer
-from friso.tune.goal import Goal
-from friso.tune.machines import Machines
-from friso.tune.search import Settings
-from friso.tune.trials import LOOSER, attraction
-from friso.tune.ways import Way
+from friso.cure.answers import Answer
+from friso.cure.goal import Goal
+from friso.cure.machines import Machines
+from friso.cure.search import Settings
+from friso.cure.trials import LOOSER, attraction
+from friso.cure.ways import Way
 
 TRIED = 3
 """Settings whose machines are surveyed, at most, for one relaxation."""

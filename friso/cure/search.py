@@ -10,10 +10,10 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from friso.stage import Stage
-from friso.tune.goal import Goal
-from friso.tune.machines import Machines
-from friso.tune.trials import Moves, attraction, margins, moved, quantile
-from friso.tune.ways import Way
+from friso.cure.goal import Goal
+from friso.cure.machines import Machines
+from friso.cure.trials import Moves, attraction, margins, moved, quantile
+from friso.cure.ways import Way
 
 SEED = 27
 """Of the optimiser: the same answer for the same input."""
