@@ -8,18 +8,18 @@ from typing import Literal
 
 import numpy as np
 
-from friso.equations.bandwidth import proportional_stiffness
-from friso.frequency.crossover import settled_margin
-from friso.frequency.stiffness import in_series
-from friso.hunting.check import Case, check_given
-from friso.stage import Stage
-from friso.studies.shares import Share, share
 from friso.cure.goal import Goal
 from friso.cure.machines import Machines
 from friso.cure.search import Settings
 from friso.cure.trials import Attraction, Moves, attraction, margins, moved, quantile
 from friso.cure.ways import Way
 from friso.cure.window import Window
+from friso.equations.bandwidth import proportional_stiffness
+from friso.frequency.crossover import settled_margin
+from friso.frequency.stiffness import in_series
+from friso.hunting.check import Case, check_given
+from friso.stage import Stage
+from friso.studies.shares import Share, share
 
 ONE = np.zeros((1, 0))
 """The shares of the one setting of a way without variables."""
@@ -79,8 +79,9 @@ class Measured:
 @dataclass(frozen=True)
 class Answer:
     """A way's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work, or
-    does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted` were given up because something
-    attracted machines with them."""
+    does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted` were
+    given up because something attracted machines with them.
+    """
 
     way: Way
     stage: Stage | None

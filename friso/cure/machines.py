@@ -21,7 +21,8 @@ TRAVEL |= {"release": ("motion.displacement", 1.0)}
 """The key that decides on the travel of a motion, and the power of the travel with which it goes."""
 
 ADDED = int.from_bytes(b"joint")
-"""Which of a seed's random numbers decide on a joint that the stage file does not have (second half of Philox's key)."""
+"""Which of a seed's random numbers decide on a joint that the stage file does not have: they are the second half of
+Philox's key."""
 
 HALF_WIDTHS = 1.959963984540054
 """Standard deviations in the half-width of a 95 % interval."""

@@ -6,6 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.cure.answers import Answer, Measured, doubts, measure, verified
+from friso.cure.goal import Goal
+from friso.cure.machines import TRAVEL, Machines, drawn
+from friso.cure.relax import Relaxed, relaxations
+from friso.cure.search import Budget, Search
+from friso.cure.ways import Way, ways
+from friso.cure.window import windows
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.motion import last_corner
 from friso.equations.structure import structure
@@ -16,13 +23,6 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.options import linear_flat
-from friso.cure.answers import Answer, Measured, doubts, measure, verified
-from friso.cure.goal import Goal
-from friso.cure.machines import TRAVEL, Machines, drawn
-from friso.cure.relax import Relaxed, relaxations
-from friso.cure.search import Budget, Search
-from friso.cure.ways import Way, ways
-from friso.cure.window import windows
 
 TRIES = 3
 """Settings of a way that are verified at most: the next best ones where the best are not sure to work."""

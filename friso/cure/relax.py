@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.stage import Stage
 from friso.cure.answers import Answer
 from friso.cure.goal import Goal
 from friso.cure.machines import Machines
 from friso.cure.search import Settings
 from friso.cure.trials import LOOSER, attraction
 from friso.cure.ways import Way
+from friso.stage import Stage
 
 TRIED = 3
 """Settings whose machines are surveyed, at most, for one relaxation."""
@@ -61,7 +61,9 @@ def _of_way(way: Way, settings: Settings, goal: Goal, machines: Machines) -> Ite
             kinds[names] = kinds.get(names, 0) + 1
             if kinds[names] > TRIED:
                 continue
-            if attraction(way, settings.shares[[number]], machines.take(np.arange(min(4, machines.count))), goal).clear.all():
+            if attraction(
+                way, settings.shares[[number]], machines.take(np.arange(min(4, machines.count))), goal
+            ).clear.all():
                 kinds[names] = TRIED
                 values = {name: _value(name, settings, int(number)) for name in names}
                 if "within" in values:

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from friso.stage import Stage
 from friso.cure.goal import Goal
 from friso.cure.machines import Machines
 from friso.cure.trials import Moves, attraction, margins, moved, quantile
 from friso.cure.ways import Way
+from friso.stage import Stage
 
 SEED = 27
 """Of the optimiser: the same answer for the same input."""
@@ -96,7 +96,9 @@ class Search:
     @property
     def settings(self) -> Settings:
         """All settings that were tried."""
-        return Settings(*(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True)))
+        return Settings(
+            *(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True))
+        )
 
     def optimise(self) -> None:
         """Try settings until they get no better."""

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.cure.goal import Goal
+from friso.cure.machines import Machines
+from friso.cure.ways import Way
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -18,9 +21,6 @@ from friso.hunting.verdict import can_hunt
 from friso.stage import Stage
 from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
-from friso.cure.goal import Goal
-from friso.cure.machines import Machines
-from friso.cure.ways import Way
 
 RTOL = 1e-6
 """Relative tolerance of the moves that are tried."""

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from friso.errors import InputError
-from friso.stage import Stage
-from friso.stage.controllers import controller_of
 from friso.cure import variables
 from friso.cure.goal import Goal
 from friso.cure.isolator import isolated, least_friction
 from friso.cure.variables import Variable, bandwidth_factor, of_key
+from friso.errors import InputError
+from friso.stage import Stage
+from friso.stage.controllers import controller_of
 
 LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
 """Ranges of the integral limit, in units of the static friction, and of the leak, in units of the bandwidth or, where

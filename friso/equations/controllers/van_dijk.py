@@ -37,7 +37,9 @@ class VanDijk(Pid):
     recognised_by = ("crossover",)
     bandwidth_key = CROSSOVER
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"crossover": 1})
-    shaped_by: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({"alpha": (0.05, 0.3), "beta": (1.2, 8.0)})
+    shaped_by: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType(
+        {"alpha": (0.05, 0.3), "beta": (1.2, 8.0)}
+    )
     loop_gain = ("tuned_mass",)
     words: ClassVar[Mapping[str, str]] = MappingProxyType(
         {"alpha": "Controller α", "beta": "Controller β", "crossover": "Crossover", "tuned_mass": "Tuned mass"}

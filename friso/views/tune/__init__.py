@@ -1,0 +1,1 @@
+"""The cure of a stage, in words, tables and figures."""

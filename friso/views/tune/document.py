@@ -1,0 +1,72 @@
+"""The cure as a JSON document."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from friso.cure.answers import Answer, Measured
+from friso.cure.method import Tuning
+from friso.views.documents import plain_json
+from friso.views.tune.words import answer, changes, failing, reason
+
+
+def tune_document(tuning: Tuning) -> dict[str, Any]:
+    """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
+    goal = tuning.goal
+    first, *further = answer(tuning)
+    return plain_json(
+        {
+            "conclusion": first,
+            "details": [*further, *failing(tuning)],
+            "stage": tuning.stage.name,
+            "interrupted": tuning.interrupted,
+            "needed": tuning.needed,
+            "seed": tuning.seed,
+            "machines": tuning.machines.count,
+            "goal": {
+                "within_m": goal.within,
+                "settle_s": goal.settle,
+                "force_limit_n": goal.force_limit,
+                "bandwidth_limit_hz": goal.bandwidth_limit,
+                "modulus_margin": goal.margin,
+                "distance": goal.distance,
+                "share": goal.share,
+            },
+            "as_is": _measured(tuning.present, tuning) | {"verdict": tuning.case.verdict},
+            "ways": {found.way.name: _way(found, tuning) for found in tuning.answers},
+            "relaxed": [
+                {"way": relaxed.way.name, "values": dict(relaxed.values), "factor": relaxed.factor}
+                for relaxed in tuning.relaxed
+            ],
+        }
+    )
+
+
+def _way(found: Answer, tuning: Tuning) -> dict[str, Any]:
+    if found.stage is None or found.measured is None or found.case is None:
+        return {"works": found.sure, "why": reason(found, tuning)}
+    edge = found.case.judgement.margin
+    return {
+        "works": found.sure,
+        "doubts": [*found.doubts],
+        "changes": changes(tuning.stage, found.stage),
+        "verdict": found.case.verdict,
+        "certain": found.case.judgement.hunting.certain,
+        "edge_factor": None if edge is None else edge.factor,
+        "windows": [asdict(window) for window in found.windows],
+        **_measured(found.measured, tuning),
+    }
+
+
+def _measured(measured: Measured, tuning: Tuning) -> dict[str, Any]:
+    goal = tuning.goal
+    return {
+        "meets_goal": asdict(measured.share(goal)),
+        "slowest_twentieth_s": measured.slowest(goal),
+        "median_s": measured.median,
+        "force_n": measured.force(goal),
+        "modulus_margin": measured.least_margin(goal),
+        "own_margin": measured.own_margin,
+        "stiffness_n_per_m": measured.stiffness,
+    }

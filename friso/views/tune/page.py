@@ -1,0 +1,45 @@
+"""The page of `friso tune`, its figures, and a stage file for every way."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friso.cure.method import Tuning
+from friso.views.drawing.figure import Figure
+from friso.views.files import Content, pictures
+from friso.views.pages import Report
+from friso.views.tune.figures import figures as tune_figures
+from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
+
+
+def tune_files(tuning: Tuning) -> dict[str, Content]:
+    """The stage files, the page, and every figure in all formats; `tuned.toml` is the least change that works."""
+    figures = tune_figures(tuning)
+    return {**stage_files(tuning), "tune.html": page(tuning, figures), **pictures(figures)}
+
+
+def stage_files(tuning: Tuning) -> dict[str, Content]:
+    """A stage file for every way for which there are settings; one that is not sure to work is named so."""
+    files: dict[str, Content] = {}
+    for found in tuning.answers:
+        if found.stage is None:
+            continue
+        slug = found.way.name.replace(",", "").replace(" ", "-")
+        unsure = "" if found.sure == "works" else "-not-sure"
+        files[f"tuned-{slug}{unsure}.toml"] = found.stage.to_toml()
+    least = tuning.working[:1]
+    return {"tuned.toml": least[0].stage.to_toml() if least and least[0].stage else None, **files}
+
+
+def page(tuning: Tuning, figures: Sequence[Figure]) -> str:
+    """The page with its figures."""
+    return Report.of_stage(
+        "tune",
+        tuning.stage,
+        figures,
+        sentences=answer(tuning),
+        notes=[*failing(tuning), *window_lines(tuning), *assumptions(tuning)],
+        columns=COLUMNS,
+        rows=rows(tuning),
+        computed=f", seed {tuning.seed}",
+    ).html()

@@ -1,0 +1,307 @@
+"""The cure in words: what to change, what it brings and costs, what else would do, and what cannot work and why."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.cure.answers import Answer, Measured
+from friso.cure.goal import Goal
+from friso.cure.method import Tuning
+from friso.cure.relax import Relaxed
+from friso.cure.search import Settings
+from friso.cure.variables import BANDWIDTH, crossover
+from friso.cure.window import Window
+from friso.stage import Stage, numeric_keys
+from friso.views.drawing.prefixes import NOTHING, listed, percent, share_with_interval, with_unit
+
+DOUBTS = {
+    "verdict": "friso check does not say that it settles",
+    "certain": "friso check is not certain that nothing attracts it",
+    "distance": "its edge of hunting is closer than wanted",
+    "window": "something attracts it at a bandwidth nearby",
+    "own margin": "a settled state of the stage itself has less margin than wanted",
+    "hunting": "something attracts too many of the machines, or may",
+    "settling": "too many of the machines are not in position in time",
+    "margin": "too many of the machines have less modulus margin than wanted",
+    "force": "too many of the machines take more force than there is",
+}
+"""Why a way is not sure to work."""
+
+COLUMNS = (
+    "Works",
+    "Machines that meet the goal",
+    "Slowest twentieth settles in",
+    "Median",
+    "Largest force",
+    "Modulus margin",
+    "Stiffness under load",
+)
+
+RELAXED = {"within": "--within", "settle": "--settle", "force_limit": "--force-limit", "margin": "modulus margin"}
+UNITS = {"within": "m", "settle": "s", "force_limit": "N", "margin": ""}
+
+ABSENT = "never"
+
+
+def time(seconds: float) -> str:
+    """A settling time, which may never come."""
+    return with_unit(seconds, "s") if math.isfinite(seconds) else ABSENT
+
+
+def changes(before: Stage, after: Stage) -> list[str]:
+    """The keys that differ, with their values before and after."""
+    old, new = before.flat(), after.flat()
+    keys = numeric_keys(new)
+    return [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
+
+
+def _changes(key: str, old: Mapping[str, Any], new: Mapping[str, Any], keys: Mapping[str, Any]) -> bool:
+    if key not in keys:
+        return False
+    return key not in old or not math.isclose(old[key], new[key], rel_tol=1e-9)
+
+
+def _change(key: str, old: Any, new: float, unit: str) -> str:
+    text = f"{key} = {number(new, unit)}"
+    return text if old is None else f"{text} (was {number(old, unit)})"
+
+
+def number(value: float, unit: str) -> str:
+    """A value of a key with its unit, if it has one."""
+    return with_unit(value, unit, 4) if unit else f"{value:.4g}"
+
+
+def answer(tuning: Tuning) -> list[str]:
+    """The answer, first of all that is said: the least change that works, what it brings and costs; the next best."""
+    lines = [*_interrupted(tuning)]
+    if not tuning.needed:
+        return [
+            *lines,
+            f"The stage meets the goal as it is: {goal_words(tuning.goal)}. {_brings(tuning.present, tuning)}.",
+        ]
+    if not tuning.working:
+        return [*lines, *_nothing(tuning)]
+    least, fastest = tuning.working[0], tuning.fastest
+    lines.append(_works(least, tuning, "The least change that works"))
+    if fastest is not None and fastest is not least:
+        lines.append(_works(fastest, tuning, "The next best, which settles soonest"))
+    elif len(tuning.working) > 1:
+        lines.append(_works(tuning.working[1], tuning, "The next best"))
+    return lines
+
+
+def goal_words(goal: Goal) -> str:
+    """The goal in words."""
+    late = "" if goal.settle is None else f", in {with_unit(goal.settle, 's')}"
+    force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
+    return (
+        f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{force}, with a "
+        f"modulus margin of {goal.margin:g}, nothing that attracts them down to {1 / goal.distance:.2f} of the bandwidth"
+    )
+
+
+def _interrupted(tuning: Tuning) -> list[str]:
+    if not tuning.interrupted:
+        return []
+    return ["Interrupted: this is the best so far. Ways that are not named were not tried, and one may be unfinished."]
+
+
+def _works(found: Answer, tuning: Tuning, what: str) -> str:
+    assert found.stage is not None and found.measured is not None
+    return (
+        f"{what}: {found.way.name}. Set {listed(changes(tuning.stage, found.stage), 'and')}. "
+        f"{_brings(found.measured, tuning)}. {price(found.measured, tuning, found.way.buys_joint)}"
+    )
+
+
+def _brings(measured: Measured, tuning: Tuning) -> str:
+    before, now = (part.slowest(tuning.goal) for part in (tuning.present, measured))
+    as_is = "" if measured is tuning.present else f" (as it is: {time(before)})"
+    return (
+        f"Of {measured.count} fresh machines and moves, {share_with_interval(measured.share(tuning.goal))} meet the goal, "
+        f"and the slowest twentieth is in position after {time(now)}{as_is}"
+    )
+
+
+def price(measured: Measured, tuning: Tuning, buys_joint: bool) -> str:
+    """What a way costs against the stage as it is."""
+    goal, before = tuning.goal, tuning.present
+    force = _ratio(measured.force(goal), before.force(goal))
+    stiffness = _ratio(measured.stiffness, before.stiffness)
+    still = (
+        " Standstill was not computed: on a floor that shakes, a stage on a joint moves more (friso rig in-position)."
+        if buys_joint
+        else ""
+    )
+    return (
+        f"Its price: {force} times the force ({with_unit(measured.force(goal), 'N')}), a modulus margin of "
+        f"{measured.least_margin(goal):.2f} instead of {before.least_margin(goal):.2f}, {stiffness} times the stiffness "
+        f"against a load before the integral acts ({with_unit(measured.stiffness, 'N/m')}).{still}"
+    )
+
+
+def _ratio(now: float, before: float) -> str:
+    return f"{now / before:.3g}" if before > 0 and math.isfinite(now / before) else NOTHING
+
+
+def _nothing(tuning: Tuning) -> list[str]:
+    """That nothing is sure to work, what is not sure to, and what to relax."""
+    unsure = [found for found in tuning.answers if found.sure == "unsure" and found.stage is not None]
+    lines = [f"No way was found that surely meets the goal: {goal_words(tuning.goal)}."]
+    lines += [f"{found.way.name} may do, but {unsure_why(found)}." for found in unsure]
+    lines += [_relax(relaxed, tuning.goal) for relaxed in tuning.relaxed]
+    if not tuning.relaxed and not tuning.interrupted:
+        lines.append("No relaxation of one part of the goal, or of two, was found with which a way meets it.")
+    return lines
+
+
+def _relax(relaxed: Relaxed, goal: Goal) -> str:
+    parts = [
+        f"{RELAXED[name]} of {number(value, UNITS[name])} instead of {number(getattr(goal, name), UNITS[name])}"
+        for name, value in relaxed.values.items()
+    ]
+    return (
+        f"With a {listed(parts, 'and')}, {relaxed.way.name} would do on the machines that were tried (this was not "
+        "verified by cycles: run friso tune again with it)."
+    )
+
+
+def unsure_why(found: Answer) -> str:
+    """Why a way is not sure to work."""
+    if found.interrupted and not found.doubts:
+        return "it was not verified"
+    return listed([DOUBTS[doubt] for doubt in found.doubts], "and")
+
+
+def failing(tuning: Tuning) -> list[str]:
+    """What cannot work, and why; and what is not sure to."""
+    lines = []
+    for found in tuning.answers:
+        if found.sure == "does not work":
+            lines.append(f"{found.way.name}: does not work. {reason(found, tuning)}")
+        elif found.sure == "unsure" and tuning.working:
+            lines.append(f"{found.way.name}: not sure to work: {unsure_why(found)}.")
+    return lines
+
+
+def reason(found: Answer, tuning: Tuning) -> str:
+    """Why no setting of a way meets the goal."""
+    if found.settings is None:
+        return "It was not tried."
+    settings, goal = found.settings, tuning.goal
+    sentence = next(_reasons(settings, found, goal))
+    return f"{sentence}{_edges(tuning) if [v.name for v in found.way.variables] == [BANDWIDTH] else ''}"
+
+
+def _reasons(settings: Settings, found: Answer, goal: Goal) -> Iterator[str]:
+    """The first constraint that leaves nothing of the settings that meet those before."""
+    broken, left = settings.broken(goal), np.ones(len(settings.margin), bool)
+    tried = f"of {len(left)} settings tried"
+    said = {
+        "margin": f"No setting keeps a modulus margin of {goal.margin:g} on {percent(goal.share)} of the machines: the "
+        f"best has {settings.margin.max(initial=0.0):.2f}.",
+        "settling": f"No setting ({tried}) brings {percent(goal.share)} of the machines to rest in position by the end "
+        "of the run.",
+        "distance": f"No setting ({tried}) does so at {1 / goal.distance:.2f} of its bandwidth, too: hunting is nearer.",
+        "force": "All settings that settle take more force than there is.",
+        "settle": "All settings that settle do so too late.",
+    }
+    for name, sentence in said.items():
+        left = left & ~broken[name]
+        if not left.any():
+            yield sentence
+    yield f"Something attracts machines, or may, with all of the {found.attracted} best settings that were surveyed."
+
+
+def _edges(tuning: Tuning) -> str:
+    """Where hunting ends in bandwidth, and up to where there is margin."""
+    edge, comfortable = tuning.case.judgement.margin, tuning.limits.highest_comfortable
+    present = crossover(tuning.stage)
+    parts = []
+    if edge is not None:
+        parts.append(
+            f"hunting ends at {with_unit(edge.quiet * present, 'Hz')}, so that {with_unit(edge.quiet * tuning.goal.distance * present, 'Hz')} "
+            "is needed"
+        )
+    if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
+        hertz = comfortable if tuning.stage.controller.bandwidth_key else comfortable * present
+        parts.append(f"the margin is kept up to {with_unit(hertz, 'Hz')}")
+    if tuning.goal.bandwidth_limit is not None:
+        parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")
+    return f" In bandwidth {listed(parts, 'and')}." if parts else ""
+
+
+def rows(tuning: Tuning) -> list[tuple[str, list[str]]]:
+    """The ways side by side, the stage as it is first."""
+    shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
+    words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
+    table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
+    for found in tuning.answers:
+        cells = [words[found.sure], *[NOTHING] * (len(COLUMNS) - 1)]
+        if found.measured is not None:
+            cells = _row(found.measured, tuning, words[found.sure])
+        table.append((found.way.name, cells))
+    return table
+
+
+def _row(measured: Measured, tuning: Tuning, works: str) -> list[str]:
+    goal = tuning.goal
+    return [
+        works,
+        share_with_interval(measured.share(goal)),
+        time(measured.slowest(goal)),
+        time(measured.median),
+        with_unit(measured.force(goal), "N"),
+        f"{measured.least_margin(goal):.2f}",
+        with_unit(measured.stiffness, "N/m"),
+    ]
+
+
+def window_words(window: Window, found: Answer) -> str:
+    """Where a number may lie, all else being as tuned."""
+    name, low, high = window.name, window.low, window.high
+    unit = ""
+    if window.name == BANDWIDTH:
+        present = crossover(found.way.stage)
+        low, high, unit = low * present, high * present, "Hz"
+    else:
+        keys = numeric_keys(found.way.stage.flat())
+        unit = keys[name].unit if name in keys else ""
+    first, last = (number(value, unit) for value in (low, high))
+    first = f"{first} (the least tried)" if window.open_below else first
+    last = f"{last} (the most tried)" if window.open_above else last
+    return f"{name}: from {first} to {last}"
+
+
+def window_lines(tuning: Tuning) -> list[str]:
+    """The windows of the ways that work."""
+    return [
+        f"{found.way.name} holds, each number by itself, for {'; '.join(window_words(w, found) for w in found.windows)}."
+        for found in tuning.working
+        if found.windows
+    ]
+
+
+def assumptions(tuning: Tuning) -> list[str]:
+    """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
+    lines, stage, machines = [], tuning.stage, tuning.machines
+    if stage.parasitic is None and not stage.flexure:
+        lines.append(
+            "The stage file has no parasitic mode: none is assumed. State [parasitic], or the fastest bandwidth that the "
+            'machine allows (--bandwidth-limit "25 Hz"); modes that are not stated make fast controllers unstable.'
+        )
+    lines.append(
+        f"Margins include the sampling and delay of the file; hunting and moves are those of a controller in continuous "
+        f"time. {machines.count} machines were drawn with seed {tuning.seed} that the optimiser did not see, each with a "
+        "move of a quarter of the travel or more."
+    )
+    if machines.from_file:
+        lines.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
+    if machines.spreads:
+        spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
+        lines.append(f"Default spreads (95 % of the machines): {spreads}.")
+    return lines
