@@ -35,6 +35,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "identify": (RIG,),
     "rig": ("stiffness", DRIVE),
     "compare": (DRIVE,),
+    "tune": (RIG,),
     "reproduce": (),
     "guideline": (),
 }

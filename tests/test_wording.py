@@ -34,6 +34,7 @@ MISTAKES = {
     "identify": ("nowhere.csv",),
     "rig": ("stifness", DRIVE),
     "compare": (DRIVE, "--machines", "19"),
+    "tune": (RIG, "--within", "1 s"),
     "reproduce": ("masses", "--out", "out"),
     "guideline": ("--samples", "63"),
     "doctor": ("--full-path",),

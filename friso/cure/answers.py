@@ -79,8 +79,8 @@ class Measured:
 @dataclass(frozen=True)
 class Answer:
     """A way's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work, or
-    does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted` were
-    given up because something attracted machines with them.
+    does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted`
+    were given up because something attracted machines with them.
     """
 
     way: Way

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,14 +74,15 @@ def tune(
     seed: int = 1,
     correlations: Correlations | None = None,
     budget: Budget | None = None,
+    chosen: Collection[str] | None = None,
     progress: Progress = silent,
 ) -> Tuning:
-    """The best settings of every way that the goal allows. Raises InputError for a stage whose reference never stands
-    still, or that has no travel."""
+    """The best settings of every way that the goal allows, or of those with the names `chosen`. Raises InputError for a
+    motion after which nothing has to settle."""
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _moves(stage)
     ideal = _ideal(stage)
-    listed = ways(ideal, goal)
+    listed = [way for way in ways(ideal, goal) if chosen is None or way.name in chosen]
     report = _Report(progress, sum(_steps(way, budget) for way in listed) + 2)
     report("compiling")
     kernels({KernelRequest(structure(way.stage.flat())) for way in [Way.settled_on("", ideal), *listed]})

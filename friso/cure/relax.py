@@ -16,8 +16,8 @@ from friso.cure.trials import LOOSER, attraction
 from friso.cure.ways import Way
 from friso.stage import Stage
 
-TRIED = 3
-"""Settings whose machines are surveyed, at most, for one relaxation."""
+TRIED, SURVEYED = 3, 4
+"""Settings whose machines are surveyed, at most, for one relaxation, and how many machines."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ def _of_way(way: Way, settings: Settings, goal: Goal, machines: Machines) -> Ite
     count = np.sum([values > 1 for values in needed.values()], axis=0)
     factor = np.prod([np.maximum(values, 1.0) for values in needed.values()], axis=0)
     possible = np.isfinite(factor) & np.isfinite(settings.slower)
+    few = machines.take(np.arange(min(SURVEYED, machines.count)))
     for parts in (1, 2):
         kinds: dict[tuple[str, ...], int] = {}
         which = np.flatnonzero(possible & (count == parts))
@@ -61,9 +62,7 @@ def _of_way(way: Way, settings: Settings, goal: Goal, machines: Machines) -> Ite
             kinds[names] = kinds.get(names, 0) + 1
             if kinds[names] > TRIED:
                 continue
-            if attraction(
-                way, settings.shares[[number]], machines.take(np.arange(min(4, machines.count))), goal
-            ).clear.all():
+            if attraction(way, settings.shares[[number]], few, goal).clear.all():
                 kinds[names] = TRIED
                 values = {name: _value(name, settings, int(number)) for name in names}
                 if "within" in values:

@@ -100,7 +100,8 @@ def goal_words(goal: Goal) -> str:
     force = "" if goal.force_limit is None else f" with at most {with_unit(goal.force_limit, 'N')}"
     return (
         f"{percent(goal.share)} of the machines in position within {with_unit(goal.within, 'm')}{late}{force}, with a "
-        f"modulus margin of {goal.margin:g}, nothing that attracts them down to {1 / goal.distance:.2f} of the bandwidth"
+        f"modulus margin of {goal.margin:g}, and nothing that attracts them down to {1 / goal.distance:.2f} of their "
+        "bandwidth"
     )
 
 
@@ -111,7 +112,8 @@ def _interrupted(tuning: Tuning) -> list[str]:
 
 
 def _works(found: Answer, tuning: Tuning, what: str) -> str:
-    assert found.stage is not None and found.measured is not None
+    assert found.stage is not None
+    assert found.measured is not None
     return (
         f"{what}: {found.way.name}. Set {listed(changes(tuning.stage, found.stage), 'and')}. "
         f"{_brings(found.measured, tuning)}. {price(found.measured, tuning, found.way.buys_joint)}"
@@ -121,9 +123,10 @@ def _works(found: Answer, tuning: Tuning, what: str) -> str:
 def _brings(measured: Measured, tuning: Tuning) -> str:
     before, now = (part.slowest(tuning.goal) for part in (tuning.present, measured))
     as_is = "" if measured is tuning.present else f" (as it is: {time(before)})"
+    meet = share_with_interval(measured.share(tuning.goal))
     return (
-        f"Of {measured.count} fresh machines and moves, {share_with_interval(measured.share(tuning.goal))} meet the goal, "
-        f"and the slowest twentieth is in position after {time(now)}{as_is}"
+        f"Of {measured.count} fresh machines and moves, {meet} meet the goal; "
+        f"the slowest twentieth is in position after {time(now)}{as_is}"
     )
 
 
@@ -139,8 +142,8 @@ def price(measured: Measured, tuning: Tuning, buys_joint: bool) -> str:
     )
     return (
         f"Its price: {force} times the force ({with_unit(measured.force(goal), 'N')}), a modulus margin of "
-        f"{measured.least_margin(goal):.2f} instead of {before.least_margin(goal):.2f}, {stiffness} times the stiffness "
-        f"against a load before the integral acts ({with_unit(measured.stiffness, 'N/m')}).{still}"
+        f"{measured.least_margin(goal):.2f} instead of {before.least_margin(goal):.2f}, {stiffness} times the "
+        f"stiffness against a load before the integral acts ({with_unit(measured.stiffness, 'N/m')}).{still}"
     )
 
 
@@ -204,9 +207,10 @@ def _reasons(settings: Settings, found: Answer, goal: Goal) -> Iterator[str]:
     said = {
         "margin": f"No setting keeps a modulus margin of {goal.margin:g} on {percent(goal.share)} of the machines: the "
         f"best has {settings.margin.max(initial=0.0):.2f}.",
-        "settling": f"No setting ({tried}) brings {percent(goal.share)} of the machines to rest in position by the end "
-        "of the run.",
-        "distance": f"No setting ({tried}) does so at {1 / goal.distance:.2f} of its bandwidth, too: hunting is nearer.",
+        "settling": f"No setting ({tried}) brings {percent(goal.share)} of the machines to rest in position by the "
+        "end of the run.",
+        "distance": f"No setting ({tried}) does so at {1 / goal.distance:.2f} of its bandwidth as well: hunting is "
+        "nearer.",
         "force": "All settings that settle take more force than there is.",
         "settle": "All settings that settle do so too late.",
     }
@@ -223,10 +227,8 @@ def _edges(tuning: Tuning) -> str:
     present = crossover(tuning.stage)
     parts = []
     if edge is not None:
-        parts.append(
-            f"hunting ends at {with_unit(edge.quiet * present, 'Hz')}, so that {with_unit(edge.quiet * tuning.goal.distance * present, 'Hz')} "
-            "is needed"
-        )
+        ends, needed = (with_unit(factor * edge.quiet * present, "Hz") for factor in (1.0, tuning.goal.distance))
+        parts.append(f"hunting ends at {ends}, so that {needed} is needed")
     if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
         hertz = comfortable if tuning.stage.controller.bandwidth_key else comfortable * present
         parts.append(f"the margin is kept up to {with_unit(hertz, 'Hz')}")
@@ -280,10 +282,14 @@ def window_words(window: Window, found: Answer) -> str:
 def window_lines(tuning: Tuning) -> list[str]:
     """The windows of the ways that work."""
     return [
-        f"{found.way.name} holds, each number by itself, for {'; '.join(window_words(w, found) for w in found.windows)}."
+        f"{found.way.name} meets the goal, each number by itself, for {'; '.join(_windows(found))}."
         for found in tuning.working
         if found.windows
     ]
+
+
+def _windows(found: Answer) -> list[str]:
+    return [window_words(window, found) for window in found.windows]
 
 
 def assumptions(tuning: Tuning) -> list[str]:
@@ -291,12 +297,12 @@ def assumptions(tuning: Tuning) -> list[str]:
     lines, stage, machines = [], tuning.stage, tuning.machines
     if stage.parasitic is None and not stage.flexure:
         lines.append(
-            "The stage file has no parasitic mode: none is assumed. State [parasitic], or the fastest bandwidth that the "
-            'machine allows (--bandwidth-limit "25 Hz"); modes that are not stated make fast controllers unstable.'
+            "The stage file has no parasitic mode: none is assumed. State [parasitic], or the highest bandwidth that "
+            'the machine allows (--bandwidth-limit "25 Hz"): modes that are not stated make fast controllers unstable.'
         )
     lines.append(
-        f"Margins include the sampling and delay of the file; hunting and moves are those of a controller in continuous "
-        f"time. {machines.count} machines were drawn with seed {tuning.seed} that the optimiser did not see, each with a "
+        "Margins include the sampling and delay of the file; hunting and moves are those of a controller in continuous "
+        f"time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), each with a "
         "move of a quarter of the travel or more."
     )
     if machines.from_file:

@@ -1,0 +1,205 @@
+"""The cure: machines, ways, searches and answers, with tiny budgets."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from friso import Stage, load
+from friso.cure.answers import Answer, doubts, measure
+from friso.cure.goal import Goal
+from friso.cure.isolator import isolated, least_friction
+from friso.cure.machines import Machines, drawn
+from friso.cure.method import Tuning, tune
+from friso.cure.relax import relaxations
+from friso.cure.search import Budget, Search, Settings
+from friso.cure.trials import attraction, margins, moved, quantile
+from friso.cure.variables import BANDWIDTH, crossover
+from friso.cure.ways import Way, ways
+from friso.errors import InputError
+from friso.frequency.crossover import settled_margin
+from friso.hunting.check import check
+from friso.hunting.measures import measured_run
+from friso.stage.correlations import Correlations
+from friso.views.tune.document import tune_document
+from friso.views.tune.page import tune_files
+from friso.views.tune.words import answer, changes, failing, rows
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+TINY = Budget(settings=3, generations=2, machines=4, surveyed=2, fresh=6)
+
+
+@pytest.fixture(scope="module")
+def rigid() -> Stage:
+    """The thesis's rig with its joint locked: it hunts below 9.75 Hz."""
+    return load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True})
+
+
+@pytest.fixture(scope="module")
+def goal() -> Goal:
+    return Goal(bandwidth_limit=25.0, joint=False)
+
+
+@pytest.fixture(scope="module")
+def tuning(rigid: Stage, goal: Goal) -> Tuning:
+    return tune(rigid, goal, budget=TINY, chosen=["bandwidth"])
+
+
+@pytest.fixture(scope="module")
+def machines(rigid: Stage) -> Machines:
+    return drawn(rigid, Correlations(), 5, 1)
+
+
+def test_the_first_machine_is_that_of_the_file(rigid: Stage, machines: Machines) -> None:
+    flat, own = machines.laid_over(rigid, {}, 1), rigid.flat()
+    assert all(flat[key][0] == own[key] for key in [*machines.ratios, "motion.acceleration_time"] if key in own)
+    assert np.ptp(flat["friction.static"]) > 0
+
+
+def test_settings_are_laid_over_machines_one_after_the_other(rigid: Stage, machines: Machines) -> None:
+    flat = machines.laid_over(rigid, {"controller.crossover": np.array([8.0, 16.0])}, 2)
+    assert flat["controller.crossover"].tolist() == [8.0] * 5 + [16.0] * 5
+    assert flat["friction.static"][:5].tolist() == flat["friction.static"][5:].tolist()
+    assert set(flat["controller.tuned_mass"]) == {rigid.flat()["controller.tuned_mass"]}
+
+
+def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> None:
+    whole = rigid.replace({"joint": None, "parasitic": None, "masses.cart": None, "masses.stage": "2 kg"})
+    machines, free = drawn(whole, Correlations(), 4, 1), isolated(whole)
+    flat = machines.laid_over(free, {}, 1)
+    np.testing.assert_allclose(
+        flat["masses.cart"] + flat["masses.stage"], machines.laid_over(whole, {}, 1)["masses.stage"]
+    )
+    assert free.flat()["controller.tuned_mass"] == 2.0
+    assert free.flat()["joint.stiffness"] * free.flat()["joint.stroke"] < least_friction(whole.flat())
+
+
+def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Machines, goal: Goal) -> None:
+    fast = rigid.replace({"controller.crossover": "20 Hz"})
+    moves = moved(Way.settled_on("", fast), np.zeros((1, 0)), machines, goal)
+    alone = measured_run(fast)
+    assert moves.settling[0, 0] == pytest.approx(alone.settling_time[0][0], rel=1e-9)
+    assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
+
+
+def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Machines) -> None:
+    margin = margins(Way.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
+    assert margin == pytest.approx(settled_margin(rigid.flat()), rel=0.02)
+
+
+def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines: Machines, goal: Goal) -> None:
+    """The edge is at 9.75 Hz: at 11 Hz nothing attracts, at 11 Hz over 1.2 something does."""
+    near, far = (rigid.replace({"controller.crossover": f"{hertz} Hz"}) for hertz in (11, 14))
+    one = machines.take(np.array([0]))
+    results = [
+        attraction(Way.settled_on("", stage), np.zeros((1, 0)), one, goal).attracts[0, 0] for stage in (near, far)
+    ]
+    assert results == [True, False]
+
+
+def test_a_quantile_is_a_machine_s() -> None:
+    assert quantile(np.array([[3.0, 1.0, np.inf, 2.0]]), 0.75)[0] == 3.0
+    assert quantile(np.arange(20.0)[None], 0.95)[0] == 18.0
+
+
+def test_ways_are_what_may_be_changed(rigid: Stage) -> None:
+    names = {name: [way.name for way in ways(rigid, goal)] for name, goal in GOALS.items()}
+    assert names["all"] == [*names["controller"], *names["joint"], "isolator and gains"]
+    assert names["joint"] == ["isolator"]
+    assert names["controller"][:2] == ["bandwidth", "gains"]
+
+
+GOALS = {"all": Goal(), "controller": Goal(joint=False), "joint": Goal(controller=False)}
+
+
+def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal) -> None:
+    way = ways(rigid, goal)[0]
+    fastest = way.tuned(np.ones(1))
+    assert [variable.name for variable in way.variables] == [BANDWIDTH]
+    assert crossover(fastest) == pytest.approx(25.0)
+
+
+def test_the_answer_does_not_hunt(tuning: Tuning) -> None:
+    """By friso check and by the edge that it locates, a fifth of the bandwidth away at least."""
+    (found,) = tuning.working
+    assert found.stage is not None
+    case = check(found.stage)["given"]
+    edge = case.judgement.margin
+    assert (case.verdict, case.judgement.hunting.certain) == ("settles", True)
+    assert edge is not None
+    assert edge.factor * tuning.goal.distance < 1
+    assert settled_margin(found.stage.flat()) >= tuning.goal.margin
+
+
+def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Tuning) -> None:
+    assert tuning.needed
+    assert tuning.case.verdict == "hunts"
+
+
+def test_the_answer_names_what_to_change(tuning: Tuning) -> None:
+    stage = tuning.working[0].stage
+    assert stage is not None
+    (change,) = changes(tuning.stage, stage)
+    assert change.startswith("controller.crossover = ")
+    assert change in answer(tuning)[0]
+    assert len(rows(tuning)) == 2
+    assert failing(tuning) == []
+
+
+def test_the_answer_as_files(tuning: Tuning, monkeypatch: pytest.MonkeyPatch) -> None:
+    from friso.views.drawing import matplotlib_renderer
+
+    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+    files = tune_files(tuning)
+    assert files["tuned.toml"] == files["tuned-bandwidth.toml"]
+    assert answer(tuning)[0].split(".")[0] in str(files["tune.html"])
+    document = tune_document(tuning)
+    assert document["ways"]["bandwidth"]["works"] == "works"
+    assert document["as_is"]["slowest_twentieth_s"] is None
+
+
+def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Tuning) -> None:
+    """Not even one whose moves settle: 11 Hz is closer to the edge than wanted."""
+    near = rigid.replace({"controller.crossover": "11 Hz"})
+    measured, case = measure(near, tuning.machines, goal, near), check(near)["given"]
+    assert "distance" in doubts(case, measured, goal)
+    assert "hunting" in doubts(case, measured, goal)
+
+
+def test_ctrl_c_leaves_the_best_so_far(rigid: Stage, goal: Goal) -> None:
+    def interrupt(done: int, total: int, label: str) -> None:
+        if label.startswith("gains"):
+            raise KeyboardInterrupt
+
+    stopped = tune(rigid, goal, budget=TINY, chosen=["bandwidth", "gains"], progress=interrupt)
+    assert stopped.interrupted
+    assert [found.sure for found in stopped.answers] == ["works", "does not work"]
+    assert stopped.answers[0].stage is not None
+
+
+def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Machines) -> None:
+    """With a modulus margin of 0.9, that is what has to give."""
+    goal = Goal(margin=0.9, bandwidth_limit=25.0, joint=False)
+    search = Search(ways(rigid, goal)[0], goal, machines, rigid, TINY, lambda label: None)
+    search.optimise()
+    assert not [*search.surveyed()]
+    (relaxed,) = relaxations([Answer(search.way, None, None, None, (), (), search.settings)], goal, machines)
+    assert [*relaxed.values] == ["margin"]
+    assert relaxed.values["margin"] < 0.9
+    assert relaxed.factor == pytest.approx(0.9 / relaxed.values["margin"])
+
+
+def test_costs_order_settings() -> None:
+    """What breaks a constraint costs more than what does not, and the more the further it does."""
+    columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf], "looser": [1.0] * 4, "slower": [1.0] * 4}
+    columns |= {"force": [1.0] * 4, "margin": [0.6, 0.6, 0.4, 0.6]}
+    settings = Settings(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
+    assert settings.cost(Goal()).argsort().tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("motion", ["hold", "ramp"])
+def test_a_motion_that_needs_not_settle_is_refused(rigid: Stage, motion: str) -> None:
+    keys = {"motion": {"kind": motion, "duration": "1 s", **({"velocity": "1 mm/s"} if motion == "ramp" else {})}}
+    with pytest.raises(InputError):
+        tune(Stage(**{**rigid.as_written(), **keys}))
