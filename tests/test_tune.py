@@ -65,7 +65,8 @@ def test_settings_are_laid_over_machines_one_after_the_other(rigid: Stage, machi
 
 
 def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> None:
-    whole = rigid.replace({"joint": None, "parasitic": None, "masses.cart": None, "masses.stage": "2 kg"})
+    gone = dict.fromkeys(("joint", "parasitic", "masses.cart", "controller.tuned_mass"))
+    whole = rigid.replace({**gone, "masses.stage": "2 kg"})
     machines, free = drawn(whole, Correlations(), 4, 1), isolated(whole)
     flat = machines.laid_over(free, {}, 1)
     np.testing.assert_allclose(

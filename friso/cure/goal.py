@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from friso.frequency.crossover import WANTED
-
-DISTANCE = 1.2
-"""Factor in bandwidth over which nothing may attract below that of a tuned stage."""
+from friso.hunting.margin import DISTANCE
 
 SHARE = 0.95
 """Share of the machines, each with a move of its own, that have to meet the goal."""

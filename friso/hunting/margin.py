@@ -18,6 +18,9 @@ from friso.stage import Stage
 FARTHEST = 10.0
 """Factor up to which the bandwidth is changed."""
 
+DISTANCE = 1.2
+"""Factor of the bandwidth by which advice keeps off the edge of hunting: machines differ, and surveys may miss some."""
+
 STEPS, COARSE = 20, 10
 """Steps to a factor of ten in bandwidth where an edge is looked for, and beyond, where something may attract again:
 windows narrower than a step may be missed."""

@@ -15,6 +15,7 @@ from friso.errors import InputError
 from friso.stage import Stage, load
 
 if TYPE_CHECKING:
+    from friso.cure.suggestion import Suggestion
     from friso.hunting import Case
     from friso.stage.correlations import Sample
     from friso.studies.draws import Draws
@@ -55,17 +56,18 @@ def check(
     with ProgressBar("what attracts the stage") as progress:
         cases = check_stage(stage, rtol=tolerance, traces=target is not None, progress=progress)
     draws = None if sample is None else _draws(stage, sample, seed, max(tolerance, LONG))
+    isolator = _isolator(cases["given"])
     files = []
     if target is not None:
         from friso.views.check.page import check_files
 
-        files = target.write(check_files(cases, draws))
+        files = target.write(check_files(cases, draws, isolator))
     if as_json:
         from friso.views.check.document import check_document
 
-        print_document(check_document(cases, draws), files)
+        print_document(check_document(cases, draws, isolator), files)
     else:
-        _print_cases(stage, cases)
+        _print_cases(stage, cases, isolator)
         if draws is not None:
             _print_draws(draws)
         print_written(files)
@@ -104,14 +106,28 @@ def _print_draws(draws: Draws) -> None:
     print_answer(draws_sentences(draws), title, [*case_labels(draws.stage).values()], draws_rows(draws))
 
 
-def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
-    """A sentence per case, and the short table of `check`."""
+def _isolator(case: Case) -> Suggestion | None:
+    """What an isolator would do for a stage without a joint that hunts."""
+    if case.stage.joint or case.verdict not in ("hunts", "bistable"):
+        return None
+    from friso.cure.suggestion import suggestion
+
+    with ProgressBar("what an isolator would do"):
+        return suggestion(case.stage)
+
+
+def _print_cases(stage: Stage, cases: dict[str, Case], isolator: Suggestion | None) -> None:
+    """A sentence per case, what an isolator would do, and the short table of `check`."""
     from friso.views.check.cases import shown_cases
+    from friso.views.check.isolator_words import isolator_sentence
     from friso.views.check.table import rows
     from friso.views.check.words import answer
 
     cases_in_order = shown_cases(cases)
-    print_answer(answer(cases), stage.name, [item.label for item in cases_in_order], rows(cases_in_order))
+    suggested = [isolator_sentence(isolator)] if isolator else []
+    print_answer(
+        [*answer(cases), *suggested], stage.name, [item.label for item in cases_in_order], rows(cases_in_order)
+    )
 
 
 COMMAND = Command(check, 20)

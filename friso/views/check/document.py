@@ -10,6 +10,7 @@ from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
+    from friso.cure.suggestion import Suggestion
     from friso.hunting import Case, Cycle, Judgement, Margin, Swing
     from friso.hunting.feeding import Feeding
     from friso.hunting.outward import AttractionEnd
@@ -17,13 +18,33 @@ if TYPE_CHECKING:
     from friso.studies.shares import Share
 
 
-def check_document(cases: Mapping[str, Case], draws: Draws | None = None) -> dict[str, Any]:
-    """The cases with their verdicts, and what stages drawn from an uncertain one do."""
+def check_document(
+    cases: Mapping[str, Case], draws: Draws | None = None, isolator: Suggestion | None = None
+) -> dict[str, Any]:
+    """The cases with their verdicts, what stages drawn from an uncertain one do, and what an isolator would."""
     document = {name: _case(case) for name, case in cases.items()}
     if draws is not None:
         for name, case in document.items():
             case["draws"] = draws_document(draws, name)
-    return plain_json({"conclusion": " ".join(answer(cases)), "stage": cases["given"].stage.name, "cases": document})
+    return plain_json(
+        {
+            "conclusion": " ".join(answer(cases)),
+            "stage": cases["given"].stage.name,
+            "cases": document,
+            **({"isolator": _isolator(isolator)} if isolator else {}),
+        }
+    )
+
+
+def _isolator(isolator: Suggestion) -> dict[str, Any]:
+    flat = isolator.stage.flat()
+    return {
+        "settles": isolator.settles,
+        "stiffness_n_per_m": flat["joint.stiffness"],
+        "stroke_m": flat["joint.stroke"],
+        "damping_ns_per_m": flat["joint.damping"],
+        "modulus_margin": isolator.margin,
+    }
 
 
 def _feeding(feeding: Feeding) -> dict[str, Any]:

@@ -9,12 +9,14 @@ from friso.studies.draws import Draws
 from friso.views.check.cases import shown_cases
 from friso.views.check.draws import draws_figure, draws_sentences
 from friso.views.check.figures import check_figures
+from friso.views.check.isolator_words import isolator_sentence
 from friso.views.check.table import rows
 from friso.views.check.words import conclusion, verdict_sentence
 from friso.views.files import Content
 from friso.views.pages import Report
 
 if TYPE_CHECKING:
+    from friso.cure.suggestion import Suggestion
     from friso.hunting import Case
 
 
@@ -24,14 +26,16 @@ BASIS = (
 )
 
 
-def check_files(cases: Mapping[str, Case], draws: Draws | None = None) -> dict[str, Content]:
+def check_files(
+    cases: Mapping[str, Case], draws: Draws | None = None, isolator: Suggestion | None = None
+) -> dict[str, Content]:
     """The page, as `check_html`."""
-    return {"report.html": check_html(cases, draws)}
+    return {"report.html": check_html(cases, draws, isolator)}
 
 
-def check_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
+def check_html(cases: Mapping[str, Case], draws: Draws | None = None, isolator: Suggestion | None = None) -> str:
     """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
-    adds what stages drawn from an uncertain one do."""
+    adds what stages drawn from an uncertain one do, `isolator` what an isolator would."""
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
     tolerances = sorted({f"{item.case.solver.rtol:g}" for item in in_order})
@@ -40,7 +44,11 @@ def check_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
         stage,
         (*check_figures(cases), *([draws_figure(draws)] if draws else [])),
         verdicts=[(item.colour, f"{item.label}: {verdict_sentence(item, cases)}") for item in in_order],
-        sentences=[*filter(None, [conclusion(cases)]), *(draws_sentences(draws) if draws else [])],
+        sentences=[
+            *filter(None, [conclusion(cases)]),
+            *([isolator_sentence(isolator)] if isolator else []),
+            *(draws_sentences(draws) if draws else []),
+        ],
         columns=in_order,
         rows=rows(in_order),
         computed=f", relative tolerance {', '.join(tolerances)}. {BASIS}",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
-from friso.hunting.margin import FARTHEST
+from friso.hunting.margin import DISTANCE, FARTHEST
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
@@ -214,19 +214,29 @@ def _slower(case: Case, end: AttractionEnd) -> str:
 
 
 def _faster(case: Case, edge: Margin) -> str:
-    """What to do to the controller so that the stage settles: to a bandwidth at which it was found to."""
+    """What to do to the controller so that the stage settles: to a bandwidth at a distance from the edge."""
     controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
+    apart = _distance(case, edge)
+    kept = (
+        f", {apart:g} times the edge of hunting" if apart > 1 else ", just above the edge: hunting begins again closely"
+    )
     doubt = "" if edge.certain else f" (not certain: hunting was found up to {highest})"
     if edge.crossover is not None:
         crossover = edge.crossover / edge.factor
-        to = rounded_up(crossover * edge.quiet)
+        to = rounded_up(crossover * edge.quiet * apart)
         by = rounded_up(to - crossover)
-        where = f" (to {with_unit(to, 'Hz')})" if edge.certain else f", to {with_unit(to, 'Hz')}"
-        return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')}{where}{doubt}"
-    factor = rounded_up(edge.quiet)
+        return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}{kept}){doubt}"
+    factor = rounded_up(edge.quiet * apart)
     powers = controller.speeds_up.items()
     gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
-    return f"make the controller {factor:.3g} times faster ({', '.join(gains)}){doubt}"
+    return f"make the controller {factor:.3g} times faster{kept} ({', '.join(gains)}){doubt}"
+
+
+def _distance(case: Case, edge: Margin) -> float:
+    """The factor from the edge that advice keeps; 1 where something attracts again within it."""
+    begins = [window.low.inside for window in case.judgement.windows if window.low is not None]
+    again = any(edge.factor < begin <= edge.quiet * DISTANCE * (1 + ROUGH) for begin in begins)
+    return 1.0 if again or edge.quiet * DISTANCE > FARTHEST else DISTANCE
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:

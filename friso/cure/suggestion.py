@@ -1,0 +1,73 @@
+"""Whether an isolator would settle a rigid stage that hunts: a few joints surveyed, as a first answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.cure.goal import Goal
+from friso.cure.isolator import isolated, least_friction
+from friso.cure.variables import DAMPING_RATIOS, joint
+from friso.cure.ways import Way
+from friso.equations.bandwidth import faster
+from friso.equations.structure import shared_structure
+from friso.errors import InputError
+from friso.frequency.crossover import settled_margin
+from friso.hunting.attractors import attractors
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.stage import Stage
+
+STROKES = (1e-4, 3e-4, 1e-3, 3e-3)
+"""Strokes that are tried [m], the shortest that does being the answer."""
+
+FORCE, DAMPING = 0.6, (0.05, DAMPING_RATIOS[1])
+"""Force of the joints at their strokes, as a share of the static friction, and their damping ratios."""
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A joint that was tried in a rigid stage, the `stage` with it: whether it `settles`, so that nothing attracts it
+    at its bandwidth and down to the distance below it, and its least modulus `margin` in all settled states. Where no
+    joint settles, it is the last one."""
+
+    stage: Stage
+    settles: bool
+    margin: float
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities behind
+def suggestion(stage: Stage) -> Suggestion | None:
+    """The shortest stroke of a few with which an isolator settles a stage, with the softest joint that does not move
+    the cart; None for a stage that has a joint already, or can have none."""
+    friction = least_friction(stage.flat())
+    if stage.joint or friction <= 0:
+        return None
+    try:
+        free = isolated(stage)
+    except InputError:
+        return None
+    way, tried = Way("", free, joint(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
+    shares = np.array([_shares(way, stroke, damping) for stroke, damping in tried])
+    numbers = way.changes(shares)
+    flat = {**free.flat(), **numbers}
+    attracts = np.zeros(len(tried), bool)
+    for factor in (1.0, 1 / Goal.distance):
+        slower = faster(flat, factor)
+        survey = attractors(Ensemble.held(slower, len(tried), form=shared_structure(slower)), cycles=False)
+        attracts |= survey.attracts | ~survey.decided
+    for number in np.flatnonzero(~attracts):
+        settled = way.tuned(shares[number])
+        margin = settled_margin(settled.flat())
+        if margin > 0:
+            return Suggestion(settled, True, margin)
+    return Suggestion(way.tuned(shares[-1]), False, 0.0)
+
+
+def _shares(way: Way, stroke: float, damping: float) -> list[float]:
+    """The shares of the ranges of a joint at which it has a stroke [m] and a damping ratio."""
+    wanted = (stroke, FORCE, damping)
+    return [
+        float(np.log(value / variable.low) / np.log(variable.high / variable.low))
+        for value, variable in zip(wanted, way.variables, strict=True)
+    ]

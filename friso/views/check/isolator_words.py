@@ -1,0 +1,32 @@
+"""What an isolator would do for a rigid stage, in a sentence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from friso.hunting.margin import DISTANCE
+from friso.views.drawing.prefixes import with_unit
+
+if TYPE_CHECKING:
+    from friso.cure.suggestion import Suggestion
+
+LITTLE = 0.5
+"""Modulus margin below which the controller has to be tuned as well."""
+
+
+def isolator_sentence(suggestion: Suggestion) -> str:
+    """Whether it would settle on an isolator, and on which."""
+    flat = suggestion.stage.flat()
+    joint = (
+        f"an isolator of k_j = {with_unit(flat['joint.stiffness'], 'N/m')}, stroke "
+        f"{with_unit(flat['joint.stroke'], 'm')} and damping {with_unit(flat['joint.damping'], 'N*s/m')}"
+    )
+    if not suggestion.settles:
+        return f"It would not settle on {joint}, nor on those of shorter strokes that were tried."
+    low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
+    return (
+        f"On {joint} between {with_unit(flat['masses.cart'], 'kg')} on the cart and "
+        f"{with_unit(flat['masses.stage'], 'kg')} on the stage it would settle: nothing was found to attract it down "
+        f"to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}{low}. This is a first "
+        "look: friso tune finds the best isolator and verifies it."
+    )
