@@ -11,9 +11,10 @@ from refusals import Refused
 
 import friso
 from friso.design_method.geometry import Geometry, Sheet, box, rounded, sheets
+from friso.design_method.outline import outline
 from friso.design_method.population import corners, sampled, typical_move
-from friso.design_method.prepare import prepared, with_leaves
-from friso.design_method.spec import Spec, load_spec
+from friso.design_method.prepare import assumed, prepared, with_leaves
+from friso.design_method.spec import Spec, load_spec, read_spec
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = EXAMPLES / "specs" / "thesis.toml"
@@ -136,14 +137,35 @@ def test_a_range_the_friction_law_does_not_have(rig: friso.Stage, refused: Refus
 @pytest.mark.parametrize(
     "change",
     [
-        {"joint": None, "parasitic": None},
-        {"masses.cart": None, "joint": None, "parasitic": None},
+        {"joint": {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}},
         {"friction": {"model": "none"}},
     ],
 )
 def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any], refused: Refused) -> None:
     with refused():
         prepared(rig.replace(change), load_spec(SPEC))
+
+
+@pytest.mark.parametrize("masses", [{"cart": "1.2 kg", "stage": "0.5 kg"}, {"stage": "1.7 kg"}])
+def test_a_rigid_stage_is_given_what_it_lacks(rig: friso.Stage, masses: dict[str, str]) -> None:
+    """A second mass, and a joint whose limiter is nearly the thesis's."""
+    stage, spec = rig.replace({"joint": None, "parasitic": None, "masses": masses}), load_spec(SPEC)
+    base = prepared(stage, spec)
+    assert base.flat()["joint.limiter_stiffness"] == pytest.approx(2e7, rel=0.1)
+    assert base.flat()["joint.limiter_damping"] == pytest.approx(100, rel=0.1)
+    assert base.flat()["masses.cart"] + base.flat()["masses.stage"] == pytest.approx(1.7)
+    assert ("masses.cart" in assumed(stage, spec)) == (len(masses) == 1)
+    assert assumed(rig, spec) == {}
+
+
+def test_the_outline_of_a_specification_is_one(rig: friso.Stage) -> None:
+    stage = rig.replace({"friction.static": "3 N +/- 0.5 N"})
+    spec = read_spec(outline(stage))
+    assert spec.limit == stage.flat()["controller.crossover"]
+    assert spec.friction.static is not None
+    assert (spec.friction.static.low, spec.friction.static.high) == (2.5, 3.5)
+    assert spec.moves.travel.high == pytest.approx(100 * 0.03**2)
+    prepared(stage, spec)
 
 
 def test_gains_instead_of_a_crossover(rig: friso.Stage, refused: Refused) -> None:

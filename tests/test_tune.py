@@ -9,7 +9,6 @@ import pytest
 from friso import Stage, load
 from friso.cure.answers import Answer, doubts, measure
 from friso.cure.goal import Goal
-from friso.cure.isolator import isolated, least_friction
 from friso.cure.machines import Machines, drawn
 from friso.cure.method import Tuning, tune
 from friso.cure.relax import relaxations
@@ -17,6 +16,7 @@ from friso.cure.search import Budget, Search, Settings
 from friso.cure.trials import attraction, margins, moved, quantile
 from friso.cure.variables import BANDWIDTH, crossover
 from friso.cure.ways import Way, ways
+from friso.design_method.isolator import isolated, least_friction
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check

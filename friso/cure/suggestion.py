@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.cure.goal import Goal
-from friso.cure.isolator import isolated, least_friction
 from friso.cure.variables import DAMPING_RATIOS, joint
 from friso.cure.ways import Way
+from friso.design_method.isolator import isolated, least_friction
 from friso.equations.bandwidth import faster
 from friso.equations.structure import shared_structure
 from friso.errors import InputError

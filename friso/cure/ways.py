@@ -10,8 +10,8 @@ import numpy as np
 
 from friso.cure import variables
 from friso.cure.goal import Goal
-from friso.cure.isolator import isolated, least_friction
 from friso.cure.variables import Variable, bandwidth_factor, of_key
+from friso.design_method.isolator import isolated, least_friction
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.controllers import controller_of

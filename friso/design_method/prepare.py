@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from friso.design_method.geometry import Geometry, moved_along
+from friso.design_method.isolator import isolated
 from friso.design_method.spec import Spec
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.errors import InputError
+from friso.materials import materials
 from friso.stage import Stage
 
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
@@ -16,6 +18,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
     ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
     _can_be_isolated(stage)
+    stage = with_joint(stage, spec)
     section = spec.leaves
     low, high = (min(map(float, section.thickness)), section.stroke.high)
     masses: dict[str, str | None] = {
@@ -44,6 +47,23 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base
 
 
+def with_joint(stage: Stage, spec: Spec) -> Stage:
+    """The stage with masses of cart and stage, and a joint with damping and limiter: its own, or assumed ones."""
+    if stage.joint is not None:
+        return stage
+    material = spec.leaves.materials[0]
+    return isolated(stage, spec.leaves.stroke.high, materials()[material].young)
+
+
+def assumed(stage: Stage, spec: Spec) -> dict[str, float]:
+    """The masses and keys of the joint that are assumed for a stage without one, by key [SI]."""
+    if stage.joint is not None:
+        return {}
+    before, after = stage.flat(), with_joint(stage, spec).flat()
+    keys = ("masses.cart", "masses.stage", "joint.damping", "joint.limiter_stiffness", "joint.limiter_damping")
+    return {key: after[key] for key in keys if before.get(key) != after[key]}
+
+
 def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
     """A prepared stage with leaf springs of a geometry and a stroke [m]."""
     name = f"{base.name}, with friction isolator" if base.name else "With friction isolator"
@@ -52,12 +72,9 @@ def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
 
 
 def _can_be_isolated(stage: Stage) -> None:
-    if stage.masses.cart is None or stage.masses.stage is None:
-        expected = "both masses: the isolator goes between cart and stage"
-        raise InputError("masses", "a single mass", expected, 'cart = "1.2 kg", stage = "0.5 kg"')
-    if stage.joint is None or stage.joint.damping is None:
-        expected = "a [joint] with its damping and its limiter; its stiffness follows from the design"
-        raise InputError("joint", "nothing" if stage.joint is None else "no damping", expected, JOINT)
+    if stage.joint is not None and stage.joint.damping is None:
+        expected = "a [joint] with its damping and its limiter, or none; its stiffness follows from the design"
+        raise InputError("joint", "no damping", expected, JOINT)
     if stage.friction is None or stage.friction.model == "none":
         raise InputError(
             "friction", "none", "friction, without which no isolator is needed", '[friction] model = "lugre" ...'

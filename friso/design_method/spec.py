@@ -269,6 +269,14 @@ EXAMPLE = '[machine] and, on the next line, bandwidth_limit = "48 Hz"'
 EXPECTED = "a specification; examples/specs/thesis.toml is one"
 
 
+def read_spec(text: str) -> Spec:
+    """The specification of a TOML text. Raises SpecError."""
+    try:
+        return Spec(**parsed(text, EXPECTED, EXAMPLE))
+    except InputError as error:
+        raise SpecError.of(error) from None
+
+
 def load_spec(path: str | os.PathLike[str]) -> Spec:
     """The specification in a TOML file. Raises SpecError."""
     try:

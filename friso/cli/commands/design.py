@@ -30,7 +30,10 @@ if TYPE_CHECKING:
 
 def design(
     stage_file: StageFile,
-    spec_file: Annotated[Path, typer.Argument(metavar="SPEC.toml", help="The specification.")],
+    spec_file: Annotated[
+        Path | None,
+        typer.Argument(metavar="[SPEC.toml]", help="The specification; one from the stage file if left out."),
+    ] = None,
     overrides: Overrides = None,
     out: DefaultFolder = Path("design"),
     overwrite: Overwrite = False,
@@ -41,13 +44,15 @@ def design(
     Example: friso design examples/thesis_rig.toml examples/specs/thesis.toml --out design
     """
     from friso.design_method.method import NoDesign
-    from friso.design_method.spec import load_spec
+    from friso.design_method.outline import outline
+    from friso.design_method.spec import load_spec, read_spec
 
     stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
-    spec = load_spec(spec_file)
+    spec = read_spec(outline(stage)) if spec_file is None else load_spec(spec_file)
+    _say_what_is_assumed(stage, spec, spec_file)
     if stage.drive:
         say("[drive] is taken into account for the margins; hunting and moves are simulated in continuous time")
-    target = OutputFolder("design", out, overwrite, [stage_file, spec_file])
+    target = OutputFolder("design", out, overwrite, [file for file in (stage_file, spec_file) if file])
     target.check(STAGES)
     try:
         result, files = _designed(stage, spec, target)
@@ -64,6 +69,20 @@ def design(
 
         say(f"the design does not meet the specification: {shortfall(result)}")
         raise typer.Exit(2)
+
+
+def _say_what_is_assumed(stage: Stage, spec: Spec, spec_file: Path | None) -> None:
+    """Say what neither the stage file nor a specification tells."""
+    from friso.design_method.prepare import assumed
+    from friso.stage import numeric_keys
+    from friso.views.drawing.prefixes import with_unit
+
+    if spec_file is None:
+        say("no specification: one is made from the stage file; friso init --spec STAGE.toml writes it for you to edit")
+    if keys := assumed(stage, spec):
+        units = numeric_keys(stage.flat() | keys)
+        numbers = ", ".join(f"{key} = {with_unit(value, units[key].unit)}" for key, value in keys.items())
+        say(f"the stage file has no joint: {numbers} are assumed; state [masses] and [joint] to have others")
 
 
 def _designed(stage: Stage, spec: Spec, target: OutputFolder) -> tuple[Design, list[Path]]:

@@ -24,9 +24,9 @@ def isolator_sentence(suggestion: Suggestion) -> str:
     if not suggestion.settles:
         return f"It would not settle on {joint}, nor on those of shorter strokes that were tried."
     low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
+    masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     return (
-        f"On {joint} between {with_unit(flat['masses.cart'], 'kg')} on the cart and "
-        f"{with_unit(flat['masses.stage'], 'kg')} on the stage it would settle: nothing was found to attract it down "
-        f"to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}{low}. This is a first "
-        "look: friso tune finds the best isolator and verifies it."
+        f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found to "
+        f"attract it down to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}{low}. "
+        "This is a first look: friso tune finds the best isolator and verifies it."
     )

@@ -14,8 +14,12 @@ STAGE_SHARE = 0.3
 STROKE, FORCE_SHARE, DAMPING_RATIO = 1e-3, 0.5, 0.05
 """The joint that a search begins with: stroke [m], force at the stroke over static friction, damping ratio."""
 
-LIMITER = {"joint.limiter_stiffness": 2e7, "joint.limiter_damping": 100.0}
-"""The thesis's stroke limiter [N/m, N s/m]."""
+STEEL = 190e9
+"""Young's modulus of spring steel [Pa], of which leaves and stops are where nothing else is told."""
+
+STOP, STOP_DAMPING_RATIO = 0.1, 0.016
+"""Stiffness of a stroke limiter over Young's modulus times the stroke, and its damping ratio with the stage: of the
+thesis's limiter they are 0.105 and 0.0158."""
 
 
 def least_friction(flat: Mapping[str, Any]) -> float:
@@ -33,21 +37,24 @@ def split(flat: Mapping[str, Any]) -> dict[str, float]:
     return {"masses.cart": (1 - STAGE_SHARE) * whole, "masses.stage": STAGE_SHARE * whole}
 
 
-def isolated(stage: Stage) -> Stage:
-    """The stage with a free joint: its own, or one to begin a search with; its controller as tuned for the whole mass.
-    Raises StageError where the result is no stage."""
+def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stage:
+    """The stage with a free joint: its own, or one to begin a search with, of a stroke [m] and leaves with a Young's
+    modulus `young` [Pa]; its controller as tuned for the whole mass. Raises StageError where the result is no stage.
+    """
     free = stage.variants().get("free")
     if free is not None:
         return free
     flat = stage.flat()
     masses = split(flat)
-    stiffness = FORCE_SHARE * least_friction(flat) / STROKE
+    stiffness = FORCE_SHARE * least_friction(flat) / stroke
+    stop = STOP * young * stroke
     numbers = {
         **masses,
         **as_tuned(flat),
         "joint.stiffness": stiffness,
         "joint.damping": 2 * DAMPING_RATIO * (stiffness * masses["masses.stage"]) ** 0.5,
-        "joint.stroke": STROKE,
-        **LIMITER,
+        "joint.stroke": stroke,
+        "joint.limiter_stiffness": stop,
+        "joint.limiter_damping": 2 * STOP_DAMPING_RATIO * (stop * masses["masses.stage"]) ** 0.5,
     }
     return stage.with_numbers(numbers)

@@ -1,0 +1,91 @@
+"""A specification to begin with, written from a stage file: ranges about its own numbers, and leaves to be had."""
+
+from __future__ import annotations
+
+from friso.equations.bandwidth import bandwidth
+from friso.intervals import Interval
+from friso.stage import Stage
+from friso.stage.stage import numeric_keys
+
+FRICTION, MASS = 0.3, 0.05
+"""Shares by which friction and masses are taken to differ from the stage file's, where that tells nothing."""
+
+TRAVELS = 0.1
+"""The shortest move, as a share of the stage file's travel."""
+
+LIMIT = 20.0
+"""Bandwidth limit [Hz] where the controller states none."""
+
+SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
+
+
+def outline(stage: Stage) -> str:
+    """The text of a specification with comments: the present bandwidth as the machine's limit, ranges from what is
+    uncertain in the stage file (else assumed ones), moves up to its travel, and spring steel in usual gauges."""
+    flat = stage.flat()
+    limit = bandwidth(flat) or LIMIT
+    friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
+    masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
+    both = masses if len(masses) == 2 else [f"# {line}   # split, unless both are told" for line in masses]
+    travel, acceleration = _move(stage)
+    return "\n".join(
+        [
+            f'name = "Friction isolator of {stage.name or "the stage"}"',
+            "",
+            "[machine]                                  # the highest bandwidth that it allows",
+            f'bandwidth_limit = "{limit:g} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',
+            "",
+            "[friction]                                 # ranges; a key left out stays as in the stage file",
+            *friction,
+            "",
+            "[masses]",
+            *both,
+            "",
+            "[moves]",
+            f'travel = "{TRAVELS * travel:g} m .. {travel:g} m"',
+            f'acceleration = "{TRAVELS * acceleration:g} m/s^2 .. {acceleration:g} m/s^2"',
+            "",
+            "[position]",
+            'window = "1 um"                            # in position: stays this close to the reference',
+            '# settling_time = "1 s"                    # what 95 % of the moves may take',
+            "",
+            "[load]                                     # at the leaf ends, beside the weight of the stage",
+            'force_x = "0 N"                            # along the leaves',
+            'force_y = "0 N"                            # along their width, as of a cable',
+            "",
+            "[leaves]                                   # what may be built",
+            "leaves = 2",
+            'length = "30 mm .. 70 mm"',
+            'width = "15 mm .. 45 mm"',
+            'spacing = "30 mm .. 60 mm"',
+            'thickness = "0.1 mm .. 0.5 mm"             # usual gauges in this range, or a list of sheets to be had',
+            'materials = ["stainless 1.4310"]',
+            'stroke = "0.3 mm .. 1 mm"                  # the largest that can be had is chosen',
+            "",
+            "[safety]                                   # factors; those left out are the defaults",
+            "hunting = 1.2                              # crossover over the edge of hunting",
+            "",
+        ]
+    )
+
+
+def _line(stage: Stage, key: str, share: float) -> str:
+    """A range of a key: its own, or a share about its value."""
+    flat, own = stage.flat(), stage.uncertain().get(key)
+    name, unit = key.split(".")[1], numeric_keys(flat)[key].unit
+    low, high = _ends(own) if own else ((1 - share) * flat[key], (1 + share) * flat[key])
+    why = "as in the stage file" if own else f"assumed: {100 * share:g} % about the stage file's"
+    return f'{name} = "{low:.4g} {unit} .. {high:.4g} {unit}"   # {why}'
+
+
+def _ends(interval: Interval) -> tuple[float, float]:
+    return float(interval.low), float(interval.high)
+
+
+def _move(stage: Stage) -> tuple[float, float]:
+    """Travel [m] and acceleration [m/s^2] of the stage file's motion, or 10 mm at 10 m/s^2."""
+    flat = stage.flat()
+    if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"]:
+        return 1e-2, 10.0
+    rate = float(flat["motion.acceleration"])
+    return rate * float(flat["motion.acceleration_time"]) ** 2, rate
