@@ -26,7 +26,7 @@ def isolator_sentence(suggestion: Suggestion) -> str:
     low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
     masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     return (
-        f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found to "
-        f"attract it down to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}{low}. "
-        "This is a first look: friso tune finds the best isolator and verifies it."
+        f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found "
+        f"to attract it down to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}"
+        f"{low}. This is a first look: friso tune finds the best isolator and verifies it."
     )
