@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from friso import Stage, load
-from friso.cure.answers import Answer, doubts, measure
+from friso.cure.answers import Cure, doubts, measure
 from friso.cure.goal import Goal
-from friso.cure.machines import Machines, drawn
-from friso.cure.method import Tuning, tune
+from friso.cure.machines import Fleet, drawn
+from friso.cure.method import Advice, tune
 from friso.cure.relax import relaxations
-from friso.cure.search import Budget, Search, Settings
+from friso.cure.search import Budget, Search, SettingsTried
 from friso.cure.suggestion import suggestion
 from friso.cure.trials import attraction, margins, moved, quantile
 from friso.cure.variables import BANDWIDTH, crossover
-from friso.cure.ways import Way, ways
+from friso.cure.ways import WayOut, ways
 from friso.design_method.isolator import isolated, least_friction
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
@@ -44,7 +44,7 @@ def goal() -> Goal:
 
 
 @pytest.fixture(scope="module")
-def tuning(rigid: Stage, goal: Goal) -> Tuning:
+def tuning(rigid: Stage, goal: Goal) -> Advice:
     """Interrupted in the middle of the second way."""
 
     def interrupt(done: int, total: int, label: str) -> None:
@@ -55,17 +55,17 @@ def tuning(rigid: Stage, goal: Goal) -> Tuning:
 
 
 @pytest.fixture(scope="module")
-def machines(rigid: Stage) -> Machines:
+def machines(rigid: Stage) -> Fleet:
     return drawn(rigid, Correlations(), 5, 1)
 
 
-def test_the_first_machine_is_that_of_the_file(rigid: Stage, machines: Machines) -> None:
+def test_the_first_machine_is_that_of_the_file(rigid: Stage, machines: Fleet) -> None:
     flat, own = machines.laid_over(rigid, {}, 1), rigid.flat()
     assert all(flat[key][0] == own[key] for key in [*machines.ratios, "motion.acceleration_time"] if key in own)
     assert np.ptp(flat["friction.static"]) > 0
 
 
-def test_settings_are_laid_over_machines_one_after_the_other(rigid: Stage, machines: Machines) -> None:
+def test_settings_are_laid_over_machines_one_after_the_other(rigid: Stage, machines: Fleet) -> None:
     flat = machines.laid_over(rigid, {"controller.crossover": np.array([8.0, 16.0])}, 2)
     assert flat["controller.crossover"].tolist() == [8.0] * 5 + [16.0] * 5
     assert flat["friction.static"][:5].tolist() == flat["friction.static"][5:].tolist()
@@ -84,25 +84,25 @@ def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> N
     assert free.flat()["joint.stiffness"] * free.flat()["joint.stroke"] < least_friction(whole.flat())
 
 
-def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Machines, goal: Goal) -> None:
+def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     fast = rigid.replace({"controller.crossover": "20 Hz"})
-    moves = moved(Way.settled_on("", fast), np.zeros((1, 0)), machines, goal)
+    moves = moved(WayOut.settled_on("", fast), np.zeros((1, 0)), machines, goal)
     alone = measured_run(fast)
     assert moves.settling[0, 0] == pytest.approx(alone.settling_time[0][0], rel=1e-9)
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
 
 
-def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Machines) -> None:
-    margin = margins(Way.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
+def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Fleet) -> None:
+    margin = margins(WayOut.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
     assert margin == pytest.approx(settled_margin(rigid.flat()), rel=0.02)
 
 
-def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines: Machines, goal: Goal) -> None:
+def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     """The edge is at 9.75 Hz: at 11 Hz nothing attracts, at 11 Hz over 1.2 something does."""
     near, far = (rigid.replace({"controller.crossover": f"{hertz} Hz"}) for hertz in (11, 14))
     one = machines.take(np.array([0]))
     results = [
-        attraction(Way.settled_on("", stage), np.zeros((1, 0)), one, goal).attracts[0, 0] for stage in (near, far)
+        attraction(WayOut.settled_on("", stage), np.zeros((1, 0)), one, goal).attracts[0, 0] for stage in (near, far)
     ]
     assert results == [True, False]
 
@@ -129,7 +129,7 @@ def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal) -> None:
     assert crossover(fastest) == pytest.approx(25.0)
 
 
-def test_the_answer_does_not_hunt(tuning: Tuning) -> None:
+def test_the_answer_does_not_hunt(tuning: Advice) -> None:
     """By what friso check says of it and the edge that it locates, a fifth of the bandwidth away at least."""
     (found,) = tuning.working
     case = found.case
@@ -143,12 +143,12 @@ def test_the_answer_does_not_hunt(tuning: Tuning) -> None:
     assert settled_margin(found.stage.flat()) >= tuning.goal.margin
 
 
-def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Tuning) -> None:
+def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Advice) -> None:
     assert tuning.needed
     assert tuning.case.verdict == "hunts"
 
 
-def test_the_answer_names_what_to_change(tuning: Tuning) -> None:
+def test_the_answer_names_what_to_change(tuning: Advice) -> None:
     stage = tuning.working[0].stage
     assert stage is not None
     (change,) = changes(tuning.stage, stage)
@@ -158,7 +158,7 @@ def test_the_answer_names_what_to_change(tuning: Tuning) -> None:
     assert [line.split(":")[0] for line in failing(tuning)] == ["gains"]
 
 
-def test_the_answer_as_files(tuning: Tuning, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_answer_as_files(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
     from friso.views.drawing import matplotlib_renderer
 
     monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
@@ -170,7 +170,7 @@ def test_the_answer_as_files(tuning: Tuning, monkeypatch: pytest.MonkeyPatch) ->
     assert document["as_is"]["slowest_twentieth_s"] is None
 
 
-def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Tuning) -> None:
+def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
     """Not even one whose moves settle: 11 Hz is closer to the edge than wanted."""
     near = rigid.replace({"controller.crossover": "11 Hz"})
     measured, case = measure(near, tuning.machines, goal, near), check_given(near)
@@ -178,19 +178,19 @@ def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning:
     assert "hunting" in doubts(case, measured, goal)
 
 
-def test_ctrl_c_leaves_the_best_so_far(tuning: Tuning) -> None:
+def test_ctrl_c_leaves_the_best_so_far(tuning: Advice) -> None:
     assert tuning.interrupted
     assert [found.sure for found in tuning.answers] == ["works", "does not work"]
     assert "Interrupted" in answer(tuning)[0]
 
 
-def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Machines) -> None:
+def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
     """With a modulus margin of 0.9, that is what has to give."""
     goal = Goal(margin=0.9, bandwidth_limit=25.0, joint=False)
     search = Search(ways(rigid, goal)[0], goal, machines, rigid, TINY, lambda label: None)
     search.optimise()
     assert not [*search.surveyed()]
-    (relaxed,) = relaxations([Answer(search.way, None, None, None, (), (), search.settings)], goal, machines)
+    (relaxed,) = relaxations([Cure(search.way, None, None, None, (), (), search.settings)], goal, machines)
     assert [*relaxed.values] == ["margin"]
     assert relaxed.values["margin"] < 0.9
     assert relaxed.factor == pytest.approx(0.9 / relaxed.values["margin"])
@@ -213,7 +213,7 @@ def test_costs_order_settings() -> None:
     """What breaks a constraint costs more than what does not, and the more the further it does."""
     columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf], "looser": [1.0] * 4, "slower": [1.0] * 4}
     columns |= {"force": [1.0] * 4, "margin": [0.6, 0.6, 0.4, 0.6]}
-    settings = Settings(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
+    settings = SettingsTried(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
     assert settings.cost(Goal()).argsort().tolist() == [0, 1, 2, 3]
 
 

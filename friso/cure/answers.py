@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 
 from friso.cure.goal import Goal
-from friso.cure.machines import Machines
-from friso.cure.search import Settings
+from friso.cure.machines import Fleet
+from friso.cure.search import SettingsTried
 from friso.cure.trials import Attraction, Moves, attraction, margins, moved, quantile
-from friso.cure.ways import Way
-from friso.cure.window import Window
+from friso.cure.ways import WayOut
+from friso.cure.window import SettingWindow
 from friso.equations.bandwidth import proportional_stiffness
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
@@ -28,7 +28,7 @@ Sure = Literal["works", "unsure", "does not work"]
 
 
 @dataclass(frozen=True)
-class Measured:
+class Performance:
     """A stage on machines: its `moves`, modulus margins and what attracts, in rows of one; and of the stage itself the
     least modulus margin in all settled states, `own_margin`, and the stiffness [N/m] against a load before the integral
     acts: that of loop and joint in series."""
@@ -77,19 +77,19 @@ class Measured:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Cure:
     """A way's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work, or
     does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted`
     were given up because something attracted machines with them.
     """
 
-    way: Way
+    way: WayOut
     stage: Stage | None
-    measured: Measured | None
+    measured: Performance | None
     case: Case | None
     doubts: tuple[str, ...]
-    windows: tuple[Window, ...] = ()
-    settings: Settings | None = None
+    windows: tuple[SettingWindow, ...] = ()
+    settings: SettingsTried | None = None
     attracted: int = 0
     interrupted: bool = False
 
@@ -102,15 +102,15 @@ class Answer:
 
 
 @np.errstate(all="ignore")
-def measure(stage: Stage, machines: Machines, goal: Goal, drive: Stage) -> Measured:
+def measure(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
     """A stage on machines, with the sampling and delay of the stage `drive` for its margins."""
-    way = Way.settled_on("", stage)
+    way = WayOut.settled_on("", stage)
     flat = stage.flat()
     timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
     stiffness = proportional_stiffness(flat)
     if flat.get("joint.locked") is False:
         stiffness = in_series(stiffness, flat["joint.stiffness"])
-    return Measured(
+    return Performance(
         moved(way, ONE, machines, goal),
         margins(way, ONE, machines, drive),
         attraction(way, ONE, machines, goal),
@@ -124,7 +124,7 @@ def verified(stage: Stage) -> Case:
     return check_given(stage)
 
 
-def doubts(case: Case, measured: Measured, goal: Goal) -> tuple[str, ...]:
+def doubts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """What of the goal a stage does not meet, or not surely: names of `friso.views.tune.words.DOUBTS`."""
     judgement, edge = case.judgement, case.judgement.margin
     listed: list[str] = []

@@ -31,7 +31,7 @@ ADDED_KEYS = ("joint.stiffness", "joint.damping")
 
 
 @dataclass(frozen=True)
-class Machines:
+class Fleet:
     """Keys of the stage to what they are multiplied by on each machine (`ratios`), or what is added where they are 0
     (`shifts`), and its share of the travel, all of shape (count,); which keys the file calls uncertain, and the default
     spreads [%] of others."""
@@ -47,7 +47,7 @@ class Machines:
     def count(self) -> int:
         return len(self.travel)
 
-    def take(self, numbers: np.ndarray) -> Machines:
+    def take(self, numbers: np.ndarray) -> Fleet:
         """The machines with these numbers."""
         ratios, shifts = (
             {key: value[numbers] for key, value in column.items()} for column in (self.ratios, self.shifts)
@@ -79,7 +79,7 @@ class Machines:
         return ratios
 
 
-def drawn(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
+def drawn(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
     """Machines drawn as `friso compare` draws them; the first is that of the stage file, with its own move. Joints that
     the file does not have vary by the default spreads. Raises InputError."""
     sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()
@@ -95,4 +95,4 @@ def drawn(stage: Stage, correlations: Correlations, count: int, seed: int) -> Ma
         values[0] = 1.0
     for values in shifts.values():
         values[0] = 0.0
-    return Machines(ratios, shifts, travel, sample.from_file, dict(sample.spreads), seed)
+    return Fleet(ratios, shifts, travel, sample.from_file, dict(sample.spreads), seed)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.cure.answers import Answer, Measured, doubts, measure, verified
+from friso.cure.answers import Cure, Performance, doubts, measure, verified
 from friso.cure.goal import Goal
-from friso.cure.machines import TRAVEL, Machines, drawn
+from friso.cure.machines import TRAVEL, Fleet, drawn
 from friso.cure.relax import Relaxed, relaxations
 from friso.cure.search import Budget, Search
-from friso.cure.ways import Way, ways
+from friso.cure.ways import WayOut, ways
 from friso.cure.window import windows
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.motion import last_corner
@@ -33,18 +33,18 @@ FRESH = 1000
 
 
 @dataclass(frozen=True)
-class Tuning:
+class Advice:
     """The answers, those that change least first, for a stage that was checked and measured itself (`present`); the
     bandwidths with which it keeps its margin; what to relax where nothing works; whether it was interrupted."""
 
     stage: Stage
     goal: Goal
     case: Case
-    present: Measured
+    present: Performance
     limits: Limits
-    answers: tuple[Answer, ...]
+    answers: tuple[Cure, ...]
     relaxed: tuple[Relaxed, ...]
-    machines: Machines
+    machines: Fleet
     seed: int
     interrupted: bool = False
 
@@ -54,17 +54,17 @@ class Tuning:
         return bool(doubts(self.case, self.present, self.goal))
 
     @property
-    def working(self) -> tuple[Answer, ...]:
+    def working(self) -> tuple[Cure, ...]:
         """The ways that work."""
         return tuple(answer for answer in self.answers if answer.sure == "works")
 
     @property
-    def fastest(self) -> Answer | None:
+    def fastest(self) -> Cure | None:
         """The way that works and settles soonest."""
         return min(self.working, key=lambda answer: _slowest(answer, self.goal), default=None)
 
 
-def _slowest(answer: Answer, goal: Goal) -> float:
+def _slowest(answer: Cure, goal: Goal) -> float:
     return np.inf if answer.measured is None else answer.measured.slowest(goal)
 
 
@@ -76,7 +76,7 @@ def tune(
     budget: Budget | None = None,
     chosen: Collection[str] | None = None,
     progress: Progress = silent,
-) -> Tuning:
+) -> Advice:
     """The best settings of every way that the goal allows, or of those with the names `chosen`. Raises InputError for a
     motion after which nothing has to settle."""
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
@@ -85,18 +85,18 @@ def tune(
     listed = [way for way in ways(ideal, goal) if chosen is None or way.name in chosen]
     report = _Report(progress, sum(_steps(way, budget) for way in listed) + 2)
     report("compiling")
-    kernels({KernelRequest(structure(way.stage.flat())) for way in [Way.settled_on("", ideal), *listed]})
+    kernels({KernelRequest(structure(way.stage.flat())) for way in [WayOut.settled_on("", ideal), *listed]})
     fresh = drawn(ideal, correlations, budget.fresh, seed + FRESH)
     machines = drawn(ideal, correlations, budget.machines, seed)
     report("the stage as it is")
     case, present = verified(ideal), measure(ideal, fresh, goal, stage)
-    answers: list[Answer] = []
+    answers: list[Cure] = []
     relaxed: tuple[Relaxed, ...] = ()
     interrupted = False
     try:
         for way in listed:
             search = Search(way, goal, machines, stage, budget, report)
-            answers.append(Answer(way, None, None, None, (), interrupted=True))  # as long as it is not there
+            answers.append(Cure(way, None, None, None, (), interrupted=True))  # as long as it is not there
             answers[-1] = _answer(search, fresh, stage, answers)
             report.after(_steps(way, budget))
         if not any(answer.sure == "works" for answer in answers):
@@ -104,7 +104,7 @@ def tune(
             relaxed = relaxations(answers, goal, machines)
     except KeyboardInterrupt:
         interrupted = True
-    return Tuning(
+    return Advice(
         ideal,
         goal,
         case,
@@ -118,19 +118,19 @@ def tune(
     )
 
 
-def _answer(search: Search, fresh: Machines, drive: Stage, answers: list[Answer]) -> Answer:
+def _answer(search: Search, fresh: Fleet, drive: Stage, answers: list[Cure]) -> Cure:
     """The best settings of a way that are verified, or else the best that are not sure to work; `answers` ends with
     what is known of it so far."""
     way, goal = search.way, search.goal
     search.optimise()
-    unsure: Answer | None = None
+    unsure: Cure | None = None
     for number, shares in enumerate(search.surveyed()):
         tuned = way.tuned(shares)
         search.report(f"{way.name}: cycles")
         measured = measure(tuned, fresh, goal, drive)
         case = verified(tuned)
         around = windows(search, shares)
-        answer = Answer(
+        answer = Cure(
             way, tuned, measured, case, doubts(case, measured, goal), around, search.settings, search.attracted
         )
         if answer.sure == "works":
@@ -139,7 +139,7 @@ def _answer(search: Search, fresh: Machines, drive: Stage, answers: list[Answer]
         answers[-1] = unsure
         if number + 1 == TRIES:
             break
-    return unsure or Answer(way, None, None, None, (), (), search.settings, search.attracted)
+    return unsure or Cure(way, None, None, None, (), (), search.settings, search.attracted)
 
 
 def _moves(stage: Stage) -> None:
@@ -157,7 +157,7 @@ def _ideal(stage: Stage) -> Stage:
     return stage.replace({table: None for table in ("drive", "rail", "cable", "floor") if getattr(stage, table)})
 
 
-def _steps(way: Way, budget: Budget) -> int:
+def _steps(way: WayOut, budget: Budget) -> int:
     """How many reports a way makes, about."""
     return (2 if len(way.variables) == 1 else budget.generations) + 4
 

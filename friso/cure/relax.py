@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from friso.cure.answers import Answer
+from friso.cure.answers import Cure
 from friso.cure.goal import Goal
-from friso.cure.machines import Machines
-from friso.cure.search import Settings
+from friso.cure.machines import Fleet
+from friso.cure.search import SettingsTried
 from friso.cure.trials import LOOSER, attraction
-from friso.cure.ways import Way
+from friso.cure.ways import WayOut
 from friso.stage import Stage
 
 TRIED, SURVEYED = 3, 4
@@ -25,13 +25,13 @@ class Relaxed:
     """Parts of the goal (`within`, `settle`, `force_limit`, `margin`) to the values with which a way meets it: its
     stage, and the factor by which they are relaxed, all together."""
 
-    way: Way
+    way: WayOut
     stage: Stage
     values: Mapping[str, float]
     factor: float
 
 
-def relaxations(answers: Sequence[Answer], goal: Goal, machines: Machines) -> tuple[Relaxed, ...]:
+def relaxations(answers: Sequence[Cure], goal: Goal, machines: Fleet) -> tuple[Relaxed, ...]:
     """The cheapest relaxation of each kind, the one that relaxes least first. Nothing is relaxed of the distance from
     hunting: machines that are surveyed with the settings named have nothing that attracts."""
     best: dict[tuple[str, ...], Relaxed] = {}
@@ -47,7 +47,7 @@ def relaxations(answers: Sequence[Answer], goal: Goal, machines: Machines) -> tu
     return tuple(sorted(listed, key=lambda relaxed: relaxed.factor))
 
 
-def _of_way(way: Way, settings: Settings, goal: Goal, machines: Machines) -> Iterator[Relaxed]:
+def _of_way(way: WayOut, settings: SettingsTried, goal: Goal, machines: Fleet) -> Iterator[Relaxed]:
     """The cheapest relaxations of a way: those of one part each, or else of two."""
     needed = _needed(settings, goal)
     count = np.sum([values > 1 for values in needed.values()], axis=0)
@@ -72,7 +72,7 @@ def _of_way(way: Way, settings: Settings, goal: Goal, machines: Machines) -> Ite
             return
 
 
-def _needed(settings: Settings, goal: Goal) -> dict[str, np.ndarray]:
+def _needed(settings: SettingsTried, goal: Goal) -> dict[str, np.ndarray]:
     """The factors by which parts of the goal would have to be relaxed for each setting."""
     time = np.where(np.isfinite(settings.settling), settings.settling, settings.looser)
     none = np.zeros(len(time))
@@ -84,7 +84,7 @@ def _needed(settings: Settings, goal: Goal) -> dict[str, np.ndarray]:
     }
 
 
-def _value(name: str, settings: Settings, number: int) -> float:
+def _value(name: str, settings: SettingsTried, number: int) -> float:
     """What a part of the goal would have to be for a setting."""
     time = settings.settling[number] if np.isfinite(settings.settling[number]) else settings.looser[number]
     values: dict[str, Any] = {

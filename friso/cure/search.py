@@ -10,9 +10,9 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from friso.cure.goal import Goal
-from friso.cure.machines import Machines
+from friso.cure.machines import Fleet
 from friso.cure.trials import Moves, attraction, margins, moved, quantile
-from friso.cure.ways import Way
+from friso.cure.ways import WayOut
 from friso.stage import Stage
 
 SEED = 27
@@ -41,7 +41,7 @@ class Budget:
 
 
 @dataclass(frozen=True)
-class Settings:
+class SettingsTried:
     """Settings that were tried, one a row: their `shares` of the ranges (n, variables), and, each of shape (n,), the
     settling time of the slowest twentieth [s] and within the looser tolerance, the same with the bandwidth lower by the
     distance from hunting, the largest force [N] and least modulus margin of all but a twentieth."""
@@ -53,9 +53,9 @@ class Settings:
     force: np.ndarray
     margin: np.ndarray
 
-    def take(self, numbers: np.ndarray) -> Settings:
+    def take(self, numbers: np.ndarray) -> SettingsTried:
         """The settings with these numbers."""
-        return Settings(*(column[numbers] for column in vars(self).values()))
+        return SettingsTried(*(column[numbers] for column in vars(self).values()))
 
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
         """Which settings break a constraint of the goal, by its name."""
@@ -84,19 +84,19 @@ class Search:
     """The search for the best settings of a way: what was `tried` so far, and of how many settings that were surveyed
     something `attracted` the machines, or may have."""
 
-    way: Way
+    way: WayOut
     goal: Goal
-    machines: Machines
+    machines: Fleet
     drive: Stage
     budget: Budget
     report: Callable[[str], None]
-    tried: list[Settings] = field(default_factory=list)
+    tried: list[SettingsTried] = field(default_factory=list)
     attracted: int = 0
 
     @property
-    def settings(self) -> Settings:
+    def settings(self) -> SettingsTried:
         """All settings that were tried."""
-        return Settings(
+        return SettingsTried(
             *(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True))
         )
 
@@ -130,7 +130,7 @@ class Search:
             updating="deferred",
         )
 
-    def measured(self, shares: np.ndarray) -> Settings:
+    def measured(self, shares: np.ndarray) -> SettingsTried:
         """Settings on the machines: the moves are run only where the loop is stable and has half of the margin."""
         goal, count = self.goal, len(shares)
         few = self.machines.take(np.arange(min(6, self.machines.count)))
@@ -144,7 +144,7 @@ class Search:
             for column, value in zip(columns, values, strict=True):
                 column[on] = quantile(value, goal.share)
         settling, looser, slower, force = columns
-        return Settings(shares, settling, looser, slower, force, margin)
+        return SettingsTried(shares, settling, looser, slower, force, margin)
 
     def surveyed(self) -> Iterator[np.ndarray]:
         """The best settings first, shape (variables,), as far as nothing attracts the machines with them; those that

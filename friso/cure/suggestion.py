@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.cure.goal import Goal
 from friso.cure.variables import DAMPING_RATIOS, joint
-from friso.cure.ways import Way
+from friso.cure.ways import WayOut
 from friso.design_method.isolator import isolated, least_friction
 from friso.equations.bandwidth import faster
 from friso.equations.structure import shared_structure
@@ -47,7 +47,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
         free = isolated(stage)
     except InputError:
         return None
-    way, tried = Way("", free, joint(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
+    way, tried = WayOut("", free, joint(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
     shares = np.array([_shares(way, stroke, damping) for stroke, damping in tried])
     numbers = way.changes(shares)
     flat = {**free.flat(), **numbers}
@@ -64,7 +64,7 @@ def suggestion(stage: Stage) -> Suggestion | None:
     return Suggestion(way.tuned(shares[-1]), False, 0.0)
 
 
-def _shares(way: Way, stroke: float, damping: float) -> list[float]:
+def _shares(way: WayOut, stroke: float, damping: float) -> list[float]:
     """The shares of the ranges of a joint at which it has a stroke [m] and a damping ratio."""
     wanted = (stroke, FORCE, damping)
     return [

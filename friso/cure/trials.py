@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.cure.goal import Goal
-from friso.cure.machines import Machines
-from friso.cure.ways import Way
+from friso.cure.machines import Fleet
+from friso.cure.ways import WayOut
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -51,7 +51,7 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
-def moved(way: Way, shares: np.ndarray, machines: Machines, goal: Goal, slower: float = 1.0) -> Moves:
+def moved(way: WayOut, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0) -> Moves:
     """The moves of settings, as shares of the ranges of a way (settings, variables), with a bandwidth lower by a factor
     `slower`."""
     count = len(shares) * machines.count
@@ -72,7 +72,7 @@ def moved(way: Way, shares: np.ndarray, machines: Machines, goal: Goal, slower: 
 
 
 @np.errstate(all="ignore")
-def margins(way: Way, shares: np.ndarray, machines: Machines, drive: Stage) -> np.ndarray:
+def margins(way: WayOut, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
     """The least modulus margin of the limit cases (0: not stable), shape (settings, machines), with the sampling and
     delay of the stage `drive`."""
     timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
@@ -96,7 +96,7 @@ class Attraction:
 
 
 @np.errstate(all="ignore")
-def attraction(way: Way, shares: np.ndarray, machines: Machines, goal: Goal) -> Attraction:
+def attraction(way: WayOut, shares: np.ndarray, machines: Fleet, goal: Goal) -> Attraction:
     """What attracts the machines with settings, at the bandwidth and below it by the distance of the goal, by
     simulations from many starts; closed orbits have to confirm it for the answer."""
     flat = machines.laid_over(way.stage, way.changes(shares), len(shares))

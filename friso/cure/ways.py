@@ -14,7 +14,7 @@ from friso.cure.variables import Variable, bandwidth_factor, of_key
 from friso.design_method.isolator import isolated, least_friction
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.stage.controllers import controller_of
+from friso.stage.controllers import FILTERS_KEY, controller_of
 
 LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
 """Ranges of the integral limit, in units of the static friction, and of the leak, in units of the bandwidth or, where
@@ -31,7 +31,7 @@ WIDTHS, DEPTH = (0.1, 1.5), 0.9
 
 
 @dataclass(frozen=True)
-class Way:
+class WayOut:
     """A way by its `name`, the stage it begins with, and its variables, which are applied in this order; whether it
     changes the controller alone, or a joint is needed (`buys_joint`)."""
 
@@ -49,7 +49,7 @@ class Way:
         return changed
 
     @classmethod
-    def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Way:
+    def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> WayOut:
         """A stage as it is, with nothing to vary."""
         return cls(name, stage, (), buys_joint)
 
@@ -58,12 +58,12 @@ class Way:
         return self.stage.with_numbers({k: float(f"{v[0]:.4g}") for k, v in self.changes(shares[None]).items()})
 
 
-def ways(stage: Stage, goal: Goal) -> list[Way]:
+def ways(stage: Stage, goal: Goal) -> list[WayOut]:
     """The ways that a goal allows, those that change least first."""
-    listed: list[Way] = []
+    listed: list[WayOut] = []
     speed = bandwidth_factor(stage, goal.bandwidth_limit)
     if goal.controller:
-        listed += [Way("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
+        listed += [WayOut("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
         listed += [*_notch(stage, speed), *_against_friction(stage, goal)]
     if goal.joint and least_friction(stage.flat()) > 0:
         listed += _isolators(stage, goal, speed)
@@ -72,13 +72,13 @@ def ways(stage: Stage, goal: Goal) -> list[Way]:
 
 def _gains(
     name: str, stage: Stage, speed: Variable, first: tuple[Variable, ...] = (), buys_joint: bool = False
-) -> list[Way]:
+) -> list[WayOut]:
     """All gains, where there are more than the bandwidth tells."""
     several = (*first, *variables.gains(stage, speed))
-    return [Way(name, stage, several, buys_joint)] if len(several) > 1 else []
+    return [WayOut(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
-def _notch(stage: Stage, speed: Variable) -> Iterator[Way]:
+def _notch(stage: Stage, speed: Variable) -> Iterator[WayOut]:
     """A notch at the parasitic mode, with which the bandwidth can be higher."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat:
@@ -87,15 +87,15 @@ def _notch(stage: Stage, speed: Variable) -> Iterator[Way]:
     filters = [*stage.as_written()["controller"].get("filters", [])]
     notch = {"kind": "notch", "frequency": f"{frequency!r} Hz", "width": f"{frequency / 2!r} Hz", "depth": DEPTH}
     try:
-        with_notch = stage.replace({"controller.filters": [*filters, notch]})
+        with_notch = stage.replace({FILTERS_KEY: [*filters, notch]})
     except InputError:  # as many filters as there may be
         return
-    key = f"controller.filters.{len(filters) + 1}.width"
+    key = f"{FILTERS_KEY}.{len(filters) + 1}.width"
     width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
-    yield Way("notch at the parasitic mode, and bandwidth", with_notch, (width, speed))
+    yield WayOut("notch at the parasitic mode, and bandwidth", with_notch, (width, speed))
 
 
-def _against_friction(stage: Stage, goal: Goal) -> Iterator[Way]:
+def _against_friction(stage: Stage, goal: Goal) -> Iterator[WayOut]:
     """Each setting against friction that the stage has not got, by itself."""
     flat = stage.flat()
     law = controller_of(flat)
@@ -116,10 +116,10 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Way]:
         ranges = {f"controller.{key}": (scale * low, scale * high) for key, (scale, (low, high)) in keys.items()}
         if not any(key in flat for key in ranges):
             numbers = {key: float(np.sqrt(low * high)) for key, (low, high) in ranges.items()}
-            yield Way(name, stage.with_numbers(numbers), tuple(of_key(key, *ends) for key, ends in ranges.items()))
+            yield WayOut(name, stage.with_numbers(numbers), tuple(of_key(key, *ends) for key, ends in ranges.items()))
 
 
-def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Way]:
+def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[WayOut]:
     """An isolator, alone and with the gains; leaf springs of the file give way to a joint stated by its numbers."""
     try:
         free = isolated(stage)
@@ -130,6 +130,6 @@ def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Way]:
         kept = {key: flat[key] for key in flat if key.startswith(("joint.stiffness", "parasitic."))}
         free = free.with_numbers(kept, without=("flexure",))
     joint = variables.joint(least_friction(flat))
-    yield Way("isolator", free, joint, True)
+    yield WayOut("isolator", free, joint, True)
     if goal.controller:
         yield from _gains("isolator and gains", free, speed, joint, True)

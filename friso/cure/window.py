@@ -13,7 +13,7 @@ POINTS = 16
 
 
 @dataclass(frozen=True)
-class Window:
+class SettingWindow:
     """From `low` to `high` of a variable of a way (SI, or factors), all else being as tuned, machines meet the goal;
     whether it goes on to the end of the range that was searched, `open_below` and `open_above`."""
 
@@ -24,7 +24,7 @@ class Window:
     open_above: bool
 
 
-def windows(search: Search, shares: np.ndarray) -> tuple[Window, ...]:
+def windows(search: Search, shares: np.ndarray) -> tuple[SettingWindow, ...]:
     """The windows about settings, shape (variables,), by moves and margins of the machines of the search."""
     variables = search.way.variables
     grid = np.linspace(0, 1, POINTS)
@@ -39,5 +39,5 @@ def windows(search: Search, shares: np.ndarray) -> tuple[Window, ...]:
         first = int(below[-1]) + 1 if below.size else 0
         last = at + int(above[0]) - 1 if above.size else len(places) - 1
         low, high = variable.at(places[[first, max(first, last)]])
-        listed.append(Window(variable.name, float(low), float(high), not below.size, not above.size))
+        listed.append(SettingWindow(variable.name, float(low), float(high), not below.size, not above.size))
     return tuple(listed)

@@ -25,7 +25,7 @@ from friso.stage import Stage, load
 
 if TYPE_CHECKING:
     from friso.cure.goal import Goal
-    from friso.cure.method import Tuning
+    from friso.cure.method import Advice
     from friso.stage.correlations import Correlations
 
 Within = Annotated[
@@ -139,7 +139,7 @@ def _correlations(path: Path, stage: Stage) -> Correlations:
     return correlations.among(stage.uncertain())
 
 
-def _print(tuning: Tuning, files: Sequence[Path]) -> None:
+def _print(tuning: Advice, files: Sequence[Path]) -> None:
     from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
 
     print_answer([*answer(tuning), *failing(tuning)], tuning.stage.name, COLUMNS, rows(tuning))

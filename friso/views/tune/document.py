@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from friso.cure.answers import Answer, Measured
-from friso.cure.method import Tuning
+from friso.cure.answers import Cure, Performance
+from friso.cure.method import Advice
 from friso.views.documents import plain_json
 from friso.views.tune.words import answer, changes, failing, reason
 
 
-def tune_document(tuning: Tuning) -> dict[str, Any]:
+def tune_document(tuning: Advice) -> dict[str, Any]:
     """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
     goal = tuning.goal
     first, *further = answer(tuning)
@@ -43,7 +43,7 @@ def tune_document(tuning: Tuning) -> dict[str, Any]:
     )
 
 
-def _way(found: Answer, tuning: Tuning) -> dict[str, Any]:
+def _way(found: Cure, tuning: Advice) -> dict[str, Any]:
     if found.stage is None or found.measured is None or found.case is None:
         return {"works": found.sure, "why": reason(found, tuning)}
     edge = found.case.judgement.margin
@@ -59,7 +59,7 @@ def _way(found: Answer, tuning: Tuning) -> dict[str, Any]:
     }
 
 
-def _measured(measured: Measured, tuning: Tuning) -> dict[str, Any]:
+def _measured(measured: Performance, tuning: Advice) -> dict[str, Any]:
     goal = tuning.goal
     return {
         "meets_goal": asdict(measured.share(goal)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.cure.answers import Answer
-from friso.cure.method import Tuning
+from friso.cure.answers import Cure
+from friso.cure.method import Advice
 from friso.engine.simulate import simulate
 from friso.equations.motion import last_corner
 from friso.frequency.drive import DriveTiming
@@ -38,7 +38,7 @@ RTOL = 1e-7
 """Relative tolerance of the responses that are drawn."""
 
 
-def figures(tuning: Tuning) -> list[Figure]:
+def figures(tuning: Advice) -> list[Figure]:
     """The response, the settling times and the sensitivities."""
     stages = shown(tuning)
     panels = (_response(tuning, stages), _settling(tuning), _sensitivity(stages))
@@ -50,7 +50,7 @@ def figures(tuning: Tuning) -> list[Figure]:
     return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
 
 
-def shown(tuning: Tuning) -> list[tuple[str, Stage, str]]:
+def shown(tuning: Advice) -> list[tuple[str, Stage, str]]:
     """The stages that are drawn, with names and colours: as it is, and with each way for which there are settings."""
     ways = [found for found in tuning.answers if found.stage is not None]
     return [
@@ -59,16 +59,16 @@ def shown(tuning: Tuning) -> list[tuple[str, Stage, str]]:
     ]
 
 
-def colour(tuning: Tuning, found: Answer) -> str:
+def colour(tuning: Advice, found: Cure) -> str:
     """The colour of a way."""
     return COLOURS[tuning.answers.index(found) % len(COLOURS)]
 
 
-def _name(found: Answer) -> str:
+def _name(found: Cure) -> str:
     return found.way.name if found.sure == "works" else f"{found.way.name} (not sure)"
 
 
-def _response(tuning: Tuning, stages: list[tuple[str, Stage, str]]) -> Panel:
+def _response(tuning: Advice, stages: list[tuple[str, Stage, str]]) -> Panel:
     flat = tuning.stage.flat()
     corner, series = float(last_corner(flat)), []
     for name, stage, line in stages:
@@ -80,7 +80,7 @@ def _response(tuning: Tuning, stages: list[tuple[str, Stage, str]]) -> Panel:
     return Panel("The same move", Axis("Time after the move", "s"), y, tuple(series))
 
 
-def _settling(tuning: Tuning) -> Panel:
+def _settling(tuning: Advice) -> Panel:
     flat = tuning.stage.flat()
     end = flat["motion.duration"] - float(last_corner(flat))
     rows = [("as it is", tuning.present.moves.settling[0], INK)]

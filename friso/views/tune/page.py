@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friso.cure.method import Tuning
+from friso.cure.method import Advice
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
@@ -12,13 +12,13 @@ from friso.views.tune.figures import figures as tune_figures
 from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
 
 
-def tune_files(tuning: Tuning) -> dict[str, Content]:
+def tune_files(tuning: Advice) -> dict[str, Content]:
     """The stage files, the page, and every figure in all formats; `tuned.toml` is the least change that works."""
     figures = tune_figures(tuning)
     return {**stage_files(tuning), "tune.html": page(tuning, figures), **pictures(figures)}
 
 
-def stage_files(tuning: Tuning) -> dict[str, Content]:
+def stage_files(tuning: Advice) -> dict[str, Content]:
     """A stage file for every way for which there are settings; one that is not sure to work is named so."""
     files: dict[str, Content] = {}
     for found in tuning.answers:
@@ -31,7 +31,7 @@ def stage_files(tuning: Tuning) -> dict[str, Content]:
     return {"tuned.toml": least[0].stage.to_toml() if least and least[0].stage else None, **files}
 
 
-def page(tuning: Tuning, figures: Sequence[Figure]) -> str:
+def page(tuning: Advice, figures: Sequence[Figure]) -> str:
     """The page with its figures."""
     return Report.of_stage(
         "tune",

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.cure.answers import Answer, Measured
+from friso.cure.answers import Cure, Performance
 from friso.cure.goal import Goal
-from friso.cure.method import Tuning
+from friso.cure.method import Advice
 from friso.cure.relax import Relaxed
-from friso.cure.search import Settings
+from friso.cure.search import SettingsTried
 from friso.cure.variables import BANDWIDTH, crossover
-from friso.cure.window import Window
+from friso.cure.window import SettingWindow
 from friso.stage import Stage, numeric_keys
 from friso.views.drawing.prefixes import NOTHING, listed, percent, share_with_interval, with_unit
 
@@ -75,7 +75,7 @@ def number(value: float, unit: str) -> str:
     return with_unit(value, unit, 4) if unit else f"{value:.4g}"
 
 
-def answer(tuning: Tuning) -> list[str]:
+def answer(tuning: Advice) -> list[str]:
     """The answer, first of all that is said: the least change that works, what it brings and costs; the next best."""
     lines = [*_interrupted(tuning)]
     if not tuning.needed:
@@ -105,13 +105,13 @@ def goal_words(goal: Goal) -> str:
     )
 
 
-def _interrupted(tuning: Tuning) -> list[str]:
+def _interrupted(tuning: Advice) -> list[str]:
     if not tuning.interrupted:
         return []
     return ["Interrupted: this is the best so far. Ways that are not named were not tried, and one may be unfinished."]
 
 
-def _works(found: Answer, tuning: Tuning, what: str) -> str:
+def _works(found: Cure, tuning: Advice, what: str) -> str:
     assert found.stage is not None
     assert found.measured is not None
     return (
@@ -120,7 +120,7 @@ def _works(found: Answer, tuning: Tuning, what: str) -> str:
     )
 
 
-def _brings(measured: Measured, tuning: Tuning) -> str:
+def _brings(measured: Performance, tuning: Advice) -> str:
     before, now = (part.slowest(tuning.goal) for part in (tuning.present, measured))
     as_is = "" if measured is tuning.present else f" (as it is: {time(before)})"
     meet = share_with_interval(measured.share(tuning.goal))
@@ -130,7 +130,7 @@ def _brings(measured: Measured, tuning: Tuning) -> str:
     )
 
 
-def price(measured: Measured, tuning: Tuning, buys_joint: bool) -> str:
+def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
     """What a way costs against the stage as it is."""
     goal, before = tuning.goal, tuning.present
     force = _ratio(measured.force(goal), before.force(goal))
@@ -151,7 +151,7 @@ def _ratio(now: float, before: float) -> str:
     return f"{now / before:.3g}" if before > 0 and math.isfinite(now / before) else NOTHING
 
 
-def _nothing(tuning: Tuning) -> list[str]:
+def _nothing(tuning: Advice) -> list[str]:
     """That nothing is sure to work, what is not sure to, and what to relax."""
     unsure = [found for found in tuning.answers if found.sure == "unsure" and found.stage is not None]
     lines = [f"No way was found that surely meets the goal: {goal_words(tuning.goal)}."]
@@ -173,14 +173,14 @@ def _relax(relaxed: Relaxed, goal: Goal) -> str:
     )
 
 
-def unsure_why(found: Answer) -> str:
+def unsure_why(found: Cure) -> str:
     """Why a way is not sure to work."""
     if found.interrupted and not found.doubts:
         return "it was not verified"
     return listed([DOUBTS[doubt] for doubt in found.doubts], "and")
 
 
-def failing(tuning: Tuning) -> list[str]:
+def failing(tuning: Advice) -> list[str]:
     """What cannot work, and why; and what is not sure to."""
     lines = []
     for found in tuning.answers:
@@ -191,7 +191,7 @@ def failing(tuning: Tuning) -> list[str]:
     return lines
 
 
-def reason(found: Answer, tuning: Tuning) -> str:
+def reason(found: Cure, tuning: Advice) -> str:
     """Why no setting of a way meets the goal."""
     if found.settings is None:
         return "It was not tried."
@@ -200,7 +200,7 @@ def reason(found: Answer, tuning: Tuning) -> str:
     return f"{sentence}{_edges(tuning) if [v.name for v in found.way.variables] == [BANDWIDTH] else ''}"
 
 
-def _reasons(settings: Settings, found: Answer, goal: Goal) -> Iterator[str]:
+def _reasons(settings: SettingsTried, found: Cure, goal: Goal) -> Iterator[str]:
     """The first constraint that leaves nothing of the settings that meet those before."""
     broken, left = settings.broken(goal), np.ones(len(settings.margin), bool)
     tried = f"of {len(left)} settings tried"
@@ -221,7 +221,7 @@ def _reasons(settings: Settings, found: Answer, goal: Goal) -> Iterator[str]:
     yield f"Something attracts machines, or may, with all of the {found.attracted} best settings that were surveyed."
 
 
-def _edges(tuning: Tuning) -> str:
+def _edges(tuning: Advice) -> str:
     """Where hunting ends in bandwidth, and up to where there is margin."""
     edge, comfortable = tuning.case.judgement.margin, tuning.limits.highest_comfortable
     present = crossover(tuning.stage)
@@ -237,7 +237,7 @@ def _edges(tuning: Tuning) -> str:
     return f" In bandwidth {listed(parts, 'and')}." if parts else ""
 
 
-def rows(tuning: Tuning) -> list[tuple[str, list[str]]]:
+def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     """The ways side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
     words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
@@ -250,7 +250,7 @@ def rows(tuning: Tuning) -> list[tuple[str, list[str]]]:
     return table
 
 
-def _row(measured: Measured, tuning: Tuning, works: str) -> list[str]:
+def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     goal = tuning.goal
     return [
         works,
@@ -263,7 +263,7 @@ def _row(measured: Measured, tuning: Tuning, works: str) -> list[str]:
     ]
 
 
-def window_words(window: Window, found: Answer) -> str:
+def window_words(window: SettingWindow, found: Cure) -> str:
     """Where a number may lie, all else being as tuned."""
     name, low, high = window.name, window.low, window.high
     unit = ""
@@ -279,7 +279,7 @@ def window_words(window: Window, found: Answer) -> str:
     return f"{name}: from {first} to {last}"
 
 
-def window_lines(tuning: Tuning) -> list[str]:
+def window_lines(tuning: Advice) -> list[str]:
     """The windows of the ways that work."""
     return [
         f"{found.way.name} meets the goal, each number by itself, for {'; '.join(_windows(found))}."
@@ -288,11 +288,11 @@ def window_lines(tuning: Tuning) -> list[str]:
     ]
 
 
-def _windows(found: Answer) -> list[str]:
+def _windows(found: Cure) -> list[str]:
     return [window_words(window, found) for window in found.windows]
 
 
-def assumptions(tuning: Tuning) -> list[str]:
+def assumptions(tuning: Advice) -> list[str]:
     """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
     lines, stage, machines = [], tuning.stage, tuning.machines
     if stage.parasitic is None and not stage.flexure:
