@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -80,7 +80,7 @@ class Performance:
 class Cure:
     """A way's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work, or
     does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted`
-    were given up because something attracted machines with them.
+    were given up because something attracted machines with them. `shares` are where in the ranges of the way it lies.
     """
 
     way: WayOut
@@ -92,6 +92,7 @@ class Cure:
     settings: SettingsTried | None = None
     attracted: int = 0
     interrupted: bool = False
+    shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def sure(self) -> Sure:

@@ -131,7 +131,15 @@ def _answer(search: Search, fresh: Fleet, drive: Stage, answers: list[Cure]) -> 
         case = verified(tuned)
         around = windows(search, shares)
         answer = Cure(
-            way, tuned, measured, case, doubts(case, measured, goal), around, search.settings, search.attracted
+            way,
+            tuned,
+            measured,
+            case,
+            doubts(case, measured, goal),
+            around,
+            search.settings,
+            search.attracted,
+            shares=shares,
         )
         if answer.sure == "works":
             return answer

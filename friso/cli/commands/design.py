@@ -32,7 +32,7 @@ def design(
     stage_file: StageFile,
     spec_file: Annotated[
         Path | None,
-        typer.Argument(metavar="[SPEC.toml]", help="The specification; one from the stage file if left out."),
+        typer.Argument(metavar="SPEC.toml", help="The specification; one from the stage file if left out."),
     ] = None,
     overrides: Overrides = None,
     out: DefaultFolder = Path("design"),

@@ -1,0 +1,142 @@
+"""The cure held against a brute search: `python -m benchmarks.tune [--machines N] [--settings N] [--fresh N]`.
+
+Axes with four controllers, three levels of friction, with and without a parasitic mode are tuned way by way, the joint
+kept. For the ways that work a Sobol sequence of settings over the same ranges is measured by the same moves and margins
+on the same machines, and the best of them, surveyed for what attracts like the tuned one, is compared with it in the
+settling time of the slowest twentieth. The tuned stages are then measured on fresh machines, and a share is counted of
+those that break a constraint.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from time import perf_counter
+
+import numpy as np
+from scipy.stats import qmc
+
+from benchmarks.report import Goal as Target
+from benchmarks.report import print_goals, print_table
+from friso.cure.answers import Cure, measure
+from friso.cure.goal import Goal
+from friso.cure.machines import Fleet, drawn
+from friso.cure.method import tune
+from friso.cure.search import Budget, Search
+from friso.stage import Stage, loads
+from friso.stage.correlations import Correlations
+
+AXIS = """
+[masses]
+cart = "1.2 kg"
+stage = "0.5 kg"
+[friction]
+model = "lugre"
+static = "3 N"
+coulomb = "1 N"
+stribeck_velocity = "1.6 mm/s"
+stribeck_exponent = 2
+bristle_stiffness = "1e5 N/m"
+bristle_damping = "316 N*s/m"
+viscous = "0.5 N*s/m"
+[motion]
+kind = "there_and_back"
+acceleration = "100 m/s^2"
+acceleration_time = "30 ms"
+return_at = "3 s"
+duration = "10 s"
+[controller]
+"""
+
+CONTROLLERS = {
+    "van Dijk": 'kind = "pid"\ncrossover = "8 Hz"\nalpha = 0.1\nbeta = 2\n',
+    "PID on the error": 'kind = "pid"\nkp = "1.4 kN/m"\nki = "11 kN/(m*s)"\nkd = "85 N*s/m"\ntau = "5 ms"\n',
+    "PID on the measurement": 'kind = "pid"\nkp = "1.4 kN/m"\nki = "11 kN/(m*s)"\nkd = "85 N*s/m"\n'
+    'derivative_on = "measurement"\n',
+    "cascade": 'kind = "cascade"\nkv = "10 1/s"\nkp = "85 N*s/m"\nvelocity_integral_time = "100 ms"\n',
+}
+
+LEVELS = (0.5, 1.0, 2.0)
+"""Factors of all friction forces."""
+
+LIMIT, WITHIN, ALIKE = 30.0, 2e-6, 1.05
+"""Limit of the bandwidth [Hz], tolerance [m], and the factor within which the tuned settling time has to be."""
+
+CHUNK = 256
+"""Settings that are measured at once."""
+
+
+def axes() -> Iterator[tuple[str, Stage]]:
+    """All machines: four structures of controller, three levels of friction, the mode there in every other one."""
+    number = 0
+    for level in LEVELS:
+        for name, controller in CONTROLLERS.items():
+            stage = loads(AXIS + controller)
+            flat = stage.flat()
+            keys = ("friction.static", "friction.coulomb", "friction.bristle_stiffness", "friction.bristle_damping")
+            stage = stage.with_numbers({key: level * flat[key] for key in keys})
+            number += 1
+            if number % 2:
+                yield f"{name}, friction x {level:g}", stage
+                continue
+            joint = {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
+            mode = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": "0.01"}
+            yield f"{name}, friction x {level:g}, mode", stage.replace({"joint": joint, "parasitic": mode})
+
+
+def brute(found: Cure, stage: Stage, goal: Goal, machines: Fleet, count: int) -> float:
+    """The best settling time [s] of so many settings that keep all constraints and have nothing that attracts."""
+    search = Search(found.way, goal, machines, stage, Budget(), lambda label: None)
+    shares = qmc.Sobol(len(found.way.variables), rng=0).random(count)
+    for first in range(0, count, CHUNK):
+        search.tried.append(search.measured(shares[first : first + CHUNK]))
+    best = next(search.surveyed(), None)
+    if best is None:
+        return float("inf")
+    return float(search.measured(best[None]).settling[0])
+
+
+def main() -> None:
+    """Tune machines, search by brute force, measure on fresh machines."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--machines", type=int, default=12)
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--settings", type=int, default=1024)
+    parser.add_argument("--fresh", type=int, default=400)
+    parser.add_argument("--ways", nargs="*", default=["bandwidth", "gains"])
+    options = parser.parse_args()
+    goal = Goal(within=WITHIN, bandwidth_limit=LIMIT, joint=False)
+    rows: list[tuple[str, ...]] = []
+    worst, least = 0.0, 1.0
+    for name, stage in [*axes()][options.first : options.first + options.machines]:
+        begun = perf_counter()
+        advice = tune(stage, goal, chosen=options.ways)
+        seconds = perf_counter() - begun
+        machines = drawn(stage, Correlations(), Budget().machines, advice.seed)
+        fresh = drawn(stage, Correlations(), options.fresh, 77)
+        for found in advice.answers:
+            if found.sure != "works" or found.stage is None:
+                rows.append((name, found.way.name, found.sure, *[""] * 4, f"{seconds:.0f} s"))
+                continue
+            search = Search(found.way, goal, machines, stage, Budget(), lambda label: None)
+            tuned = float(search.measured(found.shares[None]).settling[0])
+            best = brute(found, stage, goal, machines, options.settings)
+            share = measure(found.stage, fresh, goal, stage).share(goal)
+            worst, least = max(worst, tuned / best), min(least, share.probability)
+            cells = (f"{tuned:.4g} s", f"{best:.4g} s", f"{tuned / best:.3f}", f"{100 * share.probability:.1f} %")
+            rows.append((name, found.way.name, "works", *cells, f"{seconds:.0f} s"))
+        print_table(("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "time"), rows[-2:])
+    print_table(("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "time"), rows)
+    print_goals(
+        [
+            Target("settling time over the best of the brute search", f"<= {ALIKE}", f"{worst:.3f}", worst <= ALIKE),
+            Target(
+                "share of fresh machines that meet the goal", f">= {goal.share}", f"{least:.3f}", least >= goal.share
+            ),
+        ],
+        f"{options.settings} settings, {options.fresh} fresh machines; numpy {np.__version__}",
+    )
+
+
+if __name__ == "__main__":
+    main()
