@@ -317,9 +317,9 @@ def test_sentences(snapshots: Snapshots) -> None:
 @pytest.mark.parametrize(
     ("name", "facts"),
     [
-        ("hunts", ["±0.52 mm", "1.63 s", "1.80 Hz", "9.80 Hz"]),
-        ("hunts, gains", ["1.23 times", "kp × 1.51", "ki × 1.86", "kd × 1.23"]),
-        ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "1.80 Hz"]),
+        ("hunts", ["±0.52 mm", "1.63 s", "3.80 Hz", "11.8 Hz", "1.2 times"]),
+        ("hunts, gains", ["1.47 times", "kp × 2.16", "ki × 3.18", "kd × 1.47"]),
+        ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "3.80 Hz"]),
         ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.750 Hz"]),
         ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
@@ -429,10 +429,10 @@ def test_conclusion_names_what_the_joint_does(snapshots):
 
 
 def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it(wording: Wording) -> None:
-    """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz, which is rounded upward."""
+    """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz; 1.2 times that is rounded upward."""
     sure, unsure = (Margin(1.2187, 9.7496, certain, 1.2248) for certain in (True, False))
     for edge in (sure, unsure):
-        assert "to 9.80 Hz" in sentence(hunts(margin=edge))
+        assert "to 11.8 Hz" in sentence(hunts(margin=edge))
     wording(sentence(hunts(margin=unsure)))
     assert row("Edge of hunting", hunts(margin=unsure)) == "somewhere between 9.749 Hz and 9.799 Hz (not certain)"
     below = sentence(settles(margin=replace(unsure, factor=0.91234, crossover=7.29872, quiet=0.92)))
@@ -448,6 +448,8 @@ def test_windows_are_told_beside_the_edge() -> None:
     window, lower = AttractionEnd(5.0049, 4.96, True), AttractionEnd(0.505, 0.5004, True)
     assert "above 40.04 Hz" in sentence(hunts(windows=(BandwidthWindow(window, None),)))
     assert "lower the bandwidth to 4.00 Hz" in sentence(hunts(lower=lower))
+    soon = BandwidthWindow(AttractionEnd(1.3, 1.29, True), None)  # 10.4 Hz: no room for a distance from the edge
+    assert "to 9.80 Hz" in sentence(hunts(margin=Margin(1.2187, 9.7496, True, 1.2248), windows=(soon,)))
     unsure = sentence(hunts(windows=(BandwidthWindow(replace(window, certain=False), None),)))
     assert "39.68 Hz" in unsure
     assert "40.04 Hz" in unsure

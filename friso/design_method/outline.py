@@ -28,6 +28,8 @@ def outline(stage: Stage) -> str:
     masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
     both = masses if len(masses) == 2 else [f"# {line}   # split, unless both are told" for line in masses]
     travel, acceleration = _move(stage)
+    own = flat.get("joint.stroke")
+    stroke = f"{own / 2:.4g} m .. {own:.4g} m" if own else "0.3 mm .. 1 mm"
     return "\n".join(
         [
             f'name = "Friction isolator of {stage.name or "the stage"}"',
@@ -60,7 +62,7 @@ def outline(stage: Stage) -> str:
             'spacing = "30 mm .. 60 mm"',
             'thickness = "0.1 mm .. 0.5 mm"             # usual gauges in this range, or a list of sheets to be had',
             'materials = ["stainless 1.4310"]',
-            'stroke = "0.3 mm .. 1 mm"                  # the largest that can be had is chosen',
+            f'stroke = "{stroke}"                  # the largest that can be had is chosen',
             "",
             "[safety]                                   # factors; those left out are the defaults",
             "hunting = 1.2                              # crossover over the edge of hunting",

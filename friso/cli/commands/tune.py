@@ -146,6 +146,9 @@ def _print(tuning: Advice, files: Sequence[Path]) -> None:
     for sentence in (*window_lines(tuning), *assumptions(tuning)):
         print_wrapped(sentence)
     print_written(files)
+    for file in files:
+        if file.name.startswith("tuned-isolator") and file.suffix == ".toml":
+            print(f"leaf springs for it: friso design {file}")
 
 
 COMMAND = Command(tune, 25)
