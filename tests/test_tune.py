@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import Wording
 
 from friso import Stage, load
 from friso.cure.answers import Cure, doubts, measure
@@ -178,10 +179,10 @@ def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning:
     assert "hunting" in doubts(case, measured, goal)
 
 
-def test_ctrl_c_leaves_the_best_so_far(tuning: Advice) -> None:
+def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None:
     assert tuning.interrupted
     assert [found.sure for found in tuning.answers] == ["works", "does not work"]
-    assert "Interrupted" in answer(tuning)[0]
+    wording(answer(tuning)[0])
 
 
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
@@ -196,7 +197,7 @@ def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) ->
     assert relaxed.factor == pytest.approx(0.9 / relaxed.values["margin"])
 
 
-def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
+def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -> None:
     """At 8 Hz one settles the stage; at 1 Hz none of those tried does."""
     tried, none = suggestion(rigid), suggestion(rigid.replace({"controller.crossover": "1 Hz"}))
     assert tried is not None
@@ -204,8 +205,8 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage) -> None:
     flat = tried.stage.flat()
     assert (tried.settles, none.settles) == (True, False)
     assert flat["joint.stiffness"] * flat["joint.stroke"] < flat["friction.static"]
-    assert "would settle" in isolator_sentence(tried)
-    assert "would not settle" in isolator_sentence(none)
+    wording(isolator_sentence(tried))
+    wording(isolator_sentence(none))
     assert suggestion(load(EXAMPLES / "thesis_rig.toml")) is None
 
 
