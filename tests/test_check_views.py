@@ -318,7 +318,7 @@ def test_sentences(snapshots: Snapshots) -> None:
     ("name", "facts"),
     [
         ("hunts", ["±0.52 mm", "1.63 s", "3.80 Hz", "11.8 Hz", "1.2 times"]),
-        ("hunts, gains", ["1.47 times", "kp × 2.16", "ki × 3.18", "kd × 1.47"]),
+        ("hunts, gains", ["1.48 times", "kp × 2.19", "ki × 3.24", "kd × 1.48"]),
         ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "3.80 Hz"]),
         ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.750 Hz"]),
         ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
