@@ -198,6 +198,7 @@ def _without_words(source: str) -> str:
     return ast.dump(tree)
 
 
+@cache
 def _compiled_with() -> str:
     """What compiled code takes from friso."""
     files = (Path(__file__).parent / f"{name}.py" for name in _INCLUDED)

@@ -108,11 +108,24 @@ def image(figure: Figure, form: str) -> bytes:
     """The figure as the bytes of a file; `form` is one of FORMATS (ValueError otherwise)."""
     if form not in FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
-    canvas = render(figure)
     stream = io.BytesIO()
     with _style():
-        canvas.savefig(stream, format=form, metadata=_METADATA[form])
+        _laid_out(figure).savefig(stream, format=form, metadata=_METADATA[form])
     return stream.getvalue()
+
+
+def _laid_out(figure: Figure) -> Canvas:
+    """The figure on a canvas whose parts have their places; that of the last figure is kept for its next format."""
+    last = _last.get("canvas")
+    if last is None or last[0] is not figure:
+        canvas = render(figure)
+        canvas.draw_without_rendering()
+        canvas.set_layout_engine("none")
+        last = _last["canvas"] = (figure, canvas)
+    return last[1]
+
+
+_last: dict[str, tuple[Figure, Canvas]] = {}
 
 
 def save(figure: Figure, path: Path) -> None:
