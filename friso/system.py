@@ -9,6 +9,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from types import FrameType
 
@@ -136,6 +137,7 @@ if sys.platform == "linux":
         share of time."""
         return max(1, math.ceil(min(len(os.sched_getaffinity(0)), _share_of_time())))
 
+    @cache  # reading it takes half a millisecond, and many short batches ask for it
     def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
         """How many cores' time the control groups of this process leave it, of either version; infinite without a
         limit."""

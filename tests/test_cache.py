@@ -4,6 +4,7 @@ A stand-in of a few lines takes a kernel's place, so that compiling it takes a f
 """
 
 import os
+import signal
 import shutil
 import stat
 import subprocess
@@ -237,6 +238,22 @@ def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(RuntimeError, match="could not be compiled") as raised:
         building.entries([request, request])
     assert ("no such stage" in str(raised.value)) == ("no such stage" in crash)
+
+
+def test_a_builder_builds_again_unless_it_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that has ended while it waited costs a new one, and nothing else."""
+    (tmp_path / "telling_builder.py").write_text(
+        "import os\ndef build(folder, task):\n    return f'{os.getpid():024x}'\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(cache.CodeRequest, "answer", lambda request, name: processes.append(int(name, 16)))
+    processes: list[int] = []
+    for number in range(3):
+        with pytest.raises(RuntimeError, match="is not in"):  # it keeps nothing
+            building.entries([cache.CodeRequest(f"telling {number}", "what tells its process", "telling_builder")])
+        if number == 1:
+            os.kill(processes[-1], signal.SIGTERM)
+    assert processes[0] == processes[1] != processes[2]
 
 
 def test_what_killed_processes_left_is_deleted(copied: Path) -> None:

@@ -6,6 +6,7 @@ which finds everything compiled loads neither SymPy nor a compiler's front end.
 
 from __future__ import annotations
 
+import atexit
 import os
 import pickle
 import subprocess
@@ -14,8 +15,10 @@ import tempfile
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
-from types import TracebackType
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
 
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
 from friso.engine.prune import prune
@@ -41,7 +44,7 @@ class _Work:
 
     def __init__(self, requests: list[CodeRequest]) -> None:
         self._count, self._waiting = len(requests), deque(enumerate(requests, 1))
-        self._builders: list[_Builder] = []
+        self._busy: list[_Builder] = []
 
     def finish(self) -> None:
         """Meet all of them. Whatever ends it early ends the builders too."""
@@ -52,66 +55,105 @@ class _Work:
                     job.result()
             except BaseException:
                 self._waiting.clear()
-                for builder in list(self._builders):
+                for builder in list(self._busy):
                     builder.kill()
                 raise
 
     def _meet(self) -> None:
-        with _Builder() as builder:
-            self._builders.append(builder)
-            while True:
-                try:
-                    number, request = self._waiting.popleft()
-                except IndexError:
-                    return
-                with request.lock():
-                    if request.entry() is None:  # no other process has built it meanwhile
-                        place = f"{number} of {self._count}"
-                        logger.warning("compiling, once on this machine, %s: %s", place, request.title)
-                        request.answer(builder.build(request))
+        while True:
+            try:
+                number, request = self._waiting.popleft()
+            except IndexError:
+                return
+            with request.lock():
+                if request.entry() is None:  # no other process has built it meanwhile
+                    place = f"{number} of {self._count}"
+                    logger.warning("compiling, once on this machine, %s: %s", place, request.title)
+                    request.answer(self._built(request))
+
+    def _built(self, request: CodeRequest) -> str:
+        """Build what is requested, by a builder that waits where there is one; the name of the entry."""
+        surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(filter(None, sys.path)), request.plug_ins)
+        while True:
+            waiting = _taken(surroundings)
+            builder = waiting or _Builder(surroundings)
+            self._busy.append(builder)
+            name = builder.build(request)
+            self._busy.remove(builder)
+            if name:
+                _waiting.append(builder)
+                return name
+            message = builder.end()
+            if waiting is None:  # one that has waited may have ended meanwhile
+                raise RuntimeError(f"the kernel could not be compiled:\n{message}")
+
+
+@dataclass(frozen=True)
+class _Surroundings:
+    """What a builder is started with and what it has loaded: by which process (one that was forked has none of its
+    own), for which cache, where modules are, which plug-ins."""
+
+    process: int
+    folder: Path
+    paths: tuple[str, ...]
+    plug_ins: str
 
 
 class _Builder:
-    """A process that builds what it is sent (`friso.engine.builder`); it is started when it is needed."""
+    """A process that builds what it is sent (`friso.engine.builder`). It waits for more when it is done, and ends by
+    itself if nothing comes for a while, or with the process that started it."""
 
-    def __init__(self) -> None:
-        self._process: subprocess.Popen[bytes] | None = None
-        self._open = ExitStack()
-
-    def __enter__(self) -> _Builder:
-        self._messages = self._open.enter_context(tempfile.TemporaryFile())
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        if self._process is not None:
-            if error is not None:
-                self._process.kill()
-            self._process.communicate()
-        self._open.close()
+    def __init__(self, surroundings: _Surroundings) -> None:
+        self.surroundings = surroundings
+        self._messages = tempfile.TemporaryFile()  # noqa: SIM115, open as long as the process lives
+        environ = {**os.environ, "PYTHONPATH": os.pathsep.join(surroundings.paths)}
+        command = [sys.executable, "-P", "-m", "friso.engine.builder", str(surroundings.folder)]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)
 
     def build(self, request: CodeRequest) -> str:
-        """Build what is requested; the name of its entry."""
-        process = self._process = self._process or self._started()
-        assert process.stdin is not None
-        assert process.stdout is not None
+        """Build what is requested; the name of its entry, "" where the process ended instead."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
         with suppress(BrokenPipeError):  # it says why
-            pickle.dump((request.builder, request.task), process.stdin)
-            process.stdin.flush()
-        name = process.stdout.readline().decode("ascii").strip()
-        if not name:
-            process.wait()
-            self._messages.seek(0)
-            message = self._messages.read().decode(errors="replace")
-            raise RuntimeError(f"the kernel could not be compiled:\n{message}")
-        return name
+            pickle.dump((request.builder, request.task), self._process.stdin)
+            self._process.stdin.flush()
+        return self._process.stdout.readline().decode("ascii").strip()
+
+    def end(self) -> str:
+        """End the process; what it has said on standard error."""
+        with suppress(BrokenPipeError):
+            self._process.communicate()
+        self._messages.seek(0)
+        message = self._messages.read().decode(errors="replace")
+        self._messages.close()
+        return message
 
     def kill(self) -> None:
         """End the process, whatever it is at."""
-        if self._process is not None:
-            self._process.kill()
+        self._process.kill()
 
-    def _started(self) -> subprocess.Popen[bytes]:
-        environ = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-        command = [sys.executable, "-P", "-m", "friso.engine.builder", str(cache_folder())]
-        pipe = subprocess.PIPE
-        return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)
+
+_waiting: list[_Builder] = []
+
+
+def _taken(surroundings: _Surroundings) -> _Builder | None:
+    """A builder that waits in these surroundings, and no longer does; None if there is none."""
+    with _taking:
+        for builder in _waiting:
+            if builder.surroundings == surroundings:
+                _waiting.remove(builder)
+                return builder
+    return None
+
+
+_taking = Lock()
+
+
+@atexit.register
+def _dismiss() -> None:
+    """End the builders of this process that wait."""
+    for builder in _waiting:
+        if builder.surroundings.process == os.getpid():
+            builder.kill()
+            builder.end()

@@ -122,12 +122,14 @@ class Compiled:
 @dataclass(frozen=True)
 class CodeRequest:
     """What is to be compiled: its `name` in full, a `title` for people, the module whose `build(folder, task)` keeps it
-    in the cache (`keep`) and returns the name of its entry, and the task that it is given."""
+    in the cache (`keep`) and returns the name of its entry, the task that it is given, and the digests of the plug-ins
+    that it loads."""
 
     name: str
     title: str
     builder: str
     task: bytes = b""
+    plug_ins: str = ""
 
     @property
     def file(self) -> Path:

@@ -226,8 +226,9 @@ DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.bu
 def _request(request: KernelRequest) -> CodeRequest:
     """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
     foreign = plug_ins(request.sections)
-    name = " ".join([repr(request), *(plug_in.digest for plug_in in foreign)])
-    return CodeRequest(name, request.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(request))))
+    digests = " ".join(plug_in.digest for plug_in in foreign)
+    task = pickle.dumps((foreign, pickle.dumps(request)))
+    return CodeRequest(f"{request!r} {digests}", request.title, "friso.engine.build", task, digests)
 
 
 def _load(request: KernelRequest, entry: Compiled) -> None:
