@@ -4,8 +4,8 @@ A stand-in of a few lines takes a kernel's place, so that compiling it takes a f
 """
 
 import os
-import signal
 import shutil
+import signal
 import stat
 import subprocess
 import sys
