@@ -54,9 +54,9 @@ class ChannelContent:
         steps = steps[steps > 0]
         return 1 / float(np.median(steps)) if steps.size else None
 
-    def course(self, bins: int = BINS) -> np.ndarray:
+    def course(self) -> np.ndarray:
         """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""
-        parts = np.array_split(self.values, min(bins, max(self.values.size, 1)))
+        parts = np.array_split(self.values, min(BINS, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
         return np.array([part.mean() if part.size else np.nan for part in finite])
 

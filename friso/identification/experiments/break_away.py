@@ -62,9 +62,7 @@ class BreakAway:
     warnings: tuple[str, ...]
 
 
-def static_from_ramps(
-    log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE_RATE, cutoff: float = CUTOFF
-) -> BreakAway:
+def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE_RATE) -> BreakAway:
     """Break-away forces of the ramps in a log, each from rest of the body on the bearing, and static friction.
 
     With the `mass` [kg] that moves, it is the greatest friction, force less inertia, as motion begins (the published
@@ -77,9 +75,9 @@ def static_from_ramps(
     for part in log.segments:
         if part.stop - part.start < LEAST:
             continue
-        breaks = slips(body[part], log.sample_time, cutoff)
+        breaks = slips(body[part], log.sample_time, CUTOFF)
         threshold = max(threshold, breaks.threshold)
-        pushed = low_pass(force[part], log.sample_time, cutoff)
+        pushed = low_pass(force[part], log.sample_time, CUTOFF)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.directions, strict=True)
         for onset, start, rest, direction in marks:
             push = direction * force[part][rest : start + 1]
@@ -87,21 +85,21 @@ def static_from_ramps(
                 stops += 1
                 continue
             begin = rest + _half(push)
-            if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
+            if start - begin < max(SMEARED / (CUTOFF * log.sample_time), SAMPLES):
                 quick += 1
                 continue
             rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
             at, level, unsure = onset, float(direction * pushed[onset]), 0.0
             if mass and rising > 0:
                 signals = direction * force[part], direction * body[part]
-                top = peak(*signals, mass, log.sample_time, rising, (begin, start), cutoff)
+                top = peak(*signals, mass, log.sample_time, rising, (begin, start), CUTOFF)
                 at, level, unsure = top.at, top.level, top.unsure
             first = part.start + at
             rows.append((float(log.time[first]), float(body[first]), float(direction), level, float(rising), unsure))
     table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 6).T
     notes = []
     if quick:
-        notes.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
+        notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
     if stops:
         notes.append(f"{stops} motions went on after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:

@@ -78,8 +78,8 @@ class StepStiffness:
     warnings: tuple[str, ...]
 
 
-def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
-    """Stiffness from steps of the position with the cart fixed, the force low-passed at `cutoff` [Hz].
+def stiffness_from_steps(log: Log) -> StepStiffness:
+    """Stiffness from steps of the position with the cart fixed, the force low-passed at `CUTOFF` [Hz].
 
     Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
     windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
@@ -88,9 +88,9 @@ def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
     measured = deflection(log)
     deflected = position if measured is None else measured
     smooth = [
-        np.concatenate([low_pass(x[s], log.sample_time, cutoff) for s in log.segments]) for x in (force, deflected)
+        np.concatenate([low_pass(x[s], log.sample_time, CUTOFF) for s in log.segments]) for x in (force, deflected)
     ]
-    spans = [s for part in log.segments for s in _plateaus(log, part, cutoff)]
+    spans = [s for part in log.segments for s in _plateaus(log, part, CUTOFF)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
     settled = [_settled(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)

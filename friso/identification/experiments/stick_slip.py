@@ -88,7 +88,6 @@ def static_from_stick_slip(
     stage_mass: float = 0.0,
     stroke: float = np.inf,
     bristle_rate: float = BRISTLE_RATE,
-    cutoff: float = CUTOFF,
 ) -> StickSlip:
     """Static friction from slow motion that sticks and slips.
 
@@ -98,31 +97,31 @@ def static_from_stick_slip(
     Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
     with its reason. Raises InputError for missing channels or an unusable stiffness.
     """
-    deflected, pushed = _deflection(log, cutoff), _actuator(log, stage_mass, cutoff)
+    deflected, pushed = _deflection(log, CUTOFF), _actuator(log, stage_mass, CUTOFF)
     pull, relative_error = _pull(log, stiffness, deflected, pushed)
     body = on_bearing(log)
     cart_velocity = np.zeros_like(body)
     rows: list[tuple[float, ...]] = []
     shares, loads = [], []
     for part in log.segments:
-        breaks = slips(body[part], log.sample_time, cutoff)
+        breaks = slips(body[part], log.sample_time, CUTOFF)
         cart_velocity[part] = breaks.speed
         shares.append(breaks.share)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, top, direction in marks:
             at, force, before, rising, held = _peak(
-                direction * pull[part], log.sample_time, cutoff, (rest, onset, start, top)
+                direction * pull[part], log.sample_time, CUTOFF, (rest, onset, start, top)
             )
             at += part.start
             bent = np.nan if deflected is None else float(direction * deflected[at])
             unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
-            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
+            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / CUTOFF)
             place = (float(log.time[at]), float(body[at]), float(direction))
             held = held or abs(bent) > (1 - AT_STOP) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    joint_stiffness = _stiffness(log, deflected, loads, cutoff)
+    joint_stiffness = _stiffness(log, deflected, loads, CUTOFF)
     return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), joint_stiffness, _why(shares))
 
 

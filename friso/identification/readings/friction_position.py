@@ -71,15 +71,13 @@ class FrictionPosition:
     warnings: tuple[str, ...]
 
 
-def friction_position(
-    log: Log, mass: float = 0.0, crossover: float | None = None, cutoff: float = CUTOFF
-) -> FrictionPosition:
+def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
     """Friction along the rail from the passes at constant velocity, `mass` [kg] times acceleration taken off.
 
     With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
     InputError for missing channels.
     """
-    stretches = passes(log, cutoff)
+    stretches = passes(log, CUTOFF)
     position, force = on_bearing(log), channel(log, "force")
     if not stretches:
         unknown = _no_repeatability("no stretch of constant velocity")
@@ -89,7 +87,7 @@ def friction_position(
     long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
     ends = [position[p.span] for p in long]
     places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS)
-    maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, cutoff)) for stretch in long)
+    maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, CUTOFF)) for stretch in long)
     pairs = _pairs(maps)
     repeatability = _repeatability(maps, pairs)
     separated, verdict = _verdict(maps, repeatability, crossover)

@@ -63,12 +63,12 @@ class FrictionVelocity:
     warnings: tuple[str, ...]
 
 
-def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> FrictionVelocity:
+def friction_velocity(log: Log, mass: float = 0.0) -> FrictionVelocity:
     """Friction-velocity map from the stretches of constant velocity, over the places that all of them share if they
     share one, `mass` [kg] times what is left of acceleration taken off. What the speeds present cannot show is unknown,
     with the reason. Raises InputError for missing channels."""
-    every = passes(log, cutoff)
-    used = on_common_places(log, [stretch for stretch in every if stretch.steady], cutoff)
+    every = passes(log, CUTOFF)
+    used = on_common_places(log, [stretch for stretch in every if stretch.steady], CUTOFF)
     velocities, forces, errors = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 3).T
     unsteady = np.array([stretch.velocity for stretch in every if not stretch.steady])
     sides = {

@@ -38,10 +38,9 @@ def break_away(
     coulomb: float,
     bristle_stiffness: float,
     stribeck_velocity: float,
-    exponent: float = 2.0,
 ) -> float:
     """Least force [N] at which LuGre friction breaks away while the force rises at `force_rate` [N/s]."""
-    level = stribeck_curve(_SPEEDS, coulomb, static, 1.0, exponent)
+    level = stribeck_curve(_SPEEDS, coulomb, static, 1.0)
     creep = 1 - force_rate / (bristle_stiffness * stribeck_velocity * _SPEEDS)
     return float(max(np.max(level * creep), coulomb))
 

@@ -58,12 +58,12 @@ class StraightLine:
         return float(np.log2(self.high / self.low))
 
 
-def mass_lines(response: FrequencyResponse, sign: float | None = None, most: int = 3) -> tuple[StraightLine, ...]:
+def mass_lines(response: FrequencyResponse, most: int = 3) -> tuple[StraightLine, ...]:
     """The mass lines of a force-to-position response by frequency, at most so many; none is an answer too.
 
     Below an antiresonance it is the line of the whole mass, above the resonance that of the driven part.
     """
-    return straight_lines(response, 2, sign, most)
+    return straight_lines(response, 2, most=most)
 
 
 def straight_lines(

@@ -14,6 +14,9 @@ if TYPE_CHECKING:
     from control import FrequencyResponseData
 
 
+COHERENT = 0.5
+"""Coherence from which on, where it is known, a line is used."""
+
 NEIGHBOURS = 15
 """Lines from which the scatter between neighbours is taken."""
 
@@ -107,20 +110,20 @@ class FrequencyResponse:
             raise InputError("band", text, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
         return self.at(inside)
 
-    def usable(self, ratio: float = 3.0, coherence: float = 0.5) -> FrequencyResponse:
+    def usable(self, ratio: float = 3.0) -> FrequencyResponse:
         """The lines whose response is at least `ratio` deviations large and whose coherence, if known, suffices.
 
         The warnings list the lines left out. Raises InputError where none is left: excitation too weak.
         """
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:
-            enough &= self.coherence >= coherence
+            enough &= self.coherence >= COHERENT
         if not enough.any():
             best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
             text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
                 text += f", coherence at most {np.max(self.coherence):.2g}"
-            expected = f"a response of {ratio:g} deviations and a coherence of {coherence:g} on some line"
+            expected = f"a response of {ratio:g} deviations and a coherence of {COHERENT:g} on some line"
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self

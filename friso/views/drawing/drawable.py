@@ -72,9 +72,13 @@ def line_key(figure: Figure) -> list[Series]:
     return list({(line.label, line.colour, line.dash): line for line in lines}.values())
 
 
-def word_ticks(axis: Axis, most: int = 12) -> tuple[list[int], list[str]]:
-    """Positions and words written at an axis of words: all, or every second, third, ... so that `most` do."""
-    positions = list(range(0, len(axis.words), -(-len(axis.words) // most)))
+WORDS = 12
+"""Words at an axis at most."""
+
+
+def word_ticks(axis: Axis) -> tuple[list[int], list[str]]:
+    """Positions and words written at an axis of words: all, or every second, third, ... so that `WORDS` do at most."""
+    positions = list(range(0, len(axis.words), -(-len(axis.words) // WORDS)))
     return positions, [axis.words[position] for position in positions]
 
 

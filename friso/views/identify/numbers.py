@@ -95,12 +95,12 @@ def listed(estimates: Sequence[Estimate]) -> str:
     return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
 
 
-def digits(value: float, unit: str, count: int = 3) -> str:
-    """A value [unit] to so many digits, with a prefix of its own: "2.1 µm"."""
+def digits(value: float, unit: str) -> str:
+    """A value [unit] to three digits, with a prefix of its own: "2.1 µm"."""
     if not math.isfinite(value):
         return NOTHING
     factor, text = choose(np.array([value]), unit)
-    return f"{value * factor:.{count}g} {text}".rstrip()
+    return f"{value * factor:.3g} {text}".rstrip()
 
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
