@@ -29,8 +29,8 @@ _OPEN_JOINT_KEYS = frozenset({"joint.damping"})
 class Variant:
     """One change against the baseline: `parameter` and its `value` in words, and why that value is plausible.
 
-    `rtol` None is the tolerance of the reproduction. Of the kind "metric" a run is as long as `changes` say, and hunts
-    if it still swings in its last quarter.
+    `rtol` None is the tolerance of the reproduction. Of the kind "metric" a run is as long as `changes` say, and what
+    it does at its end counts instead of peaks.
     """
 
     parameter: str
