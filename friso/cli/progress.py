@@ -23,8 +23,8 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
     """
 
-    def __init__(self, what: str = "", lines: float = math.inf) -> None:
-        self.what, self.lines = what, lines
+    def __init__(self, label: str = "", lines: float = math.inf) -> None:
+        self.label, self.lines = label, lines
         self.last = time.monotonic()
         self.display: Display | None = None
         self.task: TaskID | None = None
@@ -32,7 +32,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
             self.display = _display()
-            self.task = self.display.add_task(one_line(self.what), total=None)
+            self.task = self.display.add_task(one_line(self.label), total=None)
             self.display.start()
         return self
 
@@ -41,13 +41,13 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self.display.stop()
             self.display = None
 
-    def __call__(self, done: int, total: int, what: str, /) -> None:
+    def __call__(self, done: int, total: int, label: str, /) -> None:
         if self.display is not None and self.task is not None:
-            self.display.update(self.task, completed=done, total=total or None, description=one_line(what))
+            self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
         elif time.monotonic() - self.last > self.lines:
             self.last = time.monotonic()
             share = f"{100 * done // total} %, " if total else ""
-            print(f"friso: {share}{one_line(what)}", file=sys.stderr, flush=True)
+            print(f"friso: {share}{one_line(label)}", file=sys.stderr, flush=True)
 
 
 def _display() -> Display:

@@ -172,8 +172,8 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
 def _without_constants(system: System, internal: tuple[str, ...]) -> System:
     """The system without those internal states of the friction law that stay as they are, such as the force of an
     element that slips: each would be a pole at 0."""
-    still = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
-    moving = [i for i in range(len(system.states)) if i not in still]
+    unmoved = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
+    moving = [i for i in range(len(system.states)) if i not in unmoved]
     states = tuple(system.states[i] for i in moving)
     a, b, c = system.a[:, moving][:, :, moving], system.b[:, moving], system.c[:, :, moving]
     return replace(system, a=a, b=b, c=c, states=states)

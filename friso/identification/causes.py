@@ -59,8 +59,8 @@ def _delay(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
     lag = None if rough is None else tried({rough - abs(rough) // 4, rough + abs(rough) // 4} - {rough})
     if lag is None or fits[lag].error > BETTER * inverse.error:
         return []
-    how = f"{abs(lag) * log.sample_time * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
-    return [Cause(f"a force {how} fits much better: a delay between the channels?", fits[lag])]
+    shift = f"{abs(lag) * log.sample_time * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
+    return [Cause(f"a force {shift} fits much better: a delay between the channels?", fits[lag])]
 
 
 def _constant(inverse: InverseModel, unit: str) -> str:

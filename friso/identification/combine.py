@@ -147,10 +147,10 @@ def _text(estimate: Estimate) -> str:
     return f"{_value(estimate)} by {estimate.method}"
 
 
-def _texts(every: Sequence[Estimate]) -> str:
+def _texts(estimates: Sequence[Estimate]) -> str:
     """The values by method."""
-    methods = dict.fromkeys(estimate.method for estimate in every)
-    values_of = ([_value(estimate) for estimate in every if estimate.method == method] for method in methods)
+    methods = dict.fromkeys(estimate.method for estimate in estimates)
+    values_of = ([_value(estimate) for estimate in estimates if estimate.method == method] for method in methods)
     return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, values_of, strict=True))
 
 

@@ -232,21 +232,21 @@ def _rows(
         columns = np.stack([a, v * forward, sign * forward, v * backward, sign * backward], axis=1)
     else:
         columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
-    every = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
+    step = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
     arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part], moved.position)]
-    time, position = (array[_first(len(array), every) :: every] for array in (arrays[0], arrays[3]))
-    return time, _decimated(arrays[1], every), _decimated(arrays[2], every), position
+    time, position = (array[_first(len(array), step) :: step] for array in (arrays[0], arrays[3]))
+    return time, _decimated(arrays[1], step), _decimated(arrays[2], step), position
 
 
-def _decimated(columns: np.ndarray, every: int) -> np.ndarray:
+def _decimated(columns: np.ndarray, step: int) -> np.ndarray:
     """Every so many-th row, after a filter forward and back that keeps what is beyond half the new frequency out."""
-    if every == 1:
+    if step == 1:
         return columns
-    sections = cheby1(DECIMATION_ORDER, RIPPLE, PASS / every, output="sos")
+    sections = cheby1(DECIMATION_ORDER, RIPPLE, PASS / step, output="sos")
     low = sosfiltfilt(sections, columns, axis=0, padlen=3 * DECIMATION_ORDER)
-    return low[_first(len(columns), every) :: every]
+    return low[_first(len(columns), step) :: step]
 
 
-def _first(count: int, every: int) -> int:
+def _first(count: int, step: int) -> int:
     """The first row kept, so that the last one is."""
-    return (count - 1) % every
+    return (count - 1) % step

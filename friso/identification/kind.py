@@ -147,5 +147,5 @@ class ExperimentKind(Generic[Result]):
         if self.together:
             return [*([times] if times else []), *responses]
         partial = [log for log in times if len(times) > 1 and self.partial(log)]
-        whole = [log for log in times if log not in partial]
-        return [*((log,) for log in (*whole, *together(partial))), *responses]
+        complete = [log for log in times if log not in partial]
+        return [*((log,) for log in (*complete, *together(partial))), *responses]

@@ -54,14 +54,14 @@ def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogF
     gaps: list[LogError] = []
     mappings: dict[Path, Mapping] = {}
     for path in paths:
-        said = _applicable(options, path, paths)
+        mapping = _applicable(options, path, paths)
         try:
-            file = _read(path, said, folder)
+            file = _read(path, mapping, folder)
             files.append(replace(file, mapping_file=kept_at(path, file.mapping, folder)))
             mappings[path] = file.mapping
         except GapsError as error:
             gaps += error.gaps
-            mappings[path] = said.over(load(path, folder) or Mapping())
+            mappings[path] = mapping.over(load(path, folder) or Mapping())
     if gaps:
         raise OpenQuestions(gaps, mappings)
     return files

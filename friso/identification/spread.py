@@ -113,7 +113,7 @@ def _together(scores: np.ndarray, group: np.ndarray) -> np.ndarray:
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The inverse of columns of length 1 times themselves, and which of these cannot be distinguished from others."""
     sizes, directions = np.linalg.eigh(square)
-    lost = sizes < COLLINEAR * sizes[-1]
-    resolved = directions[:, ~lost]
-    alike = (np.abs(directions[:, lost]) > np.sqrt(COLLINEAR)).any(axis=1)
-    return resolved / sizes[~lost] @ resolved.T, alike
+    collinear = sizes < COLLINEAR * sizes[-1]
+    resolved = directions[:, ~collinear]
+    alike = (np.abs(directions[:, collinear]) > np.sqrt(COLLINEAR)).any(axis=1)
+    return resolved / sizes[~collinear] @ resolved.T, alike

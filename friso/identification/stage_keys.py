@@ -91,8 +91,8 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
     """The estimate as far as the key allows it, or None; and why it is not as it was, if it is not."""
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
-        what = f"known only to be {' and '.join(ends)}" if ends else "unknown"
-        return None, f"{what}, the stage file keeps what it had"
+        knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
+        return None, f"{knowledge}, the stage file keeps what it had"
     if not estimate.high > estimate.low:
         return None, "its uncertainty is not known, the stage file keeps what it had"
     if not (field.bound.holds(estimate.low) or field.bound.holds(estimate.high)):
@@ -143,11 +143,11 @@ def _static_above(
         return {}
     leads, follows = (COULOMB, STATIC) if COULOMB in estimates else (STATIC, COULOMB)
     ratio, lead = flat[follows] / flat[leads], estimates[leads]
-    lost = f" ({written(estimates[follows])} was found)" if follows in estimates else ""
+    remark = f" ({written(estimates[follows])} was found)" if follows in estimates else ""
     estimates[follows] = replace(
         lead, name=follows, value=lead.value * ratio, low=lead.low * ratio, high=lead.high * ratio
     )
-    why = f"Coulomb friction would be above static friction otherwise{lost}"
+    why = f"Coulomb friction would be above static friction otherwise{remark}"
     notes.append(f"{follows}: moved along with {leads} to {written(estimates[follows])}, since {why}")
     return {follows: leads}
 

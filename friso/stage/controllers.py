@@ -144,8 +144,8 @@ class Controllers(Variants):
     @property
     def words(self) -> dict[str, str]:
         """What keys are called on the axes of maps."""
-        every = (form for forms in self.forms.values() for form in forms)
-        return {form.key(name): word for form in every for name, word in form.words.items()}
+        forms_of_all = (form for forms in self.forms.values() for form in forms)
+        return {form.key(name): word for form in forms_of_all for name, word in form.words.items()}
 
     def form(self, kind: str, name: str) -> type[ControllerSection]:
         """The form of a kind whose class has this name."""

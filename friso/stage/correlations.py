@@ -200,9 +200,9 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
     fields = numeric_keys(stage.flat())
     within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)
     why = np.full(count, "", dtype=object)
-    some = np.flatnonzero(within)
-    for wrong, reason in violations(laid_over(stage, {key: values[some] for key, values in keys.items()})):
-        which = some[np.broadcast_to(wrong, some.shape)]
+    chosen = np.flatnonzero(within)
+    for wrong, reason in violations(laid_over(stage, {key: values[chosen] for key, values in keys.items()})):
+        which = chosen[np.broadcast_to(wrong, chosen.shape)]
         why[which[why[which] == ""]] = reason
     return within & (why == ""), why
 

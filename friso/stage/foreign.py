@@ -12,8 +12,8 @@ def foreign() -> list[str]:
         "friction law": FRICTION.classes.items(),
     }
     return [
-        f"{what} {name} ({cls.__module__})"
-        for what, classes in kinds.items()
+        f"{kind} {name} ({cls.__module__})"
+        for kind, classes in kinds.items()
         for name, cls in classes
         if plug_in_of(cls)
     ]

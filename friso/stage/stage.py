@@ -127,9 +127,9 @@ class Stage(Section):
         if self.joint and (self.masses.cart is None or self.masses.stage is None):
             text = "a [joint], but a single mass"
             raise StageError("masses", text, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
-        for table, what in (("parasitic", "a parasitic mode"), ("flexure", "leaf springs")):
+        for table, words in (("parasitic", "a parasitic mode"), ("flexure", "leaf springs")):
             if getattr(self, table) and not self.joint:
-                raise StageError(table, f"{what}, but no [joint]", "both or neither", _JOINT.example)
+                raise StageError(table, f"{words}, but no [joint]", "both or neither", _JOINT.example)
         if self.flexure and self.axis_kind != LINEAR:
             text = f"leaf springs on an axis with {self.axis_kind.described}"
             raise StageError("flexure", text, "[joint] with its stiffness", 'stiffness = "2.4 N*m/mrad"')
@@ -148,9 +148,9 @@ class Stage(Section):
     def _has_a_whole_transmission(self) -> None:
         """Encoders and friction at the motor belong to a transmission, which has encoders on one side or both."""
         if self.transmission is None:
-            for table, what in (("encoder", "a choice of encoders"), ("motor_friction", "friction at the motor")):
+            for table, words in (("encoder", "a choice of encoders"), ("motor_friction", "friction at the motor")):
                 if getattr(self, table):
-                    raise StageError(table, f"{what}, but no [transmission]", "both or neither", _TRANSMISSION.example)
+                    raise StageError(table, f"{words}, but no [transmission]", "both or neither", _TRANSMISSION.example)
             return
         if self.encoder is None:
             expected = "the sides on which position and velocity are measured"
@@ -182,9 +182,9 @@ class Stage(Section):
         except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # numbers beyond what floats hold
             flat = {"joint.stiffness": np.nan}
         followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
-        lost = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
-        if lost:
-            text = f"leaf springs for which {lost[0]} cannot be computed"
+        undefined = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
+        if undefined:
+            text = f"leaf springs for which {undefined[0]} cannot be computed"
             raise StageError("flexure", text, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
 
     def _written(self, rule: Rule) -> str:

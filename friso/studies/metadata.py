@@ -116,8 +116,8 @@ def checked_metadata(path: Path) -> Metadata:
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
     if number == FORMAT:
         study, axes, notes = (entry.get(name) for name in ("study", "axes", "notes"))
-        whole = isinstance(study, str) and isinstance(axes, dict) and isinstance(notes, dict)
-        if not whole or entry.get("sha256") != sealed:
+        complete = isinstance(study, str) and isinstance(axes, dict) and isinstance(notes, dict)
+        if not complete or entry.get("sha256") != sealed:
             raise _damaged(path, "is damaged")
         return Metadata(document, study, axes, notes)
     if "equations" in attributes:
@@ -163,9 +163,9 @@ def _content(file: Path) -> Any:
         return None
 
 
-def _damaged(path: Path, how: str) -> StoreError:
+def _damaged(path: Path, damage: str) -> StoreError:
     expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
-    return StoreError("", f"a store whose {_FILE} {how}", expected, _EXAMPLE, str(path))
+    return StoreError("", f"a store whose {_FILE} {damage}", expected, _EXAMPLE, str(path))
 
 
 def digest(content: Any) -> str:

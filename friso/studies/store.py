@@ -262,9 +262,11 @@ def _refuse_other(path: Path, study: Study) -> None:
 
 def _warn_of_another_machine(path: Path) -> None:
     with read_store(path) as dataset:
-        there = dataset.attrs.get("machine")
-    if there != machine():
-        logger.warning("the store was begun on %s, here is %s: cells may differ in their last bits", there, machine())
+        machine_stored = dataset.attrs.get("machine")
+    if machine_stored != machine():
+        logger.warning(
+            "the store was begun on %s, here is %s: cells may differ in their last bits", machine_stored, machine()
+        )
 
 
 @contextmanager

@@ -123,9 +123,9 @@ def _recorded(
     task: MoveTask,
     seeds: np.ndarray,
     numbers: np.ndarray,
-    how: tuple[float, int, int | None],
+    timing: tuple[float, int, int | None],
 ) -> Recorded:
-    interval, count, threads = how
+    interval, count, threads = timing
     flat = {**flat, "drive.seed": seeds.astype(float)}
     low, high = task.span
     motion = {"motion.kind": "step", "motion.size": (high - low) or MARGIN, "motion.duration": task.duration}

@@ -121,9 +121,11 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
     from friso.identification.sources import kept_at
 
     folder = target.folder
-    new = {path: said for path, said in mappings.items() if said != load(path, folder)}
+    new = {path: mapping for path, mapping in mappings.items() if mapping != load(path, folder)}
     texts: dict[Path, Content] = {
-        place: mapping_text(said) for path, said in new.items() if (place := kept_at(path, said, folder)) is not None
+        place: mapping_text(mapping)
+        for path, mapping in new.items()
+        if (place := kept_at(path, mapping, folder)) is not None
     }
     if any(place.parent == folder for place in texts):
         target.write({}, beside=texts)  # so that the folder is known for its own next time

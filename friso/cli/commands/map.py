@@ -196,7 +196,7 @@ def _run(study: Study, store: Path, crew: Crew, share: float, overwrite: bool, n
     stored = 0
     with ProgressBar(store.name) as bar:
 
-        def progress(done: int, total: int, what: str) -> None:
+        def progress(done: int, total: int, label: str) -> None:
             nonlocal stored
             stored = done
             bar(done, total, store.name)

@@ -63,10 +63,10 @@ class DrivenPlant:
         """Forces [N] that move the cart by amplitudes [m] at the frequencies with these numbers, the positions of
         stage and cart over them [m/N], complex, and the dynamic stiffness of friction [N/m], each of shape (count,)."""
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
-        some = self.compliances[which]
+        compliances = self.compliances[which]
         with np.errstate(all="ignore"):  # what cannot be computed is NaN or infinite, and no root
-            cart = some[:, 1, 0] / (1 + some[:, 1, 1] * stiffness)
-            stage = some[:, 0, 0] - some[:, 0, 1] * stiffness * cart
+            cart = compliances[:, 1, 0] / (1 + compliances[:, 1, 1] * stiffness)
+            stage = compliances[:, 0, 0] - compliances[:, 0, 1] * stiffness * cart
             return amplitudes / np.abs(cart), np.stack([stage, cart], axis=1), stiffness
 
     @cached_property
@@ -78,14 +78,14 @@ class DrivenPlant:
     def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Amplitudes [m] that need less than each of `forces` at each frequency, and more, shape (forces, frequencies):
         well beyond those of a stuck and of a free cart, whatever the other forces are."""
-        every, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
+        rows, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
         with np.errstate(over="ignore"):
             bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *LIMITS)
-        stuck = np.abs(self.answer(np.full(shape[1], self.stuck), every)[1][:, 1])
-        slid = np.abs(self.answer((FREE * bare).ravel(), np.tile(every, shape[0]))[1][:, 1]).reshape(shape)
+        stuck = np.abs(self.answer(np.full(shape[1], self.stuck), rows)[1][:, 1])
+        slid = np.abs(self.answer((FREE * bare).ravel(), np.tile(rows, shape[0]))[1][:, 1]).reshape(shape)
         with np.errstate(over="ignore"):
-            some = np.stack([bare, stuck * forces[:, None], slid * forces[:, None]])
-        low, high = np.fmin.reduce(some) / BEYOND, np.fmax.reduce(some) * BEYOND
+            states = np.stack([bare, stuck * forces[:, None], slid * forces[:, None]])
+        low, high = np.fmin.reduce(states) / BEYOND, np.fmax.reduce(states) * BEYOND
         return self._extended(low, forces, -1), self._extended(high, forces, 1)
 
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:

@@ -118,24 +118,24 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
     chosen = np.zeros(sizes.shape[:2], np.int64)
     before = np.full(len(sizes), -np.inf)
-    every = np.arange(len(sizes))
+    rows = np.arange(len(sizes))
     for j in range(sizes.shape[1])[::order]:
         far = np.where(np.isfinite(before)[:, None], np.abs(sizes[:, j] - before[:, None]), sizes[:, j])
         chosen[:, j] = np.argmin(far, axis=1)
-        now = sizes[every, j, chosen[:, j]]
+        now = sizes[rows, j, chosen[:, j]]
         before = np.where(np.isfinite(now), now, before)
     return chosen
 
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     """What is wrong with the answers to every force at every frequency, or "done"."""
-    there, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
-    count = np.sum(there, axis=2)
+    present, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
+    count = np.sum(present, axis=2)
     last = np.take_along_axis(lasting, np.maximum(count - 1, 0)[:, :, None], axis=2)[:, :, 0]
     missing = unknown | (lasting[:, :, 0] != 1) | (last != 1)
-    lost = (count == 0) | np.any(there & ~(branches["error"] <= 100 * CLOSE), axis=2)
+    unfound = (count == 0) | np.any(present & ~(branches["error"] <= 100 * CLOSE), axis=2)
     deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
     status = np.where(missing, MISSING, "done").astype(object)
     status[np.any(beyond_stroke(stage.flat(), deflection), axis=2)] = TOUCHES
-    status[lost] = NOT_FOUND
+    status[unfound] = NOT_FOUND
     return status.astype(str)

@@ -76,7 +76,7 @@ class Imposition:
     def symmetric(self) -> bool:
         """Whether the force is odd: the mirror image of every motion has the mirrored force; tried at random states."""
         states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
-        pairs = ((self._reaction(some.T), self._reaction(-some.T)) for some in states)
+        pairs = ((self._reaction(states_of.T), self._reaction(-states_of.T)) for states_of in states)
         return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
 
     def _reaction(self, states: np.ndarray) -> np.ndarray:
@@ -138,8 +138,8 @@ def steady(friction: Imposition) -> PeriodicStates:
     for _ in range(ROUNDS):
         if not open_.size:
             break
-        some, scales = friction.take(open_), friction.scales[open_][:, friction.inner]
-        step, missed, fine = _secant(some, inner[open_], width[open_])
+        chosen_friction, scales = friction.take(open_), friction.scales[open_][:, friction.inner]
+        step, missed, fine = _secant(chosen_friction, inner[open_], width[open_])
         gap[open_], done[open_] = np.max(np.abs(missed) / scales, axis=1), fine
         far = fine & (gap[open_] > closed(friction.rtol))
         inner[open_[far]] += step[far]
@@ -158,10 +158,10 @@ def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple
     completed, from the states and the widths of the secants (count, inner)."""
     share, sign = share_of_period(friction)
     count, size = inner.shape
-    every = np.repeat(np.arange(count), size + 1)
-    aside = np.tile(np.vstack([np.zeros(size), np.eye(size)]), (count, 1)) * width[every]
-    ends, fine = np.empty((len(every), size)), np.empty(len(every), bool)
-    for numbers, results in friction.take(every).run(inner[every] + aside, share):
+    rows = np.repeat(np.arange(count), size + 1)
+    aside = np.tile(np.vstack([np.zeros(size), np.eye(size)]), (count, 1)) * width[rows]
+    ends, fine = np.empty((len(rows), size)), np.empty(len(rows), bool)
+    for numbers, results in friction.take(rows).run(inner[rows] + aside, share):
         ends[numbers] = sign * results.ends[:, friction.inner]
         fine[numbers] = np.equal(results.statuses, Status.DONE)
     ends, fine = ends.reshape(count, size + 1, size), np.all(fine.reshape(count, size + 1), axis=1)

@@ -133,11 +133,11 @@ def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: lis
         )
 
     forward, backward = (static(mask) for _, mask in ways(directions))
-    every = static(np.ones(len(forces), dtype=bool))
+    together = static(np.ones(len(forces), dtype=bool))
     if forward.determined and backward.determined and (forward.low > backward.high or backward.low > forward.high):
         notes.append(f"The directions differ: {forward.value:.3g} N forward, {backward.value:.3g} N backward.")
     return BreakAway(
-        every, forward, backward, times, places, directions, forces, rates, unsure, threshold, tuple(notes)
+        together, forward, backward, times, places, directions, forces, rates, unsure, threshold, tuple(notes)
     )
 
 

@@ -130,8 +130,8 @@ class _Equation:
 
     def derivatives(self, p: np.ndarray) -> np.ndarray:
         """Of the residual, shape (m, 5)."""
-        here = self.model(p)
-        return np.stack([(self.model(p + step) - here) / STEP for step in STEP * np.eye(len(p))], axis=1)
+        residuals_here = self.model(p)
+        return np.stack([(self.model(p + step) - residuals_here) / STEP for step in STEP * np.eye(len(p))], axis=1)
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:

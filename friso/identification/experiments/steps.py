@@ -101,12 +101,12 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
     steps = np.diff([[w.position, w.force] for w in windows], axis=0).reshape(-1, 2)
     noise = np.array([np.hypot(a.force_error, b.force_error) for a, b in pairwise(windows)])
     large = np.abs(steps[:, 0]) > 0.2 * scale
-    every, up, down = (
+    whole, up, down = (
         _slope(steps, noise, large & chosen, words, len(spans))
         for chosen, words in ((steps[:, 0] != 0, ""), (steps[:, 0] > 0, ", upwards"), (steps[:, 0] < 0, ", downwards"))
     )
     curves = (log.time, deflected, smooth[0])
-    return StepStiffness(every, up, down, _hysteresis(windows), windows, *curves, fixed, tuple(warnings))
+    return StepStiffness(whole, up, down, _hysteresis(windows), windows, *curves, fixed, tuple(warnings))
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:

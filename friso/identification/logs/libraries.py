@@ -16,10 +16,10 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
     """What a library reads from a file of a kind. Raises LogError, which says how to install the library if it is not
     there."""
     try:
-        there = find_spec(library) is not None
+        installed = find_spec(library) is not None
     except ValueError:
-        there = False
-    if not there:
+        installed = False
+    if not installed:
         actual = f"a {kind} file, and the library {library} is not installed"
         raise LogError("log", actual, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
     return content(kind, path)

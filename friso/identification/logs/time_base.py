@@ -60,12 +60,12 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
-    there = np.isfinite(time) & np.isfinite(values)
-    if there.sum() < max(2, 0.5 * there.size):
-        actual = f"{there.size - there.sum()} of {there.size} samples that are not numbers (NaN)"
+    finite = np.isfinite(time) & np.isfinite(values)
+    if finite.sum() < max(2, 0.5 * finite.size):
+        actual = f"{finite.size - finite.sum()} of {finite.size} samples that are not numbers (NaN)"
         raise LogError(name, actual, "at least half of the samples", "")
-    inside = np.flatnonzero(there)
-    return time[there], values[there], int(np.count_nonzero(~there[inside[0] : inside[-1]]))
+    inside = np.flatnonzero(finite)
+    return time[finite], values[finite], int(np.count_nonzero(~finite[inside[0] : inside[-1]]))
 
 
 def _evened(name: str, raw: Track) -> Track:

@@ -67,9 +67,9 @@ def fit_identifiable(
     progress(0, STEPS, "moves: mass and sliding friction along the log")
     plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None])
     if loop is not None:
-        every = tuple(range(len(names)))
+        numbers = tuple(range(len(names)))
         progress(1, STEPS, "moves: all parameters in closed loop")
-        full = fit(loop, every, np.vstack([nearby(plain), everywhere(loop, every, plain.inner)]))
+        full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]))
         if explains(full, noise):
             return _believed(full, core, covered, progress, explained=True)
     progress(3, STEPS, "moves: all parameters along the log")
@@ -97,8 +97,8 @@ def _along(
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
     if not hopeful:
         return Identified(plain, {}, frozenset())
-    every = _numbers(names, core | hopeful)
-    full = fit(follows, every, everywhere(follows, every, plain.inner))
+    numbers = _numbers(names, core | hopeful)
+    full = fit(follows, numbers, everywhere(follows, numbers, plain.inner))
     believed = _believed(full, core, covered, progress)
     if _pays(full, plain) or believed.shown == hopeful:
         return believed

@@ -117,8 +117,8 @@ def _map(
     with np.errstate(invalid="ignore"):
         mapped = np.where(count > 0, np.bincount(bins, f, minlength=len(places)) / count, np.nan)
     inside = np.arange(bins.min(), bins.max() + 1)
-    there = inside[count[inside] > 0]
-    mapped[inside] = np.interp(inside, there, mapped[there])  # places passed between two samples
+    covered = inside[count[inside] > 0]
+    mapped[inside] = np.interp(inside, covered, mapped[covered])  # places passed between two samples
     row = mapped[inside]
     mean = by_t("friction force along the rail", "N", block_mean(row), "mean over the place by blocks")
     flat = row - np.polyval(np.polyfit(inside, row, 1), inside)

@@ -67,10 +67,10 @@ def friction_velocity(log: Log, mass: float = 0.0) -> FrictionVelocity:
     """Friction-velocity map from the stretches of constant velocity, over the places that all of them share if they
     share one, `mass` [kg] times what is left of acceleration taken off. What the speeds present cannot show is unknown,
     with the reason. Raises InputError for missing channels."""
-    every = passes(log, CUTOFF)
-    used = on_common_places(log, [stretch for stretch in every if stretch.steady], CUTOFF)
+    stretches = passes(log, CUTOFF)
+    used = on_common_places(log, [stretch for stretch in stretches if stretch.steady], CUTOFF)
     velocities, forces, errors = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 3).T
-    unsteady = np.array([stretch.velocity for stretch in every if not stretch.steady])
+    unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
     sides = {
         words: _direction(np.abs(velocities[m]), np.sign(velocities[m]) * forces[m], errors[m], words)
         for words, m in ways(velocities)
@@ -78,7 +78,7 @@ def friction_velocity(log: Log, mass: float = 0.0) -> FrictionVelocity:
     bias, both = _together(velocities, forces, errors)
     places = places_of(log, used)
     warnings = []
-    if used and places != places_of(log, [stretch for stretch in every if stretch.steady]):
+    if used and places != places_of(log, [stretch for stretch in stretches if stretch.steady]):
         warnings.append(f"Read on the stretch common to all passes, {places[0] * 1e3:.4g} to {places[1] * 1e3:.4g} mm.")
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
@@ -235,8 +235,8 @@ def _stribeck(
     def start(at: float) -> list[float]:
         return [line[0] / scale, line[1] * speeds.max() / scale, float(friction[np.argmin(speeds)]) / scale, np.log(at)]
 
-    tried = [least_squares(off, start(at)) for at in np.geomspace(speeds.min(), speeds.max() / 2, 4)]
-    best = min(tried, key=lambda fit: fit.cost)
+    fits = [least_squares(off, start(at)) for at in np.geomspace(speeds.min(), speeds.max() / 2, 4)]
+    best = min(fits, key=lambda fit: fit.cost)
     left, rest = freedom - 2, 2 * best.cost
     bent = best.x[2] > best.x[0] > 0
     if not bent or (rest > 0 and fisher.sf((plain - rest) / 2 / (rest / left), 2, left) > SURE):

@@ -69,8 +69,8 @@ def peak(
     in the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The
     force rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts."""
     begin, start = marks
-    still = slice(begin, (begin + start) // 2)
-    noise = scatter(force[still]), mass / sample_time**2 * scatter(position[still])
+    rest = slice(begin, (begin + start) // 2)
+    noise = scatter(force[rest]), mass / sample_time**2 * scatter(position[rest])
     least = max(GAUSSIAN / (cutoff * sample_time), 1.0)
     widths = np.geomspace(least, max(LONGEST * (start - begin), least), SCALES)
     # deviations of white noise under a Gaussian, and under its second derivative

@@ -118,12 +118,12 @@ def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[floa
     return _errors(bench.two_masses, log, bench.band, period, bench.other is not None)
 
 
-def _attempt(warnings: list[str], what: str, function, *arguments):
+def _attempt(warnings: list[str], label: str, function, *arguments):
     """The answer of an analysis, or None and why it has none."""
     try:
         return function(*arguments)
     except InputError as error:
-        warnings.append(f"no {what}: {error.actual}; expected {error.expected}")
+        warnings.append(f"no {label}: {error.actual}; expected {error.expected}")
         return None
 
 

@@ -228,10 +228,12 @@ def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tu
     columns, coefficients = ones, np.array([np.average(level, weights=weight)])
     straight = squares = float(np.sum(weight * (level - coefficients[0]) ** 2))
     for shape in shapes:
-        tried = np.hstack([ones, shape[:, None]])
-        fitted = np.linalg.solve(tried.T @ (weight[:, None] * tried), tried.T @ (weight * level))
-        left = float(np.sum(weight * (level - tried @ fitted) ** 2))
-        free = max(_independent(level - tried @ fitted) - 2, 1.0)
+        columns_tried = np.hstack([ones, shape[:, None]])
+        fitted = np.linalg.solve(
+            columns_tried.T @ (weight[:, None] * columns_tried), columns_tried.T @ (weight * level)
+        )
+        left = float(np.sum(weight * (level - columns_tried @ fitted) ** 2))
+        free = max(_independent(level - columns_tried @ fitted) - 2, 1.0)
         if left < squares and straight - left > stats.f.ppf(0.99, 1, free) * left / free:
-            columns, coefficients, squares = tried, fitted, left
+            columns, coefficients, squares = columns_tried, fitted, left
     return columns, coefficients

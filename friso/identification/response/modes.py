@@ -96,8 +96,8 @@ def fit_modes(
 
 def _described(shape: RationalShape, rows: list[Row]) -> str:
     """How the order was chosen."""
-    tried = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
-    return f"{shape.words} by the Bayesian information criterion ({tried})"
+    orders = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
+    return f"{shape.words} by the Bayesian information criterion ({orders})"
 
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:

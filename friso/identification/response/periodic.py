@@ -36,74 +36,74 @@ def multisine(
     noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises InputError for
     records that are not periodic or do not belong together.
     """
-    every, remarks = _together([spectra(record, period) for record in records])
-    excited = np.logical_and.reduce([realisation.excited for realisation in every])
+    spectra_of_records, remarks = _together([spectra(record, period) for record in records])
+    excited = np.logical_and.reduce([realisation.excited for realisation in spectra_of_records])
     if not excited.any():
         raise InputError(
             "records", "realisations without a common line", "the same excited lines", "one period for all"
         )
-    response, noise = _averaged(every, excited)
-    degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in every))
-    if len(every) > 1:
-        total, total_degrees = _total(every, excited, response)
+    response, noise = _averaged(spectra_of_records, excited)
+    degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in spectra_of_records))
+    if len(spectra_of_records) > 1:
+        total, total_degrees = _total(spectra_of_records, excited, response)
         distortion, distortion_known = np.sqrt(np.maximum(total**2 - noise**2, 0.0)), True
         degrees = np.where(distortion > 0, total_degrees, degrees)
     else:
-        distortion = _at_free_lines(every[0], excited, response)
+        distortion = _at_free_lines(spectra_of_records[0], excited, response)
         distortion_known = bool(np.isfinite(distortion).any())
     deviation = np.hypot(noise, np.nan_to_num(distortion))
-    warnings = dict.fromkeys([*remarks, *(text for realisation in every for text in realisation.warnings)])
+    warnings = dict.fromkeys([*remarks, *(text for realisation in spectra_of_records for text in realisation.warnings)])
     if not distortion_known:
         warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
-    frequency = every[0].frequency[excited]
+    frequency = spectra_of_records[0].frequency[excited]
     known_channels = channels or Channels()
     return FrequencyResponse(
         frequency, response, deviation, noise, distortion, degrees, "multisine", known_channels, None, tuple(warnings)
     )
 
 
-def _together(every: list[Spectra]) -> tuple[list[Spectra], list[str]]:
+def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     """The realisations, if they have the same lines, and what to say of their clocks. Raises InputError."""
-    if not every:
+    if not records:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
-    spacings = np.array([realisation.frequency[0] for realisation in every])
+    spacings = np.array([realisation.frequency[0] for realisation in records])
     apart = float(np.ptp(spacings) / spacings.min())
-    if apart > CLOCKS or len({len(realisation.frequency) for realisation in every}) > 1:
+    if apart > CLOCKS or len({len(realisation.frequency) for realisation in records}) > 1:
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
     if apart <= EQUAL:
-        return every, []
+        return records, []
     mean = float(spacings.mean())
-    lines = np.arange(1, len(every[0].frequency) + 1) * mean
+    lines = np.arange(1, len(records[0].frequency) + 1) * mean
     remark = f"the periods of the records differ by {1e6 * apart:.3g} ppm, as clocks do: {1 / mean:.6g} s is used"
-    return [replace(realisation, frequency=lines) for realisation in every], [remark]
+    return [replace(realisation, frequency=lines) for realisation in records], [remark]
 
 
-def _averaged(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The response and the deviation of it by noise, each (lines,)."""
-    outputs, inputs = _relative(every, excited)
+    outputs, inputs = _relative(records, excited)
     gain = inputs.mean(axis=0)
     response = outputs.mean(axis=0) / gain
     variance = np.zeros(len(response))
-    for realisation in every:
+    for realisation in records:
         residuals = (realisation.output[:, excited] - response * realisation.input[:, excited]) / realisation.reference[
             excited
         ]
         variance += np.var(residuals, axis=0, ddof=1) / len(residuals)
-    return response, np.sqrt(variance) / (len(every) * np.abs(gain))
+    return response, np.sqrt(variance) / (len(records) * np.abs(gain))
 
 
-def _relative(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _relative(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Output and input over the external signal, averaged over periods, each (realisations, lines)."""
-    outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in every]
-    inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in every]
+    outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
+    inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in records]
     return np.array(outputs), np.array(inputs)
 
 
-def _total(every: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _total(records: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The deviation of the mean, from how realisations differ, and its degrees of freedom, each (lines,)."""
-    outputs, inputs = _relative(every, excited)
-    count = len(every)
+    outputs, inputs = _relative(records, excited)
+    count = len(records)
     squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
     relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
     freedom = 2 * (count - 1)

@@ -132,10 +132,10 @@ def _another(
     best, best_parameters = np.inf, nonlinear
     for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), PLACES):
         for damping in DAMPINGS:
-            tried = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
-            left = _solved(_columns(tried, shape, s), values, deviation)[1]
+            start = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
+            left = _solved(_columns(start, shape, s), values, deviation)[1]
             if left @ left < best:
-                best, best_parameters = left @ left, tried
+                best, best_parameters = left @ left, start
     return best_parameters
 
 

@@ -183,9 +183,9 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
     at = np.arange(len(average)) + (samples - 1) / 2
     length = min(len(average), samples)
     ends = [np.polynomial.Polynomial.fit(at[part], average[part], 1) for part in (slice(length), slice(-length, None))]
-    every = np.arange(len(signal))
-    inside = np.interp(every, at, average)
-    return np.where(every < at[0], ends[0](every), np.where(every > at[-1], ends[1](every), inside))
+    numbers = np.arange(len(signal))
+    inside = np.interp(numbers, at, average)
+    return np.where(numbers < at[0], ends[0](numbers), np.where(numbers > at[-1], ends[1](numbers), inside))
 
 
 def _alike(driving: np.ndarray) -> np.ndarray:

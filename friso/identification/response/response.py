@@ -127,10 +127,9 @@ class FrequencyResponse:
             raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self
-        lost = self.frequency[~enough]
-        warning = (
-            f"{lost.size} of {enough.size} lines left out, too weakly excited ({lost.min():.3g} to {lost.max():.3g} Hz)"
-        )
+        left_out = self.frequency[~enough]
+        band = f"{left_out.min():.3g} to {left_out.max():.3g} Hz"
+        warning = f"{left_out.size} of {enough.size} lines left out, too weakly excited ({band})"
         return replace(self.at(enough), warnings=(*self.warnings, warning))
 
     def scatter(self) -> np.ndarray:

@@ -276,7 +276,7 @@ def _troubles(results: list[Result], count: int) -> list[str]:
             ("linear loops that are not stable", result.unstable, unstable),
             ("failed runs", result.failed, failed),
         )
-        for what, number, consequence in troubles:
+        for trouble, number, consequence in troubles:
             if number:
-                notes.append(f"{result.letter} {result.option.name}, {what}: {number} of {count}; {consequence}")
+                notes.append(f"{result.letter} {result.option.name}, {trouble}: {number} of {count}; {consequence}")
     return notes

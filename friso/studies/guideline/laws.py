@@ -156,12 +156,12 @@ def fitted(law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray |
     chosen: tuple[Exponent, ...] = ()
     path = [_validated(law, chosen, values, target, offset, folds)]
     while len(chosen) < MOST:
-        tried = [exponent for exponent in law.candidates if exponent not in chosen]
-        scores = [_validated(law, (*chosen, exponent), values, target, offset, folds) for exponent in tried]
+        remaining = [exponent for exponent in law.candidates if exponent not in chosen]
+        scores = [_validated(law, (*chosen, exponent), values, target, offset, folds) for exponent in remaining]
         if not scores or min(scores) > (1 - GAIN) * path[-1]:
             break
         path.append(min(scores))
-        chosen = (*chosen, tried[int(np.argmin(scores))])
+        chosen = (*chosen, remaining[int(np.argmin(scores))])
     solution = _solved(law, chosen, values, target, offset)
     rates = len(law.rates)
     factors = tuple(float(factor) for factor in np.exp(solution[:rates]))

@@ -136,9 +136,9 @@ def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
 def _coarser(evidence: Evidence) -> Evidence:
     """The evidence with every second value of each axis of the maps, which shows what hangs on the grid; maps of less
     than five values stay."""
-    every = slice(None, None, 2)
+    second = slice(None, None, 2)
     maps = {
-        name: runs.isel(dict.fromkeys(runs.dims, every)) if min(runs.sizes.values()) >= 5 else runs
+        name: runs.isel(dict.fromkeys(runs.dims, second)) if min(runs.sizes.values()) >= 5 else runs
         for name, runs in evidence.maps.items()
     }
     return replace(evidence, maps=maps)

@@ -29,8 +29,8 @@ def stability(bode: Bode) -> list[str]:
     """Whether the one controller is stable in the settled states, and how well; whether in all others; and why not."""
     if len(bode.scan.members) == 1:
         margins = bode.settled[1]
-        how = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
-        return [f"The loop is {how}."]
+        state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
+        return [f"The loop is {state}."]
     sentences = [_settled(bode)]
     if bode.stable:
         worst, margins = bode.worst
@@ -169,13 +169,13 @@ def _limits(bode: Bode, name: str) -> str:
     )
 
 
-def _remark(bode: Bode, name: str, end: float | None, what: str, member: Members | None) -> str:
+def _remark(bode: Bode, name: str, end: float | None, meaning: str, member: Members | None) -> str:
     """Which state ends a range of crossovers, or is why there is none."""
     if member is None or len(bode.scan.members) == 1:
         return ""
     where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
     state = in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), name == "free")
-    return f" ({where}, {what}: {state})"
+    return f" ({where}, {meaning}: {state})"
 
 
 def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:

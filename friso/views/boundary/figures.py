@@ -136,8 +136,8 @@ def _plane(traced: Plane) -> Figure:
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
-    lost = lost_places(traced)
-    markers = (Markers(lost[:, 0], lost[:, 1], LOST, GREY, "cross"),) if len(lost) else ()
+    gaps = lost_places(traced)
+    markers = (Markers(gaps[:, 0], gaps[:, 1], LOST, GREY, "cross"),) if len(gaps) else ()
     return Figure("boundary", "Edge of hunting", note, (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
 
 

@@ -103,15 +103,15 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
 def _edges(traced: Diagram, key: ShownKey) -> str:
     """Where hunting begins and ends over the range, and how finely that was looked for."""
     changes, verdicts = changes_of(traced), place_verdicts(traced)
-    tried = f"{len(verdicts)} values were tried"
+    values_tried = f"{len(verdicts)} values were tried"
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
     at = {change.low for change in changes}
     others = sorted({value for value, _ in turns_of(traced)} - at)
     also = [f"Cycles also begin or stop attracting at {listed([key.text(value) for value in others], 'and')}."]
-    answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({tried}{unknown})."
+    answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
     if changes:
         places = [f"{'begins' if change.begins else 'ends'} {_between(change, key)}" for change in changes]
-        answer = f"Hunting {listed(places, 'and')} ({tried}{unknown})."
+        answer = f"Hunting {listed(places, 'and')} ({values_tried}{unknown})."
     return " ".join([answer, *(also if others else [])])
 
 

@@ -61,8 +61,10 @@ def _sentence(fates: Fates, draws: Draws) -> str:
         draws, them = ("draw", "it") if failed == 1 else ("draws", "them")
         sentences.append(f"{failed} {draws} failed; the intervals cover both outcomes for {them}.")
     if keys:
-        key, how = next(iter(keys.items()))
-        sentences.append(f"{key} matters most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")
+        key, separation = next(iter(keys.items()))
+        sentences.append(
+            f"{key} matters most ({separation:+.2f}): {'larger' if separation > 0 else 'smaller'} values hunt."
+        )
     return " ".join(sentences)
 
 

@@ -41,8 +41,8 @@ def _multiplier(cycle: Cycle) -> str:
 
 
 def _decided(cycle: Cycle) -> str:
-    how = "slope of the returns" if cycle.multiplier == cycle.slope else "Floquet"
-    return f"{'half a' if cycle.symmetric else 'a whole'} period ({how})"
+    method = "slope of the returns" if cycle.multiplier == cycle.slope else "Floquet"
+    return f"{'half a' if cycle.symmetric else 'a whole'} period ({method})"
 
 
 def _others(case: Case) -> str:
@@ -78,14 +78,14 @@ def _kicks(kick: Kick | None, unit: str) -> str:
         return NOTHING
     if not kick.windows:
         return f"none from {range_with_unit(*kick.searched, unit)}"
-    tried = range_with_unit(*kick.searched, unit)
+    searched = range_with_unit(*kick.searched, unit)
     if kick.windows == (kick.searched,):
-        return f"all that were tried, {tried}"
+        return f"all that were tried, {searched}"
     texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
     more = len(kick.windows) - len(texts)
     text = ", ".join([*texts, *([f"and {more} more ranges"] if more else [])])
     open_ended = kick.windows[0][0] == kick.searched[0] or kick.windows[-1][1] == kick.searched[1]
-    return f"{text} (tried: {tried})" if open_ended else text
+    return f"{text} (tried: {searched})" if open_ended else text
 
 
 def _moves(case: Case) -> str:

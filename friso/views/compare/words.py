@@ -68,7 +68,7 @@ def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
 def _about(option: Option, comparison: Comparison) -> str:
     joint = "the joint free" if option.letter in JOINT else "the joint locked" if comparison.stage.joint else "no joint"
     deadband = with_unit(comparison.options.deadband, "m")
-    what = {
+    meanings = {
         "a": "the controller of the file",
         "b": _bandwidth(option, comparison),
         "c": "the controller of the file",
@@ -78,7 +78,7 @@ def _about(option: Option, comparison: Comparison) -> str:
         "drawn for each machine",
         "g": _bandwidth(option, comparison),
     }
-    return f"{joint}; {what[option.letter]}"
+    return f"{joint}; {meanings[option.letter]}"
 
 
 def _bandwidth(option: Option, comparison: Comparison) -> str:
@@ -116,9 +116,9 @@ def paired_rows(comparison: Comparison) -> list[Row]:
         pair = comparison.paired(result)
         points = [100 * value for value in (pair.swinging.value, pair.swinging.low, pair.swinging.high)]
         more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
-        still = _ratio(pair.in_position) if comparison.shaken else UNSHAKEN
+        standstill = _ratio(pair.in_position) if comparison.shaken else UNSHAKEN
         when = [share_with_interval(share) for share in (pair.sooner, pair.later, pair.alike)]
-        rows.append((label(result), [more, *when, still, _ratio(pair.force)]))
+        rows.append((label(result), [more, *when, standstill, _ratio(pair.force)]))
     return rows
 
 
@@ -221,8 +221,8 @@ def _recommendation(comparison: Comparison) -> list[str]:
     if joint:
         return [f"Only a joint brings these machines to rest: {_names(joint)}. No setting does so alone."]
     if settings:
-        tried = any(result.letter in JOINT for result in comparison.results)
-        return [f"Controller settings suffice ({_names(settings)}){'; a joint does not' if tried else ''}."]
+        with_joint = any(result.letter in JOINT for result in comparison.results)
+        return [f"Controller settings suffice ({_names(settings)}){'; a joint does not' if with_joint else ''}."]
     return []
 
 

@@ -61,14 +61,14 @@ def need(design: Design) -> str:
 
 def brings(design: Design) -> str:
     """What an isolator brings and costs where none is needed."""
-    tried, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
+    moves, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
     costs = f" This costs bandwidth: a crossover of {hertz(crossover)} instead of {hertz(limit)}."
     slower = costs if crossover < 0.97 * limit else ""
     return (
         f"For comparison, with the isolator the machine {edge(design.edges)}. Moves settle in "
-        f"{seconds(tried.free.slower_than(0.5))} instead of {seconds(tried.locked.slower_than(0.5))} (median), 95 % "
-        f"of them in {seconds(tried.free.slower_than(0.05))} instead of "
-        f"{seconds(tried.locked.slower_than(0.05))}, at the same crossover.{slower}"
+        f"{seconds(moves.free.slower_than(0.5))} instead of {seconds(moves.locked.slower_than(0.5))} (median), 95 % "
+        f"of them in {seconds(moves.free.slower_than(0.05))} instead of "
+        f"{seconds(moves.locked.slower_than(0.05))}, at the same crossover.{slower}"
     )
 
 
@@ -102,8 +102,8 @@ def restless(outcome: MachineOutcomes) -> str:
     if not outcome.missed:
         return "all come to rest in position"
     count, swinging = outcome.missed, outcome.swinging
-    how = f"{swinging} swing, {count - swinging} creep"
-    return f"{count} {'does' if count == 1 else 'do'} not come to rest in position ({how})"
+    outcomes = f"{swinging} swing, {count - swinging} creep"
+    return f"{count} {'does' if count == 1 else 'do'} not come to rest in position ({outcomes})"
 
 
 def probability(outcome: MachineOutcomes) -> str:

@@ -65,8 +65,8 @@ def scale(field: Coloured) -> ColourScale:
     if not field.log:
         return ColourScale(low, high, VIRIDIS)
     low, high = math.log10(low), math.log10(high)
-    every = max(1, math.ceil((high - low) / 6))
-    decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, every)
+    step = max(1, math.ceil((high - low) / 6))
+    decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, step)
     texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))  # `painted` lifts what is lower
     return ColourScale(low, high, VIRIDIS, False, (low, *decades), texts)
 

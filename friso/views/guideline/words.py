@@ -111,15 +111,15 @@ def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str
     ends = {mode.frequency: getattr(mode, state) for mode in modes if mode.damping_ratio == damping}
     usable = {frequency: end for frequency, end in ends.items() if end}
     without = [f"{frequency:g}" for frequency, end in ends.items() if not end]
-    what = f"Joint {state}, damping ratio {damping:g}"
+    subject = f"Joint {state}, damping ratio {damping:g}"
     if not usable:
-        return f"{what}: none of these modes leaves a range that contains the rig's crossover."
+        return f"{subject}: none of these modes leaves a range that contains the rig's crossover."
     low, high = (_spread([end[place] for end in usable.values()]) for place in (0, 1))
     ratio = _spread([frequency / end[1] for frequency, end in usable.items()])
-    lost = f" With a mode at {listed(without, 'or')} Hz there is no range that contains the rig's crossover."
+    without_range = f" With a mode at {listed(without, 'or')} Hz there is no range that contains the rig's crossover."
     return (
-        f"{what}: the range begins at {low} Hz and ends at {high} Hz, where the mode is {ratio} times as high."
-        f"{lost if without else ''}"
+        f"{subject}: the range begins at {low} Hz and ends at {high} Hz, where the mode is {ratio} times as high."
+        f"{without_range if without else ''}"
     )
 
 

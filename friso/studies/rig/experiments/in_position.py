@@ -110,10 +110,15 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
     force = amplifier_noise(stage)
-    still = standing(0.0, SETTLING + WATCHED)
+    standstill = standing(0.0, SETTLING + WATCHED)
     step = as_built_keys(stage)["drive.sample_time"]
-    noisy = with_noise(still, force, seed, step)
-    plans = {"encoder": (quiet, still), "amplifier": (quiet, noisy), "floor": (shaken, still), "all": (shaken, noisy)}
+    noisy = with_noise(standstill, force, seed, step)
+    plans = {
+        "encoder": (quiet, standstill),
+        "amplifier": (quiet, noisy),
+        "floor": (shaken, standstill),
+        "all": (shaken, noisy),
+    }
     runs, recordings, after, done, total = {}, {}, {}, 0, len(CASES) * (len(plans) + 1) + 1
     for case, locked in CASES.items():
         for source, (machine, task) in plans.items():

@@ -188,9 +188,11 @@ def started(
     """What became of machines, shape (count,), at the first start after which each swings on; else after the move."""
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [follow(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
-    every = joined(runs).shaped(len(tasks), count)
-    first = np.argmax(every.swings, axis=0)
-    return RailRuns(**{entry.name: getattr(every, entry.name)[first, np.arange(count)] for entry in fields(RailRuns)})
+    all_runs = joined(runs).shaped(len(tasks), count)
+    first = np.argmax(all_runs.swings, axis=0)
+    return RailRuns(
+        **{entry.name: getattr(all_runs, entry.name)[first, np.arange(count)] for entry in fields(RailRuns)}
+    )
 
 
 def varied(

@@ -40,8 +40,8 @@ def judged_line(line: LockedLine) -> Finding:
     """The finding from the simulated responses."""
     rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
     mean = np.nanmean(magnitude, axis=0)
-    on = (mean > 1 / ABOUT) & (mean < ABOUT)
-    end = float(max(rates[: len(on) if on.all() else int(on.argmin())], default=0.0))
+    about_one = (mean > 1 / ABOUT) & (mean < ABOUT)
+    end = float(max(rates[: len(about_one) if about_one.all() else int(about_one.argmin())], default=0.0))
     inside = (rates >= _NOISY[0]) & (rates <= _NOISY[1])
     mass = WEIGHED[0] / np.nanmedian(magnitude[:, inside], axis=1)
     worst, above = float(rates[np.nanargmax(scatter)]), float(np.nanmax(scatter[rates >= 1.5 * _NOISY[1]]))

@@ -125,14 +125,14 @@ def _why_elsewhere(contact: Contact) -> str:
 
 def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
     """Whether a further crossing takes the loop close to instability."""
-    there = any(about(margins.closest, f) for f in further)
+    close = any(about(margins.closest, f) for f in further)
     where = (
         f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
     )
     return Part(
         "at the highest setting that crossing threatens stability: about there the loop comes closer to -1 than "
         f"{WANTED:g} (or it is unstable)",
-        bool(further) and (not margins.stable or (there and margins.modulus_margin < WANTED)),
+        bool(further) and (not margins.stable or (close and margins.modulus_margin < WANTED)),
         where,
         why=f"tuned to {setting:g} Hz, the model is far from instability even there: it would take a delay of "
         f"{_micro(margins.delay_margin)}"

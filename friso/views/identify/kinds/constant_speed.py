@@ -53,8 +53,8 @@ def _direction_text(direction: Direction) -> str:
     visible = [estimate for estimate in several if estimate.determined]
     reasons = {estimate.reason: None for estimate in several if not estimate.determined}
     names = [within(estimate.name) for estimate in several if not estimate.determined]
-    lost = f"not shown: {', '.join(names)} ({'; '.join(reasons)})" if names else ""
-    return "; ".join(text for text in (listed(visible), lost) if text)
+    missing = f"not shown: {', '.join(names)} ({'; '.join(reasons)})" if names else ""
+    return "; ".join(text for text in (listed(visible), missing) if text)
 
 
 def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:

@@ -22,16 +22,16 @@ def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
     low, high = moves.covered.gap
     along = "the machine was simulated along the logged position, and the forces were compared."
     if moves.fit.problem.closed:
-        how = "The machine was simulated in closed loop on the logged reference."
+        method = "The machine was simulated in closed loop on the logged reference."
     elif moves.loop is not None:
-        how = f"In closed loop the simulated machine gets out of step with the log. For the fit, {along}"
+        method = f"In closed loop the simulated machine gets out of step with the log. For the fit, {along}"
     else:
-        how = f"{along[0].upper()}{along[1:]}"
+        method = f"{along[0].upper()}{along[1:]}"
     if not moves.covered.steady.size:
-        return how, "No part of the motion is steady for long enough to show friction at a speed."
+        return method, "No part of the motion is steady for long enough to show friction at a speed."
     gap = range_with_unit(low, high, "m/s")
     return (
-        how,
+        method,
         f"The widest gap in the steady speeds is {gap}: the record does not show friction there.",
     )
 

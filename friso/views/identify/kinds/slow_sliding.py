@@ -53,12 +53,12 @@ def slow_sliding_caption(result: SlowSliding) -> str:
 def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
     """Friction over time, and over velocity, as it was and as the model has it."""
     friction = Axis("Friction, low-passed", "N")
-    some = slice(None, None, max(len(result.time) // POINTS, 1))
+    thinned = slice(None, None, max(len(result.time) // POINTS, 1))
 
     def both(x: np.ndarray) -> tuple[Series, ...]:
         return (
-            Series(x[some], result.friction[some], "force less inertia", INK, width=1.4),
-            Series(x[some], result.model[some], "LuGre's bristles", ORANGE, "dashed", 1.0),
+            Series(x[thinned], result.friction[thinned], "force less inertia", INK, width=1.4),
+            Series(x[thinned], result.model[thinned], "LuGre's bristles", ORANGE, "dashed", 1.0),
         )
 
     over = Panel("", Axis("Velocity", "m/s"), friction, (*both(result.velocity), *_steady_friction(result)))

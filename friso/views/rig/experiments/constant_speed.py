@@ -177,12 +177,12 @@ def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
     }
 
 
-def _shown(every: Sequence[Estimate]) -> dict[str, Any]:
+def _shown(estimates: Sequence[Estimate]) -> dict[str, Any]:
     return {
         "shown": {
-            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in every if e.determined
+            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in estimates if e.determined
         },
-        "not_shown": {estimate.name: estimate.reason for estimate in every if not estimate.determined},
+        "not_shown": {estimate.name: estimate.reason for estimate in estimates if not estimate.determined},
     }
 
 

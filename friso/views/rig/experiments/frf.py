@@ -40,8 +40,8 @@ def sentences(outcome: Outcome) -> list[str]:
     last = measured[-1]
     others = [crossing.value for crossing in last.crossings if crossing.value > 2 * last.tuned]
     tuned = listed([f"{with_unit(loop.tuned, 'Hz')} at {with_unit(nearest(loop), 'Hz')}" for loop in measured], "and")
-    lost = [f"{loop.tuned:.3g} Hz" for loop in result.loops if not loop.measured]
-    unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
+    unmeasured = [f"{loop.tuned:.3g} Hz" for loop in result.loops if not loop.measured]
+    unstable = f" Tuned to {listed(unmeasured, 'and')} the closed loop is not stable." if unmeasured else ""
     above = f"once more at {with_unit(max(others), 'Hz')}" if others else "nowhere above"
     return [
         f"Joint locked: the mass line shows {_mass(result.locked.mass)} from "

@@ -83,8 +83,8 @@ def _limit(moves: HuntingResult, case: str) -> str:
     bound = moves.shares(case)[-1].high
     beyond = f"none from {above[0]:.3g} Hz on (at most {bound:.0%} of all rails)" if len(above) else "none tried above"
     name = f"rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else "it"
-    there = f"on {name} up to {on_rail:.3g} Hz" if np.isfinite(on_rail) else f"none on {name}"
-    return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {there}."
+    reach = f"on {name} up to {on_rail:.3g} Hz" if np.isfinite(on_rail) else f"none on {name}"
+    return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {reach}."
 
 
 def _started(moves: HuntingResult) -> list[str]:

@@ -19,11 +19,11 @@ def sentences(outcome: Outcome) -> list[str]:
     """From which crossover and stroke on no rail has counted peaks."""
     counts: StrokeCrossover = outcome.result
     count, cells = len(counts.rails), counts.share
-    some = np.isfinite(cells) & (cells > 0)
-    if not some.any():
+    shown = np.isfinite(cells) & (cells > 0)
+    if not shown.any():
         return [f"On none of {count} rails are peaks counted, at any stroke or crossover."]
     first = (
-        f"In {some.sum()} of {some.size} cells peaks are counted on at least one of {count} rails, in "
+        f"In {shown.sum()} of {shown.size} cells peaks are counted on at least one of {count} rails, in "
         f"{(cells >= 0.5).sum()} on at least half of them."
     )
     return [first, *_needed(counts)]
@@ -40,9 +40,9 @@ def _needed(counts: StrokeCrossover) -> list[str]:
     """The crossover limits by stroke, and from which stroke on none are counted at the stage's own crossover."""
     named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
     lines = [f"Counted peaks by stroke: {'; '.join(named)}."]
-    some = np.flatnonzero(counts.share[:, counts.nearest] > 0)
-    if len(some) and some[-1] + 1 < len(counts.strokes):
-        least = float(counts.strokes[some[-1] + 1])
+    rows = np.flatnonzero(counts.share[:, counts.nearest] > 0)
+    if len(rows) and rows[-1] + 1 < len(counts.strokes):
+        least = float(counts.strokes[rows[-1] + 1])
         lines.append(
             f"At {counts.crossovers[counts.nearest]:.3g} Hz no peaks are counted from a stroke of "
             f"{with_unit(least, 'm')} up."
