@@ -42,6 +42,7 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
     outputs |= {
         f"force_{term}": Output(demand.shares[term].value, "N", f"{name} share")
         for term, name in form.law.shares.items()
+        if term in demand.shares
     }
     states, resting = blocks.finished(demand, bound)
     sides = {kink.beyond: sp.Piecewise((1, kink.surface > 0), (0, True)) for kink in blocks.kinks}

@@ -1,4 +1,4 @@
-"""PID by its gains (thesis, Eq. 6)."""
+"""PID by its gains (thesis, Eq. 6), with feedforward of what the move is believed to need."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 from friso.equations.controllers.pid import Pid
-from friso.quantities import Quantity, Value, non_negative
+from friso.quantities import Quantity, Value, any_sign, non_negative
 from friso.stage import Rule, register_controller
 from friso.stage.controllers import KIND
 
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 KP, KI, KD, TAU, DERIVATIVE_ON = (f"controller.{name}" for name in ("kp", "ki", "kd", "tau", "derivative_on"))
 
+FEEDFORWARD = ("viscous_feedforward", "acceleration_feedforward", "coulomb_feedforward")
+
 
 class Terms(NamedTuple):
     """Which terms there are; each absent term is absent from the equations."""
@@ -25,6 +27,7 @@ class Terms(NamedTuple):
     integral: bool
     filtered: bool
     derivative_on: Literal["none", "error", "measurement"]
+    feedforward: tuple[str, ...] = ()
 
 
 def proportional_derivative(stiffness: float, damping: float) -> dict[str, Any]:
@@ -41,6 +44,11 @@ class PidGains(Pid):
     kd: Annotated[Value, Quantity("N*s/m", non_negative, "6 N*s/m")] = Value(0, "0 N*s/m")
     tau: Annotated[Value, Quantity("s", non_negative, "1 ms")] = Value(0, "0 s")
     derivative_on: Literal["error", "measurement"] = "error"
+    viscous_feedforward: Annotated[Value | None, Quantity("N*s/m", any_sign, "6 N*s/m")] = None
+    """As large as `kd`, it makes a derivative of the measurement one of the error."""
+    acceleration_feedforward: Annotated[Value | None, Quantity("kg", any_sign, "1.7 kg")] = None
+    coulomb_feedforward: Annotated[Value | None, Quantity("N", any_sign, "1 N")] = None
+    """By the sign of the reference's velocity."""
 
     written = "gains"
     needed = ("kp", "ki", "kd")
@@ -48,6 +56,7 @@ class PidGains(Pid):
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"kp": 2, "ki": 3, "kd": 1, "tau": -1})
     loop_gain = ("kp", "ki", "kd")
     decisive = ("ki", "kd", "tau")
+    shares: ClassVar[Mapping[str, str]] = MappingProxyType({**Pid.shares, "f": "feedforward"})
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
@@ -66,6 +75,7 @@ class PidGains(Pid):
             integral=bool(flat[KI] > 0),
             filtered=bool(derived and flat[TAU] > 0),
             derivative_on=flat[DERIVATIVE_ON] if derived else "none",
+            feedforward=tuple(name for name in FEEDFORWARD if cls.key(name) in flat),
         )
 
     @classmethod
@@ -80,7 +90,7 @@ class PidGains(Pid):
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
-        """The three shares [N] of Eq. 6."""
+        """The three shares [N] of Eq. 6, and that of the feedforward where there is any."""
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {
@@ -88,8 +98,15 @@ class PidGains(Pid):
             "error": lambda: blocks.derivative(measured.error, "error", lag) * kd,
             "measurement": lambda: -(blocks.derivative(measured.position, "position", lag) * kd),
         }
-        return {
+        shares = {
             "p": measured.error * kp,
             "d": derivative[variant.derivative_on](),
             "i": blocks.integral(measured.error, ki, rule="sum") if variant.integral else blocks.nothing,
         }
+        references = (measured.reference_velocity, measured.reference_acceleration, measured.reference_direction)
+        ahead = [
+            reference * blocks.key(name)
+            for name, reference in zip(FEEDFORWARD, references, strict=True)
+            if name in variant.feedforward
+        ]
+        return {**shares, "f": sum(ahead, start=blocks.nothing)} if ahead else shares

@@ -1,0 +1,96 @@
+"""What a kind of parameter file declares: how it is recognised and read, what it leaves open, and the way back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from friso.drives.questions import Answers, Question
+from friso.errors import InputError
+from friso.quantities import quoted
+from friso.registry import Registry
+
+Flat = Mapping[str, Any]
+"""A stage as flat keys."""
+
+
+@dataclass(frozen=True)
+class AxisParameters:
+    """The parameters of one axis in a file: its `name` there, texts or numbers by name, and those of the whole machine
+    that matter."""
+
+    name: str
+    values: Mapping[str, Any]
+    machine: Mapping[str, Any] = field(default_factory=dict)
+
+    def number(self, name: str, default: float | None = None) -> float:
+        """A finite number. Raises InputError where it is something else, or absent without a `default`."""
+        entry = self.values.get(name, self.machine.get(name, default))
+        if entry is None:
+            raise InputError(name, "nothing", "a number", f"{name} = 1.0")
+        try:
+            if isinstance(entry, bool):
+                raise TypeError
+            value = float(entry)
+        except (TypeError, ValueError):
+            raise InputError(name, quoted(str(entry)[:80]), "a number", f"{name} = 1.0") from None
+        if abs(value) > MOST or value != value:
+            raise InputError(name, f"{value:g}", f"a number of at most {MOST:g}", f"{name} = 1.0")
+        return value
+
+    def given(self, name: str) -> bool:
+        """Whether there is such a parameter, and it is neither 0 nor infinite."""
+        entry = self.values.get(name)
+        return entry is not None and str(entry).strip().lower() not in ENDLESS and self.number(name) != 0
+
+
+MOST = 1e30
+"""Largest number that a parameter can be."""
+
+ENDLESS = ("", "inf", "+inf", "infinity")
+"""How files write that there is no limit, or leave a parameter empty."""
+
+
+@dataclass(frozen=True)
+class AsStage:
+    """Tables of a stage file that follow from an axis's parameters, and what they cannot say of it, in sentences."""
+
+    tables: Mapping[str, Mapping[str, Any]]
+    left_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class ParameterFormat:
+    """A kind of parameter file.
+
+    Its `title`; the `firmware` whose formulas are used; the `source` of these; whether a file is of this kind by its
+    name and text; its axes (raises InputError); what it leaves open of an axis (raises InputError for an axis that
+    friso cannot describe); the stage of an axis with the answers to that; the parameters of a stage, by name, with
+    their comments, and what they need to know; and how a file holds them.
+    """
+
+    title: str
+    firmware: str
+    source: str
+    recognises: Callable[[str, str], bool]
+    axes: Callable[[str], tuple[AxisParameters, ...]]
+    questions: Callable[[AxisParameters, Answers], tuple[Question, ...]]
+    stage: Callable[[AxisParameters, Answers], AsStage]
+    questions_back: Callable[[Flat, Answers], tuple[Question, ...]]
+    parameters: Callable[[Flat, Answers], Mapping[str, float]]
+    text: Callable[[Mapping[str, float]], str]
+    suffix: str
+
+
+FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
+
+
+def si(value: float, unit: str) -> str:
+    """A number in SI as it stands in a stage file."""
+    return f"{value:.12g} {unit}"
+
+
+def lacks(what: str, expected: str, example: str = "") -> InputError:
+    """The refusal of a controller whose numbers a format cannot hold."""
+    return InputError("controller", what, expected, example)

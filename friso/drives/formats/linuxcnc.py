@@ -1,0 +1,271 @@
+"""LinuxCNC INI file
+
+The gains of a joint go to the HAL component `pid`: output = P e + I sum(e) T + D e' + FF0 r + FF1 r' + FF2 r'' + BIAS,
+e behind MAX_ERROR and DEADBAND, the output within MAX_OUTPUT, where the integral rests while it would drive it further.
+e' is r' - y' (of the dead-banded error up to 2.3). In torque mode the output is a force; in velocity mode it is a
+velocity, which the drive's own loop follows.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+from friso.axis import KINDS, LINEAR, AxisKind, axis_of
+from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, lacks, si
+from friso.drives.questions import Answers, Question, of_the_machine
+from friso.errors import InputError
+from friso.quantities import Quantity, positive, quoted
+
+FORCE = "force_per_output"
+UNIT = "machine_unit"
+FORCE_FIELD = Quantity("N", positive, "20 N")
+
+LENGTHS = {"mm": 1e-3, "metric": 1e-3, "inch": 0.0254, "in": 0.0254, "imperial": 0.0254, "m": 1.0, "cm": 1e-2}
+ANGLES = {"deg": 0.017453292519943295, "degree": 0.017453292519943295, "rad": 1.0, "radian": 1.0}
+"""Machine units in metres and radians."""
+
+ROTARY = KINDS["rotary"]
+NEEDED = ("P",)
+NOT_CARRIED = {
+    "FF0": "FF0 = {:g}, a force in proportion to the commanded position",
+    "FF3": "FF3 = {:g}, of the commanded jerk",
+    "BIAS": "BIAS = {:g}, a constant output: friso takes what it balances as balanced",
+    "MAX_ERROR": "MAX_ERROR = {:g}, beyond which the error counts no further",
+    "MAX_ERROR_D": "MAX_ERROR_D = {:g}, the limit of the error's derivative",
+    "DEADBAND": "DEADBAND = {:g} machine units, within which the loop does nothing: what friso says of swings as small "
+    "as that is not what this axis does",
+}
+MOST_LINES = 100_000
+
+
+def recognises(name: str, text: str) -> bool:
+    """By a section of a joint or an axis."""
+    return re.search(r"^\s*\[(JOINT|AXIS)_\d+\]", text, re.MULTILINE) is not None
+
+
+def axes(text: str) -> tuple[AxisParameters, ...]:
+    """Joints (2.8 and later) or axes with a P. Raises InputError where there is none, or a file is no INI file."""
+    sections = _sections(text)
+    machine = {
+        "unit": sections.get("TRAJ", {}).get("LINEAR_UNITS"),
+        "angle": sections.get("TRAJ", {}).get("ANGULAR_UNITS"),
+        "SERVO_PERIOD": sections.get("EMCMOT", {}).get("SERVO_PERIOD"),
+    }
+    with_gains = [
+        AxisParameters(f"[{name}]", values, {key: value for key, value in machine.items() if value is not None})
+        for name, values in sections.items()
+        if re.fullmatch(r"(JOINT|AXIS)_\d+", name) and "P" in values
+    ]
+    joints = [axis for axis in with_gains if axis.name.startswith("[JOINT")]
+    if not with_gains:
+        raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", "an axis whose loop LinuxCNC closes", "P = 50")
+    return tuple(replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains)
+
+
+def _sections(text: str) -> dict[str, dict[str, str]]:
+    """Variables by section, the first of a name, as LinuxCNC takes them. Raises InputError."""
+    sections: dict[str, dict[str, str]] = {}
+    here: dict[str, str] = {}
+    lines = text.splitlines()
+    if len(lines) > MOST_LINES:
+        raise InputError("", f"{len(lines)} lines", f"at most {MOST_LINES}")
+    for line in map(str.strip, lines):
+        if not line or line[0] in "#;":
+            continue
+        if line.startswith("["):
+            here = sections.setdefault(line.strip("[]").strip(), {})
+            continue
+        key, equals, value = line.partition("=")
+        if equals:
+            here.setdefault(key.strip(), value.strip())
+    return sections
+
+
+def questions(axis: AxisParameters, answers: Answers) -> tuple[Question, ...]:
+    """The machine, and what 1 of the output is. Raises InputError for a stepper, which has no loop around its force."""
+    if any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values):
+        raise InputError("", "a stepper: its steps are counted, not its position", "a servo axis, whose loop can hunt")
+    kind = _kind(axis)
+    asked: list[Question] = []
+    if _unit_of(axis) is None and UNIT not in answers:
+        example = '"mm"' if kind == LINEAR else '"deg"'
+        asked.append(Question(UNIT, "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS", example))
+    if "SERVO_PERIOD" not in axis.machine and "drive.sample_time" not in answers:
+        asked.append(Question("drive.sample_time", "period of the servo thread", '"1 ms"'))
+    if FORCE not in answers and "controller.kp" not in answers:
+        what = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
+        gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
+        what += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
+        asked.append(Question(FORCE, what, FORCE_FIELD.on(kind).written_example))
+    moved = "MAX_ACCELERATION" in axis.values and "MAX_VELOCITY" in axis.values
+    return (*asked, *of_the_machine(answers, kind, moved))
+
+
+def stage(axis: AxisParameters, answers: Answers) -> AsStage:
+    """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
+    kind = _kind(axis)
+    unit = _metres(axis, answers, kind)
+    left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.given(key)]
+    in_torque = FORCE in answers
+    controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
+    drive = {}
+    if "SERVO_PERIOD" in axis.machine:
+        drive["sample_time"] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
+    tables: dict[str, Mapping[str, object]] = {"controller": controller}
+    if drive:
+        tables["drive"] = drive
+    if kind != LINEAR:
+        tables["axis"] = {"kind": kind.name}
+    if axis.given("MAX_ACCELERATION") and axis.given("MAX_VELOCITY"):
+        fastest, acceleration = axis.number("MAX_VELOCITY"), axis.number("MAX_ACCELERATION")
+        back = max(5.0, 4 * fastest / acceleration)
+        tables["motion"] = {
+            "kind": "there_and_back",
+            "acceleration": si(acceleration * unit, kind.unit("m/s^2")),
+            "acceleration_time": si(fastest / acceleration, "s"),
+            "return_at": si(back, "s"),
+            "duration": si(back + 15, "s"),
+        }
+    return AsStage(tables, (*left, *more))
+
+
+def _torque(axis: AxisParameters, answers: Answers, kind: AxisKind, unit: float) -> tuple[dict[str, object], list[str]]:
+    """The table [controller] where the output is a force."""
+    scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
+    gain = {name: axis.number(name, 0.0) * scale for name in ("P", "I", "D", "FF1", "FF2")}
+    for name in ("P", "I", "D"):
+        if gain[name] < 0:
+            raise InputError(name, f"{axis.number(name):g}", "a gain of 0 or more", f"{name} = 10")
+    table: dict[str, object] = {
+        "kind": "pid",
+        "kp": si(gain["P"], kind.unit("N/m")),
+        "ki": si(gain["I"], kind.unit("N/(m*s)")),
+        "kd": si(gain["D"], kind.unit("N*s/m")),
+        "derivative_on": "measurement",
+    }
+    if ahead := gain["FF1"] + gain["D"]:  # D acts on the reference too
+        table["viscous_feedforward"] = si(ahead, kind.unit("N*s/m"))
+    if gain["FF2"]:
+        table["acceleration_feedforward"] = si(gain["FF2"], kind.unit("kg"))
+    if axis.given("MAX_OUTPUT"):
+        table |= {"force_limit": si(axis.number("MAX_OUTPUT") * scale * unit, kind.unit("N")), "anti_windup": "clamp"}
+    if axis.given("MAX_ERROR_I") and gain["I"]:
+        table["integral_limit"] = si(axis.number("MAX_ERROR_I") * unit * gain["I"], kind.unit("N"))
+    return table, []
+
+
+def _velocity(
+    axis: AxisParameters, answers: Answers, kind: AxisKind, unit: float
+) -> tuple[dict[str, object], list[str]]:
+    """The table [controller] where the output is the velocity that the drive follows; raises InputError for a D, for
+    which a cascade has no place."""
+    if axis.given("D"):
+        expected = f"D = 0 with an output that is a velocity; or {FORCE}, with one that is a force"
+        raise InputError("D", f"{axis.number('D'):g}", expected, f'--set {FORCE}="20 N"')
+    p, i = axis.number("P"), axis.number("I", 0.0)
+    if p <= 0:
+        raise InputError("P", f"{p:g}", "a gain greater than 0", "P = 50")
+    table: dict[str, object] = {"kind": "cascade", "kv": si(p, "1/s")}
+    if i:
+        table["position_integral_time"] = si(p / i, "s")
+    if axis.given("FF1"):
+        table["velocity_feedforward"] = axis.number("FF1")
+    left = [
+        f"{name} = {axis.number(name):g}, {what}"
+        for name, what in {
+            "FF2": "a velocity in proportion to the commanded acceleration",
+            "MAX_OUTPUT": "the largest velocity commanded",
+            "MAX_ERROR_I": "the limit of the error's integral",
+        }.items()
+        if axis.given(name)
+    ]
+    return table, left
+
+
+def _kind(axis: AxisParameters) -> AxisKind:
+    return ROTARY if str(axis.values.get("TYPE", "")).upper() == "ANGULAR" else LINEAR
+
+
+def _unit_of(axis: AxisParameters) -> str | None:
+    """The machine unit of an axis, as the file says."""
+    name = axis.machine.get("unit" if _kind(axis) == LINEAR else "angle", axis.values.get("UNITS"))
+    return None if name is None else str(name).lower()
+
+
+def _metres(axis: AxisParameters, answers: Answers, kind: AxisKind) -> float:
+    """The machine unit in metres or radians. Raises InputError for an unknown one."""
+    units = LENGTHS if kind == LINEAR else ANGLES
+    name = answers.choice(UNIT, tuple(units)) if UNIT in answers else _unit_of(axis)
+    if name not in units:
+        raise InputError(UNIT, quoted(str(name)[:40]), f"one of {', '.join(units)}", f'--set {UNIT}="mm"')
+    return units[name]
+
+
+def questions_back(flat: Flat, answers: Answers) -> tuple[Question, ...]:
+    """The unit, and, of a controller that exerts a force, what an output of 1 makes."""
+    kind = axis_of(flat)
+    asked = [Question(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
+    if flat["controller.kind"] != "cascade":
+        asked.append(Question(FORCE, "force that an output of 1 makes", FORCE_FIELD.on(kind).written_example))
+    return tuple(question for question in asked if question.key not in answers)
+
+
+def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
+    """The parameters of the `pid` component. Raises InputError for a controller that it is not."""
+    kind = axis_of(flat)
+    units = LENGTHS if kind == LINEAR else ANGLES
+    unit = units[answers.choice(UNIT, tuple(units))]
+    get = lambda name, default=0.0: float(flat.get(f"controller.{name}", default))  # noqa: E731
+    if flat["controller.kind"] == "cascade":
+        return _of_cascade(flat)
+    if "controller.crossover" in flat:
+        expected = "gains: its low-pass comes first, which this component has not"
+        raise lacks("van Dijk's rules", expected, 'kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"')
+    if get("tau") > 0:
+        raise lacks("a filter of the derivative", "no filter (tau = 0), which this component has not")
+    scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
+    on_error = flat["controller.derivative_on"] == "error"
+    found = {
+        "P": get("kp") / scale,
+        "I": get("ki") / scale,
+        "D": get("kd") / scale,
+        "FF0": 0.0,
+        "FF1": (get("viscous_feedforward") - (0.0 if on_error else get("kd"))) / scale,
+        "FF2": get("acceleration_feedforward") / scale,
+        "BIAS": 0.0,
+        "DEADBAND": 0.0,
+        "MAX_OUTPUT": get("force_limit") / (scale * unit),
+    }
+    if "controller.integral_limit" in flat and get("ki"):
+        found["MAX_ERROR_I"] = get("integral_limit") / (get("ki") * unit)
+    return found
+
+
+def _of_cascade(flat: Flat) -> dict[str, float]:
+    """Those whose output is the velocity that a drive follows."""
+    kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
+    ahead = flat["controller.velocity_feedforward"]
+    return {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0, "DEADBAND": 0.0}
+
+
+def text(found: Mapping[str, float]) -> str:
+    """The lines of a section."""
+    lines = [f"{name} = {value:.12g}" for name, value in found.items()]
+    return "\n".join(["[JOINT_0]", *lines, ""])
+
+
+FORMAT = ParameterFormat(
+    title="LinuxCNC INI file",
+    firmware="LinuxCNC's component pid, versions 2.4 to 2.9",
+    source="src/hal/components/pid.c",
+    recognises=recognises,
+    axes=axes,
+    questions=questions,
+    stage=stage,
+    questions_back=questions_back,
+    parameters=parameters,
+    text=text,
+    suffix=".ini",
+)

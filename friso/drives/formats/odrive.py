@@ -1,0 +1,235 @@
+"""ODrive configuration (odrivetool backup-config)
+
+Firmware 0.5.1 to 0.5.6, control in position: w = v_ff + pos_gain e; torque = inertia a_ff + vel_gain (w - v) +
+vel_integrator_gain sum(w - v) T, turns for positions, 8000 times a second. v is the estimate of the encoder's
+phase-locked loop, which has a double pole at its bandwidth. Earlier firmware counts in encoder counts and amperes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from math import inf, pi
+from typing import Any
+
+from friso.axis import KINDS, LINEAR, AxisKind, axis_of
+from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, lacks, si
+from friso.drives.questions import Answers, Question, of_the_machine
+from friso.errors import InputError
+from friso.quantities import Quantity, positive
+
+TRAVEL = "travel_per_turn"
+ROTARY = KINDS["rotary"]
+TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), ROTARY: Quantity("rad", positive, "360 deg")}
+
+CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
+GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
+RATE = 8000.0
+"""Samples of the controller in a second, of ODrive 3."""
+
+POSITION_CONTROL, PASSTHROUGH, AHEAD = 3, 1, (3, 5)
+"""Values of control_mode and input_mode; `AHEAD`, those in which the drive feeds its own reference forward."""
+
+MOST_KEYS = 100_000
+
+
+def recognises(name: str, text: str) -> bool:
+    """By being JSON with gains of an axis."""
+    return text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
+
+
+def axes(text: str) -> tuple[AxisParameters, ...]:
+    """Axes with gains. Raises InputError for what is no JSON, and for firmware whose units are others."""
+    try:
+        document = json.loads(text)
+    except RecursionError:
+        raise InputError("", "objects nested too deeply", "a configuration as odrivetool writes it") from None
+    except ValueError as error:
+        raise InputError("", f"not JSON: {str(error)[:120]}", "a configuration as odrivetool writes it") from None
+    values: dict[str, Any] = {}
+    waiting: list[tuple[str, Any]] = [("", document)]
+    while waiting:
+        place, entry = waiting.pop()
+        if isinstance(entry, dict):
+            waiting += [(f"{place}.{key}" if place else str(key), inner) for key, inner in entry.items()]
+        else:
+            values[place] = entry
+        if len(values) + len(waiting) > MOST_KEYS:
+            raise InputError("", f"more than {MOST_KEYS} entries", "a configuration as odrivetool writes it")
+    names = sorted({key.split(".")[0] for key in values if key.startswith("axis") and f".{CONFIG}.pos_gain" in key})
+    if not names:
+        raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
+    found = tuple(
+        AxisParameters(
+            name, {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
+        )
+        for name in names
+    )
+    for axis in found:
+        if f"{MOTOR}.torque_constant" not in axis.values:
+            actual = f"{axis.name} without a motor.config.torque_constant, which firmware 0.5.1 to 0.5.6 has"
+            raise InputError("", actual, "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6")
+    return found
+
+
+def questions(axis: AxisParameters, answers: Answers) -> tuple[Question, ...]:
+    """The machine, and what a turn of the motor moves. Raises InputError for an axis that controls no position."""
+    mode = axis.number(f"{CONFIG}.control_mode", POSITION_CONTROL)
+    if mode != POSITION_CONTROL:
+        raise InputError(f"{CONFIG}.control_mode", f"{mode:g}", "3, control in position", '"control_mode": 3')
+    asked = []
+    kind = LINEAR
+    if TRAVEL in answers:
+        kind, _ = answers.kind_of(TRAVEL, TRAVELS)
+    else:
+        what = 'what one turn of the motor moves; an angle on a rotary axis, "360 deg" without a gear'
+        asked.append(Question(TRAVEL, what, '"10 mm"'))
+    moved = all(axis.given(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
+    return (*asked, *of_the_machine(answers, kind, moved))
+
+
+def stage(axis: AxisParameters, answers: Answers) -> AsStage:
+    """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
+    kind, travel = answers.kind_of(TRAVEL, TRAVELS)
+    force = 2 * pi / travel  # [N] for a torque of 1 N m
+    number = lambda name, default=None: axis.number(f"{CONFIG}.{name}", default)  # noqa: E731
+    kp, ki = number("vel_gain"), number("vel_integrator_gain")
+    for name in ("pos_gain", "vel_gain"):
+        if number(name) <= 0:
+            raise InputError(f"{CONFIG}.{name}", f"{number(name):g}", "a gain greater than 0", f'"{name}": 20.0')
+    mode = number("input_mode", PASSTHROUGH)
+    table: dict[str, Any] = {
+        "kind": "cascade",
+        "kv": si(number("pos_gain"), "1/s"),
+        "kp": si(kp * force / travel, kind.unit("N*s/m")),
+    }
+    if ki > 0:
+        table["velocity_integral_time"] = si(kp / ki, "s")
+    if mode in AHEAD:
+        table["velocity_feedforward"] = 1.0
+        if inertia := number("inertia", 0.0):
+            table["acceleration_feedforward"] = si(inertia * force / travel, kind.unit("kg"))
+    torque = min(_torque_limit(axis), inf)
+    if torque < inf:
+        table |= {"force_limit": si(torque * force, kind.unit("N")), "anti_windup": "clamp"}
+    if axis.given(f"{CONFIG}.vel_integrator_limit") and ki > 0:
+        table["integral_limit"] = si(number("vel_integrator_limit") * force, kind.unit("N"))
+    bandwidth = axis.number(f"{ENCODER}.bandwidth", 1000.0) / (2 * pi)
+    low_pass = {"kind": "low_pass", "path": "feedback", "order": 2, "damping_ratio": 1.0}
+    table["filters"] = [{**low_pass, "frequency": si(bandwidth, "Hz")}]
+    drive = {"sample_time": si(1 / RATE, "s")}
+    if axis.given(f"{MOTOR}.current_control_bandwidth"):
+        drive["current_bandwidth"] = si(axis.number(f"{MOTOR}.current_control_bandwidth") / (2 * pi), "Hz")
+    tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": drive, **_motion(axis, kind, travel)}
+    if kind != LINEAR:
+        tables["axis"] = {"kind": kind.name}
+    return AsStage(tables, _left_out(axis, mode, torque < inf))
+
+
+def _torque_limit(axis: AxisParameters) -> float:
+    """Torque [N m] that the motor gives at most."""
+    current = axis.number(f"{MOTOR}.current_lim", 0.0) if axis.given(f"{MOTOR}.current_lim") else inf
+    torque = axis.number(f"{MOTOR}.torque_lim") if axis.given(f"{MOTOR}.torque_lim") else inf
+    return min(current * axis.number(f"{MOTOR}.torque_constant"), torque)
+
+
+def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Mapping[str, Any]]:
+    """The move of the drive's own trajectories, where it has any."""
+    if not all(axis.given(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit")):
+        return {}
+    fastest, acceleration = (axis.number(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
+    back = max(5.0, 4 * fastest / acceleration)
+    return {
+        "motion": {
+            "kind": "there_and_back",
+            "acceleration": si(acceleration * travel, kind.unit("m/s^2")),
+            "acceleration_time": si(fastest / acceleration, "s"),
+            "return_at": si(back, "s"),
+            "duration": si(back + 15, "s"),
+        }
+    }
+
+
+def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
+    """What a stage cannot say of the axis, in sentences."""
+    left = ["the position is the estimate of a phase-locked loop too, which follows a steady motion without an error"]
+    if axis.values.get(f"{CONFIG}.enable_gain_scheduling"):
+        width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
+        left.append(
+            f"enable_gain_scheduling: within {width:g} turns the gains go to 0 with the error, and what friso says of "
+            "swings as small as that is not what this axis does"
+        )
+    if axis.values.get(f"{CONFIG}.enable_vel_limit", True) and axis.given(f"{CONFIG}.vel_limit"):
+        left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
+    if mode == PASSTHROUGH:
+        left.append("input_vel and input_torque of whoever commands the positions: taken as 0")
+    if mode == AHEAD[0]:
+        left.append("the filter of the commanded position (input_filter_bandwidth)")
+    if limited:
+        left.append("at the limit of the torque the integral decays by 1 % a sample; here it rests")
+    if axis.values.get(f"{CONFIG}.anticogging.anticogging_enabled"):
+        left.append("the map against cogging")
+    return tuple(left)
+
+
+def questions_back(flat: Flat, answers: Answers) -> tuple[Question, ...]:
+    """What a turn moves, where no transmission tells."""
+    if TRAVEL in answers or _travel(flat) is not None:
+        return ()
+    return (
+        Question(TRAVEL, "what one turn of the motor moves", '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'),
+    )
+
+
+def _travel(flat: Flat) -> float | None:
+    """What one turn of the motor moves [m or rad], as the transmission tells."""
+    if "transmission.ratio" in flat:
+        return 2 * pi / flat["transmission.ratio"]
+    return flat.get("transmission.lead")
+
+
+def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
+    """The parameters of an axis. Raises InputError for a controller that is no P over P or PI."""
+    name = "controller."
+    if flat["controller.kind"] != "cascade":
+        raise lacks(f'kind = "{flat["controller.kind"]}"', "a cascade, the only structure that this drive has")
+    if f"{name}position_integral_time" in flat:
+        raise lacks("an integral in the position loop", "a proportional position loop")
+    if flat[f"{name}proportional_on"] != "error":
+        raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
+    told = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else _travel(flat)
+    assert told is not None  # it was asked for
+    travel = float(told)
+    force = 2 * pi / travel
+    kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
+    found = {
+        f"{CONFIG}.pos_gain": flat[f"{name}kv"],
+        f"{CONFIG}.vel_gain": kp,
+        f"{CONFIG}.vel_integrator_gain": kp / time if time else 0.0,
+        f"{CONFIG}.inertia": flat[f"{name}acceleration_feedforward"] * travel / force,
+    }
+    if f"{name}integral_limit" in flat:
+        found[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
+    if f"{name}force_limit" in flat:
+        found[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
+    return found
+
+
+def text(found: Mapping[str, float]) -> str:
+    """The lines that odrivetool takes."""
+    return "".join(f"odrv0.axis0.{name} = {value:.12g}\n" for name, value in found.items())
+
+
+FORMAT = ParameterFormat(
+    title="ODrive configuration (odrivetool backup-config)",
+    firmware="ODrive 0.5.1 to 0.5.6",
+    source="Firmware/MotorControl/controller.cpp and encoder.cpp",
+    recognises=recognises,
+    axes=axes,
+    questions=questions,
+    stage=stage,
+    questions_back=questions_back,
+    parameters=parameters,
+    text=text,
+    suffix=".txt",
+)

@@ -1,0 +1,112 @@
+"""From a parameter file to a stage file. What is read was written by others: it is bounded, and never trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from friso.drives.format import FORMATS, AsStage, AxisParameters, ParameterFormat
+from friso.drives.questions import Answers, refuse_open
+from friso.errors import InputError
+from friso.quantities import quoted
+from friso.stage import Stage
+from friso.stage.files import text_of
+
+MOST_BYTES = 4_000_000
+"""Size of a parameter file at most."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A stage from a parameter file: the file, its kind, the name of the axis in it, and what the stage leaves out."""
+
+    stage: Stage
+    path: Path
+    kind: ParameterFormat
+    axis: str
+    left_out: tuple[str, ...]
+
+    def text(self) -> str:
+        """The stage file, at its head what it leaves out."""
+        lines = [f"# From {self.path.name}, {self.axis}, by friso init --from."]
+        lines += [f"# Left out: {sentence}" for sentence in self.left_out]
+        return "\n".join([*lines, self.stage.to_toml()])
+
+
+def stage_from(path: Path, axis: str | None, told: Mapping[str, Any]) -> Drawn:
+    """The stage of an axis in a parameter file, with what the user says of all that is not in it. Raises InputError for
+    what cannot be read, and for all that is still open together."""
+    kind, axes = read(path)
+    chosen = _chosen(axes, axis, path)
+    try:
+        answers = Answers(told)
+        asked = kind.questions(chosen, answers)
+        refuse_open(asked, f"{path}, {chosen.name}")
+        drawn = kind.stage(chosen, answers)
+        stage = _with_answers(drawn, kind, chosen, path, told)
+    except InputError as error:
+        raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None
+    return Drawn(stage, path, kind, chosen.name, drawn.left_out)
+
+
+def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
+    """The kind of a parameter file, and its axes that have gains. Raises InputError."""
+    titles = ", ".join(FORMATS[name].title for name in FORMATS)
+    expected = f"a parameter file: {titles}"
+    try:
+        size = path.stat().st_size
+    except (OSError, ValueError):
+        size = 0  # whatever is wrong is said where it is opened
+    if size > MOST_BYTES:
+        raise InputError(
+            "", f"a file of {size / 1e6:.3g} MB", f"{expected}, of at most {MOST_BYTES / 1e6:g} MB", "", str(path)
+        )
+    text = text_of(path, expected, "friso init stage.toml --from machine.ini")
+    for name in FORMATS:
+        kind = FORMATS[name]
+        if kind.recognises(path.name, text):
+            try:
+                return kind, kind.axes(text)
+            except InputError as error:
+                raise error.found_in(str(path)) from None
+    raise InputError("", "a file of another kind", expected, "", str(path))
+
+
+def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> AxisParameters:
+    """The axis of that name; without one, the only one there is. Raises InputError."""
+    names = ", ".join(axis.name for axis in axes)
+    if name is None and len(axes) == 1:
+        return axes[0]
+    for axis in axes:
+        if axis.name == name:
+            return axis
+    actual = f"{len(axes)} axes" if name is None else quoted(name)
+    raise InputError("--axis", actual, f"one of {names}", f"--axis {axes[0].name}", str(path))
+
+
+def _with_answers(
+    drawn: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, told: Mapping[str, Any]
+) -> Stage:
+    """The stage of the tables with the answers laid over them: those with a dot are keys of the stage."""
+    source = (
+        f"Controller: {path.name}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "
+        "machine: as told to friso init"
+    )
+    tables: dict[str, Any] = {"name": f"{path.stem}, {axis.name}", "source": source}
+    tables |= {name: dict(table) for name, table in drawn.tables.items()}
+    for key, value in told.items():
+        table, dot, name = key.partition(".")
+        if dot:
+            tables.setdefault(table, {})[name] = value
+    friction: dict[str, Any] = tables.get("friction", {})
+    if friction.get("model") == "none":
+        tables.pop("friction")
+    elif friction:
+        friction.setdefault("model", "lugre")
+    motion: dict[str, Any] = tables.setdefault("motion", {})
+    if motion.setdefault("kind", "there_and_back") == "there_and_back":
+        motion.setdefault("return_at", "5 s")
+        motion.setdefault("duration", "20 s")
+    return Stage(**tables)

@@ -1,0 +1,1 @@
+"""What `friso export` shows: the gains of a controller in the units of drives."""
