@@ -27,6 +27,7 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "deadband": {"integral_deadband": "200 um"},
     "hysteresis": {"integral_deadband": "100 um", "integral_deadband_exit": "600 um"},
     "reset": {"integral_reset": True},
+    "dead zone": {"error_deadband": "80 um"},
     "standstill": {"standstill_window": "300 um", "standstill_factor": 0.4},
     "push": {"stiction_push": "0.7 N", "stiction_push_window": "150 um"},
     "dither": {"dither_amplitude": "1.5 N", "dither_frequency": "30 Hz"},
@@ -47,18 +48,19 @@ def by_hand(flat: dict[str, Any], times: np.ndarray, step: float) -> np.ndarray:
     window, factor = key.get("standstill_window", 0.0), key.get("standstill_factor", 1.0)
     push, reach = key.get("stiction_push", 0.0), key.get("stiction_push_window", 0.0)
     amplitude, frequency = key.get("dither_amplitude", 0.0), key.get("dither_frequency", 0.0)
-    bound = key.get("force_limit", np.inf)
+    bound, dead = key.get("force_limit", np.inf), key.get("error_deadband", 0.0)
 
     def rates(t: float, y: float, v: float, z: float, x: float, pauses: bool) -> tuple[float, float, float, float]:
         e = -y
         share = factor if abs(e) < window else 1.0
-        demand = share * (KP * e - KD * v) + KI * x + push * (float(e > reach) - float(e < -reach))
+        acting = max(abs(e) - dead, 0.0) * (1 if e > 0 else -1)
+        demand = share * (KP * acting - KD * v) + KI * x + push * (float(e > reach) - float(e < -reach))
         demand += amplitude * sin(2 * pi * frequency * t)
         force = min(max(demand, -bound), bound)
         level = 1.0 + 2.0 * exp(-((v / 1.6e-3) ** 2))
         z_rate = v - 1e5 * abs(v) / level * z
         drag = 1e5 * z + 316.2277660168379 * z_rate + 0.5 * v
-        winds = share * e * (not pauses)
+        winds = share * acting * (not pauses)
         winds *= not (abs(KI * x) > limit_ and x * e > 0)
         winds *= not (abs(demand) > bound and demand * e > 0)
         return v, (force - drag) / MASS, z_rate, winds - leak * x
@@ -126,11 +128,19 @@ def test_a_drive_carries_them_out_alike() -> None:
         speed = (error - (errors[k - 1] if k else error)) / t
         share = 0.4 if abs(error) < 300e-6 else 1.0
         pauses = abs(error) < (600e-6 if pauses else 100e-6) if k else abs(error) < 100e-6
-        added = t * share * error
+        acting = error - min(max(error, -80e-6), 80e-6)
+        added = t * share * acting
 
-        def demand(x: float, share: float = share, error: float = error, speed: float = speed, k: int = k) -> float:
+        def demand(
+            x: float,
+            share: float = share,
+            error: float = error,
+            acting: float = acting,
+            speed: float = speed,
+            k: int = k,
+        ) -> float:
             push = 0.7 * (float(error > 150e-6) - float(error < -150e-6))
-            return share * (KP * error + KD * speed) + KI * x + push + 1.5 * sin(2 * pi * 30 * k * t)
+            return share * (KP * acting + KD * speed) + KI * x + push + 1.5 * sin(2 * pi * 30 * k * t)
 
         full = x + added
         winding = (demand(full) > 3.5 and added > 0) or (demand(full) < -3.5 and added < 0)
@@ -146,11 +156,15 @@ def test_a_drive_carries_them_out_alike() -> None:
     assert len({*np.round(forces, 3)}) > 500
 
 
-@pytest.mark.parametrize("name", ["leak", "hysteresis", "push", "standstill", "wide deadband"])
+@pytest.mark.parametrize(
+    "name", ["leak", "hysteresis", "push", "standstill", "wide deadband", "dead zone", "wide dead zone"]
+)
 def test_what_is_said_of_hunting_is_what_a_long_run_does(name: str) -> None:
     settings = {"hysteresis": {"integral_deadband": "2 um", "integral_deadband_exit": "6 um"},
                 "leak": {"integral_leak": "10 mHz"},
                 "wide deadband": {"integral_deadband": "2 mm"},
+                "dead zone": {"error_deadband": "2 um"},
+                "wide dead zone": {"error_deadband": "1.5 mm"},
                 "standstill": {"standstill_window": "20 um", "standstill_factor": 0.5},
                 "push": {"stiction_push": "0.3 N", "stiction_push_window": "20 um"}}[name]  # fmt: skip
     chosen = machine(settings, duration="40 s")
@@ -158,7 +172,7 @@ def test_what_is_said_of_hunting_is_what_a_long_run_does(name: str) -> None:
     run = friso.simulate(chosen, 1e-8, 1e-3)["position"]
     last = run.sel(time=slice(30, 40)).values
     swing = (last.max() - last.min()) / 2
-    if name == "wide deadband":
+    if name.startswith("wide"):
         assert swing < 1e-7
         assert (found.attracting, found.observed, found.certain) == ((), (), True)
         return

@@ -45,7 +45,7 @@ class Canvas:
 
 
 def drawing(flat: Mapping[str, Any]) -> str:
-    """The loop of a stage given as flat keys, with the terms that it has; empty for a controller that is not friso's."""
+    """The loop of a stage given as flat keys, with the terms that it has; empty for a controller from elsewhere."""
     key = {name.removeprefix("controller."): v for name, v in flat.items() if name.startswith("controller.")}
     if key["kind"] == "cascade":
         return _cascade(key)

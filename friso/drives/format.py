@@ -88,7 +88,7 @@ FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
 
 def si(value: float, unit: str) -> str:
     """A number in SI as it stands in a stage file."""
-    return f"{value:.12g} {unit}"
+    return f"{value:.15g} {unit}"
 
 
 def lacks(what: str, expected: str, example: str = "") -> InputError:

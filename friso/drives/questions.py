@@ -22,9 +22,9 @@ class Question:
     example: str
 
     @property
-    def line(self) -> str:
-        """The question on one line."""
-        return f"--set {self.key}={self.example:<18} {self.what}"
+    def option(self) -> str:
+        """The option that answers it."""
+        return f"--set {self.key}={self.example}"
 
 
 class Answers:
@@ -94,6 +94,6 @@ def refuse_open(questions: Iterable[Question], origin: str) -> None:
     asked = list(questions)
     if asked:
         things = f"{len(asked)} things are" if len(asked) > 1 else "one thing is"
-        actual = f"{things} not in the file"
-        expected = "each of them:" + "".join(f"\n            {question.line}" for question in asked)
-        raise InputError("", actual, expected, origin=origin)
+        width = max(len(question.option) for question in asked)
+        lines = [f"{question.option:<{width}}  {question.what}" for question in asked]
+        raise InputError("", f"{things} not known", "\n            ".join(["each of them:", *lines]), origin=origin)

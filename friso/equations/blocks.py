@@ -180,6 +180,10 @@ class Blocks(ABC):
         """The signal clamped to plus and minus a limit."""
 
     @abstractmethod
+    def dead_zone(self, error: Signal) -> Signal:
+        """The error less the deadband, 0 within that."""
+
+    @abstractmethod
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
         """The force with the gains of standstill, where the error is small; what integrals hold stays."""
 
@@ -248,6 +252,8 @@ def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
     if form.law.feeds_back == "position":
         position = blocks.fed_back(seen.position)
         seen = replace(seen, position=position, error=seen.error + seen.position - position)
+    if settings.dead_zone:
+        seen = replace(seen, error=blocks.dead_zone(seen.error))
     shares = form.law.declare(seen, blocks, form.variant)
     total = sum(shares.values(), start=Blocks.nothing)
     added = total

@@ -50,9 +50,13 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
     return Controller(force, Component(states, (*blocks.kinks, *others), outputs))
 
 
+FAR = 1e9
+"""An error [m] beyond all windows and deadbands."""
+
+
 def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
-    """What a controller does with an error that hardly changes: proportional gain [N/m] and integral gain [N/(m s)]; of
-    a stage given as flat keys, its reference at rest."""
+    """What a controller does with an error that hardly changes, beyond all windows and deadbands: proportional gain
+    [N/m] and integral gain [N/(m s)]; of a stage given as flat keys, its reference at rest."""
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
     blocks = Continuous(sp.S.One, form)
@@ -62,7 +66,8 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
         gain = sp.diff(force, x)
         proportional -= gain * sp.diff(integrand, STEADY.velocity)  # the integral of a velocity is a displacement
         integral += gain * _per_error(integrand)
-    values = {
+    values: dict[Any, Any] = {STEADY.error: FAR}
+    values |= {
         symbol: flat[str(symbol)]
         for gain in (proportional, integral)
         for symbol in gain.free_symbols
@@ -172,6 +177,19 @@ class Continuous(Blocks):
         value, kinks = _clamped(signal.value, limit, name)
         self.kinks += kinks
         return replace(signal, value=value, rate=None)
+
+    def dead_zone(self, error: Signal) -> Signal:
+        """With a kink where the error is as large as the deadband."""
+        band = self.key("error_deadband")
+        inside = Kink("error_deadband", band**2 - error.value**2)
+        self.kinks.append(inside)
+        outside = 1 - inside.beyond
+        value = outside * (error.value - band * sp.Piecewise((1, error.value > 0), (-1, True)))
+        settled = sp.Piecewise(
+            (error.settled - band, error.settled > band), (error.settled + band, error.settled < -band), (0, True)
+        )
+        rate = None if error.rate is None else outside * error.rate
+        return replace(error, value=value, settled=settled, rate=rate)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
         """With a kink where the error is as large as the window."""

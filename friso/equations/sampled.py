@@ -171,6 +171,15 @@ class Sampled(Blocks):
         """As it is at a sample."""
         return replace(signal, value=clipped(signal.value, limit), rate=None, before=None)
 
+    def dead_zone(self, error: Signal) -> Signal:
+        """As the error is at a sample."""
+        band = self.key("error_deadband")
+        value, settled = (
+            sp.Piecewise((part - band, part > band), (part + band, part < -band), (0, True))
+            for part in (error.value, error.settled)
+        )
+        return replace(error, value=value, settled=settled, rate=None, before=None)
+
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
         """As the error is at a sample."""
         window, factor = map(self.key, ("standstill_window", "standstill_factor"))

@@ -20,6 +20,8 @@ class AgainstFriction(UncertainSection):
     """Of the force that each integral holds."""
     integral_leak: Annotated[Value | None, Quantity("Hz", positive, "0.1 Hz")] = None
     """Corner below which an integral is a low-pass."""
+    error_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
+    """What the error is made smaller by, to 0 at least, before anything acts on it."""
     integral_deadband: Annotated[Value | None, Quantity("m", positive, "1 um")] = None
     """Error below which integrals pause."""
     integral_deadband_exit: Annotated[Value | None, Quantity("m", positive, "3 um")] = None
@@ -77,6 +79,7 @@ class FrictionSettings(NamedTuple):
     gains: bool = False
     push: bool = False
     dither: bool = False
+    dead_zone: bool = False
 
 
 NO_SETTINGS = FrictionSettings()
@@ -88,4 +91,5 @@ def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
     limit, leak, deadband, hysteresis = (f"controller.{name}" in flat for name in names)
     gains, push, dither = (f"controller.{first}" in flat for first, _ in PAIRS)
     reset = bool(flat.get("controller.integral_reset", False))
-    return FrictionSettings(limit, leak, deadband, hysteresis, reset, gains, push, dither)
+    dead_zone = "controller.error_deadband" in flat
+    return FrictionSettings(limit, leak, deadband, hysteresis, reset, gains, push, dither, dead_zone)

@@ -34,8 +34,6 @@ NOT_CARRIED = {
     "BIAS": "BIAS = {:g}, a constant output: friso takes what it balances as balanced",
     "MAX_ERROR": "MAX_ERROR = {:g}, beyond which the error counts no further",
     "MAX_ERROR_D": "MAX_ERROR_D = {:g}, the limit of the error's derivative",
-    "DEADBAND": "DEADBAND = {:g} machine units, within which the loop does nothing: what friso says of swings as small "
-    "as that is not what this axis does",
 }
 MOST_LINES = 100_000
 
@@ -110,6 +108,8 @@ def stage(axis: AxisParameters, answers: Answers) -> AsStage:
     left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.given(key)]
     in_torque = FORCE in answers
     controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
+    if axis.given("DEADBAND"):
+        controller["error_deadband"] = si(axis.number("DEADBAND") * unit, kind.unit("m"))
     drive = {}
     if "SERVO_PERIOD" in axis.machine:
         drive["sample_time"] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
@@ -219,7 +219,7 @@ def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
     unit = units[answers.choice(UNIT, tuple(units))]
     get = lambda name, default=0.0: float(flat.get(f"controller.{name}", default))  # noqa: E731
     if flat["controller.kind"] == "cascade":
-        return _of_cascade(flat)
+        return _of_cascade(flat, unit)
     if "controller.crossover" in flat:
         expected = "gains: its low-pass comes first, which this component has not"
         raise lacks("van Dijk's rules", expected, 'kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"')
@@ -235,7 +235,7 @@ def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
         "FF1": (get("viscous_feedforward") - (0.0 if on_error else get("kd"))) / scale,
         "FF2": get("acceleration_feedforward") / scale,
         "BIAS": 0.0,
-        "DEADBAND": 0.0,
+        "DEADBAND": get("error_deadband") / unit,
         "MAX_OUTPUT": get("force_limit") / (scale * unit),
     }
     if "controller.integral_limit" in flat and get("ki"):
@@ -243,11 +243,12 @@ def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
     return found
 
 
-def _of_cascade(flat: Flat) -> dict[str, float]:
+def _of_cascade(flat: Flat, unit: float) -> dict[str, float]:
     """Those whose output is the velocity that a drive follows."""
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
     ahead = flat["controller.velocity_feedforward"]
-    return {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0, "DEADBAND": 0.0}
+    found = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0}
+    return {**found, "DEADBAND": flat.get("controller.error_deadband", 0.0) / unit}
 
 
 def text(found: Mapping[str, float]) -> str:

@@ -17,6 +17,9 @@ from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, 
 from friso.drives.questions import Answers, Question, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
+from friso.stage.controllers import FILTERS_KEY
+from friso.stage.filters import FEEDBACK
+from friso.stage.lists import row_keys
 
 TRAVEL = "travel_per_turn"
 ROTARY = KINDS["rotary"]
@@ -212,7 +215,19 @@ def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
         found[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
     if f"{name}force_limit" in flat:
         found[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
+    if (bandwidth := _loop_of_velocity(flat)) is not None:
+        found[f"{ENCODER}.bandwidth"] = bandwidth
     return found
+
+
+def _loop_of_velocity(flat: Flat) -> float | None:
+    """Bandwidth [rad/s] of the phase-locked loop that the filters of the velocity stand for; None where they do not."""
+    places = [place for place in row_keys(flat, FILTERS_KEY) if flat[f"{place}.path"] == FEEDBACK]
+    if len(places) != 1 or flat[f"{places[0]}.kind"] != "low_pass":
+        return None
+    (place,) = places
+    double = flat[f"{place}.order"] == 2 and flat[f"{place}.damping_ratio"] == 1.0
+    return 2 * pi * flat[f"{place}.frequency"] if double else None
 
 
 def text(found: Mapping[str, float]) -> str:

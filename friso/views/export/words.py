@@ -49,8 +49,11 @@ def lost(gains: Gains) -> list[str]:
         "dither_amplitude",
     )
     left = [f"controller.{name}" for name in names if flat.get(f"controller.{name}")]
-    filters = [key for key in flat if key.startswith("controller.filters.") and key.endswith(".kind")]
-    return [*left, *(["the filters"] if filters else []), *_feedforward(gains)]
+    held = " ".join(gains.parameters or ())
+    taken = ["feedback"] if "encoder.config.bandwidth" in held else []
+    paths = [value for key, value in flat.items() if key.startswith("controller.filters.") and key.endswith(".path")]
+    filters = ["the filters"] if any(path not in taken for path in paths) else []
+    return [*left, *filters, *_feedforward(gains)]
 
 
 def _feedforward(gains: Gains) -> list[str]:
