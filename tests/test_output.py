@@ -32,6 +32,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "flexure": (LEAVES,),
     "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
     "logs": (RIG,),
+    "export": ("gains", RIG),
     "identify": (RIG,),
     "rig": ("stiffness", DRIVE),
     "compare": (DRIVE,),

@@ -1,0 +1,315 @@
+"""Parameter files of drives: to stages by the formulas of their firmware, and back; and what is no such file."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from inside import friso_inside
+
+import friso
+from friso.drives.conversions import conversions
+from friso.drives.format import FORMATS
+from friso.drives.gains import gains_of
+from friso.drives.questions import Answers
+from friso.drives.read import MOST_BYTES, stage_from
+from friso.equations.blocks import Loop
+from friso.equations.component import state
+from friso.equations.sampled import sampled_controller
+from friso.equations.structure import controller_form
+from friso.errors import InputError
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+AXIS = EXAMPLES / "drives" / "linuxcnc_torque_axis.ini"
+
+MACHINE = {
+    "masses.stage": "20 kg",
+    "friction.static": "20 N",
+    "friction.coulomb": "15 N",
+    "friction.stribeck_velocity": "3 mm/s",
+    "friction.stribeck_exponent": 2,
+    "friction.bristle_stiffness": "2e6 N/m",
+    "friction.bristle_damping": "1e3 N*s/m",
+    "friction.viscous": "50 N*s/m",
+}
+ROTARY = {"masses.stage": "0.02 kg*m^2", "friction.model": "none"}
+
+GAINS = {"P": 4.0, "I": 80.0, "D": 0.06, "FF1": 0.001, "FF2": 4e-4, "DEADBAND": 0.002, "MAX_OUTPUT": 10.0}
+
+ODRIVE = {
+    "axis0": {
+        "motor": {"config": {"torque_constant": 0.04, "current_lim": 20.0, "torque_lim": float("inf")}},
+        "encoder": {"config": {"cpr": 8192, "bandwidth": 1000.0}},
+        "controller": {
+            "config": {
+                "control_mode": 3,
+                "input_mode": 5,
+                "pos_gain": 20.0,
+                "vel_gain": 0.16,
+                "vel_integrator_gain": 0.32,
+                "vel_integrator_limit": 0.5,
+                "inertia": 1e-4,
+                "vel_limit": 10.0,
+            }
+        },
+        "trap_traj": {"config": {"vel_limit": 2.0, "accel_limit": 20.0, "decel_limit": 20.0}},
+    }
+}
+
+
+def ini(folder: Path, gains: dict[str, Any], unit: str = "mm", joint: str = "TYPE = LINEAR") -> Path:
+    """A LinuxCNC file with one joint."""
+    kind = "ANGULAR_UNITS" if "ANGULAR" in joint else "LINEAR_UNITS"
+    lines = [f"{name} = {value}" for name, value in gains.items()]
+    head = ["[EMCMOT]", "SERVO_PERIOD = 1000000", "[TRAJ]", f"{kind} = {unit}", "[JOINT_0]", joint, "# a comment"]
+    path = folder / "machine.ini"
+    path.write_text("\n".join([*head, "MAX_VELOCITY = 100", "MAX_ACCELERATION = 1000", *lines, ""]))
+    return path
+
+
+def backup(folder: Path, **changes: Any) -> Path:
+    """An ODrive configuration; changes are of controller.config."""
+    document = json.loads(json.dumps(ODRIVE))
+    document["axis0"]["controller"]["config"].update(changes)
+    path = folder / "odrive.json"
+    path.write_text(json.dumps(document))
+    return path
+
+
+def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
+    options = [part for key, value in MACHINE.items() for part in ("--set", f"{key}={value}")]
+    told = ["--set", "force_per_output=60 N", *options]
+    done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *told)
+    assert (done.returncode, done.stderr) == (0, "")
+    flat = friso.load(tmp_path / "axis.toml").flat()
+    assert flat["controller.kp"] == pytest.approx(2.0 * 60 / 1e-3)
+    assert flat["controller.error_deadband"] == pytest.approx(0.5e-6)
+    assert flat["drive.sample_time"] == pytest.approx(0.5e-3)
+    assert flat["motion.acceleration"] == pytest.approx(2.0)
+    again = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *told)
+    assert (again.returncode, "nothing was overwritten" in again.stderr) == (2, True)
+
+
+def test_all_that_is_not_in_the_file_is_asked_for_at_once(tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS)
+    assert done.returncode == 2
+    asked = re.findall(r"^ +--set ([a-z_.]+)=", done.stderr, re.MULTILINE)
+    assert asked == ["force_per_output", *(key for key in asked[1:] if key in MACHINE)]
+    assert {*asked[1:]} == {*MACHINE}
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("unit", "joint", "force", "told"),
+    [
+        ("mm", "TYPE = LINEAR", "20 N", MACHINE),
+        ("inch", "TYPE = LINEAR", "20 N", MACHINE),
+        ("deg", "TYPE = ANGULAR", "3 N*m", ROTARY),
+    ],
+)
+def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force: str, told: dict[str, Any]) -> None:
+    more = {"force_per_output": force}
+    drawn = stage_from(ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}, unit, joint), None, {**told, **more})
+    back = gains_of(friso.loads(drawn.text()), {**more, "machine_unit": unit}, "linuxcnc").parameters
+    assert back is not None
+    assert {name: back[name] for name in GAINS} == pytest.approx(GAINS)
+    assert back["MAX_ERROR_I"] == pytest.approx(0.01)
+
+
+def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
+    gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001, "BIAS": 0.5}
+    loop = {"controller.kp": "900 N*s/m", "controller.velocity_integral_time": "8 ms"}
+    drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop})
+    (left_out,) = drawn.left_out
+    assert left_out.startswith("BIAS = 0.5")
+    back = gains_of(drawn.stage, {"machine_unit": "mm"}, "linuxcnc").parameters
+    assert back is not None
+    assert {name: back[name] for name in ("P", "I", "FF1", "DEADBAND")} == pytest.approx(
+        {name: gains[name] for name in ("P", "I", "FF1", "DEADBAND")}
+    )
+
+
+def test_the_commands_are_those_of_the_component_pid(tmp_path: Path) -> None:
+    """A drive with the stage's controller against the formulas of LinuxCNC, written down by hand."""
+    gains = {**GAINS, "MAX_ERROR_I": 0.01}
+    drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, "force_per_output": "20 N"})
+    flat, period, unit = drawn.stage.flat(), 1e-3, 1e-3
+    times = np.arange(400) * period
+    command, feedback = 5 * np.sin(8 * times), 5 * np.sin(8 * times - 0.03) + 0.02 * np.cos(90 * times)
+    names = ("e", "y", "r_rate", "r_bend")
+    e, y, rate, bend = sp.symbols(names, real=True)
+    loop = Loop(e, y, sp.S.Zero, rate, bend)
+    force, held = sampled_controller(controller_form(flat), loop, 1)
+    parts = (force, *(number.update for number in held))
+    keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
+    clip = {"clipped": lambda value, end: min(max(value, -end), end)}
+    once = sp.lambdify([e, y, rate, bend, *keys, *(number.symbol for number in held)], parts, [clip, "math"])
+    kept = [feedback[0] * unit if number.symbol == state("position_before_1") else 0.0 for number in held]
+    total, speeds, limited = 0.0, (0.0, 0.0), 0.0
+    for k in range(len(times)):
+        before = max(k - 1, 0)
+        speed = (command[k] - command[before]) / period
+        acceleration = (speed - speeds[0]) / period
+        error = command[k] - feedback[k]
+        slope = speed - (feedback[k] - feedback[before]) / period
+        dead = error - min(max(error, -gains["DEADBAND"]), gains["DEADBAND"])
+        if dead * limited <= 0:
+            total = min(max(total + dead * period, -0.01), 0.01)
+        output = gains["P"] * dead + gains["I"] * total + gains["D"] * slope
+        output += gains["FF1"] * speed + gains["FF2"] * acceleration
+        wanted = 20 * min(max(output, -10.0), 10.0)
+        limited = 0.0 if abs(output) <= 10 else np.sign(output)
+        speeds = (speed, speeds[0])
+        row = (error * unit, feedback[k] * unit, speed * unit, acceleration * unit)
+        ours, *kept = once(*row, *keys.values(), *kept)
+        assert ours == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("travel", ["5 mm", "360 deg"])
+def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
+    told = {**(MACHINE if travel == "5 mm" else ROTARY), "travel_per_turn": travel}
+    drawn = stage_from(backup(tmp_path), None, told)
+    config = ODRIVE["axis0"]["controller"]["config"]
+    back = gains_of(friso.loads(drawn.text()), {"travel_per_turn": travel}, "odrive").parameters
+    assert back is not None
+    names = ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia", "vel_integrator_limit")
+    assert {name: back[f"controller.config.{name}"] for name in names} == pytest.approx(
+        {name: config[name] for name in names}
+    )
+    assert back["encoder.config.bandwidth"] == pytest.approx(1000.0)
+    assert back["motor.config.torque_lim"] == pytest.approx(0.04 * 20)
+
+
+def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
+    """Turns and N m by the firmware's formula, against metres and newtons by the stage's."""
+    told = {**MACHINE, "travel_per_turn": "5 mm"}
+    key = {k.removeprefix("controller."): v for k, v in stage_from(backup(tmp_path), None, told).stage.flat().items()}
+    error, speed, wound = 3e-5, 0.01, 4e-5  # [m], [m/s], [m] of the velocity's error
+    turns = [value / 5e-3 for value in (error, speed, wound)]
+    torque = 0.16 * (20.0 * turns[0] - turns[1]) + 0.32 * turns[2]
+    force = key["kp"] * (key["kv"] * error - speed) + key["kp"] / key["velocity_integral_time"] * wound
+    assert force * 5e-3 == pytest.approx(torque * 2 * np.pi)  # work in a turn
+
+
+def test_gains_in_the_units_of_drives() -> None:
+    stage = friso.load(EXAMPLES / "twincat_cascade.toml")
+    told = {"travel_per_turn": "10 mm", "motor_constant": "0.5 N*m/A"}
+    rows = {row.symbol: {unit: value for value, unit in row.values} for row in conversions(stage.flat(), Answers(told))}
+    lever = 10e-3 / (2 * np.pi)
+    assert rows["kv"]["(m/min)/mm"] == pytest.approx(1.5)
+    assert rows["Tn"]["ms"] == pytest.approx(40.0)
+    assert rows["kp"]["N*m/(rad/s)"] == pytest.approx(90 * lever**2)
+    assert rows["kp"]["A/rpm"] == pytest.approx(90 * lever**2 / 0.5 * 2 * np.pi / 60)
+    assert rows["kp"]["A*s/m"] == pytest.approx(90 * lever / 0.5)
+
+
+def test_a_pid_as_a_cascade_is_the_same_controller() -> None:
+    stage = friso.load(EXAMPLES / "ball_screw_axis.toml")
+    rows = {row.symbol: row.values[0][0] for row in conversions(stage.flat(), Answers({}))}
+    kd, kv, time = rows["kd"], rows["kv"], rows["Tn"]
+    assert kd * (kv + 1 / time) == pytest.approx(rows["kp"])
+    assert kd * kv / time == pytest.approx(rows["ki"])
+
+
+def test_export_writes_page_and_parameters(tmp_path: Path) -> None:
+    stage = EXAMPLES / "twincat_cascade.toml"
+    done = friso_inside(
+        tmp_path, "export", "gains", stage, "--to", "odrive", "--set", "travel_per_turn=10 mm", "--out", "out"
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "[ kp (1 + 1/(Tn s)) ]" in done.stdout
+    assert "the filters" in done.stdout
+    assert "vel_gain" in (tmp_path / "out" / "parameters.txt").read_text()
+    assert "[ kp (1 + 1/(Tn s)) ]" in (tmp_path / "out" / "gains.html").read_text()
+    document = json.loads(friso_inside(tmp_path, "export", "gains", stage, "--json").stdout)
+    assert document["gains"][0]["values"][0] == {"value": 25.0, "unit": "1/s"}
+
+
+@pytest.mark.parametrize(
+    ("told", "to", "part"),
+    [
+        ({}, "odrive", "travel_per_turn"),
+        ({"travel_per_turn": "3 N"}, None, "travel_per_turn"),
+        ({"travel": "3 mm"}, None, "one of"),
+        ({}, "siemens", "one of"),
+    ],
+)
+def test_what_export_cannot_do(told: dict[str, Any], to: str | None, part: str) -> None:
+    with pytest.raises(InputError, match=part):
+        gains_of(friso.load(EXAMPLES / "twincat_cascade.toml"), told, to)
+
+
+@pytest.mark.parametrize("name", ["thesis_rig", "ball_screw_axis"])
+def test_a_controller_that_a_drive_does_not_have(name: str) -> None:
+    with pytest.raises(InputError, match="a cascade, the only structure"):
+        gains_of(friso.load(EXAMPLES / f"{name}.toml"), {"travel_per_turn": "10 mm"}, "odrive")
+
+
+BAD: dict[str, tuple[str | bytes, str]] = {
+    "empty": ("", "a file of another kind"),
+    "binary": (bytes(range(256)), "is not UTF-8"),
+    "no gains": ("[JOINT_0]\nTYPE = LINEAR\n", "an axis whose loop LinuxCNC closes"),
+    "stepper": ("[JOINT_0]\nP = 1000\nSTEPGEN_MAXVEL = 20\n", "a stepper"),
+    "no number": ("[JOINT_0]\nP = 50 # high\n", "a number"),
+    "endless": ("[JOINT_0]\nP = 1e400\n", "a number of at most"),
+    "not a number": ("[JOINT_0]\nP = nan\n", "a number of at most"),
+    "two axes": ("[JOINT_0]\nP = 50\n[JOINT_1]\nP = 50\n", "--axis JOINT_0"),
+    "negative": ("[JOINT_0]\nP = -50\n", "a gain of 0 or more"),
+    "broken json": ('{"axis0": {"vel_integrator_gain": ', "not JSON"),
+    "nested": ('{"axis0": "vel_integrator_gain", "x": ' + "[" * 100_000, "nested too deeply|not JSON"),
+    "old firmware": (
+        '{"axis0": {"controller": {"config": {"pos_gain": 1, "vel_gain": 1, "vel_integrator_gain": 1}}}}',
+        "0.5.1 to 0.5.6",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_no_parameter_file(tmp_path: Path, name: str) -> None:
+    content, part = BAD[name]
+    path = tmp_path / "file.ini"
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    told = {**MACHINE, "force_per_output": "20 N", "machine_unit": "mm", "drive.sample_time": "1 ms"}
+    told |= {"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "0.1 s"}
+    with pytest.raises(InputError, match=part) as refused:
+        stage_from(path, None, told)
+    assert str(path) in str(refused.value)
+
+
+def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "huge.ini"
+    with path.open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
+    with pytest.raises(InputError, match="MB"):
+        stage_from(path, None, {})
+
+
+@pytest.mark.parametrize(
+    ("changes", "part"),
+    [
+        ({"control_mode": 2}, "control in position"),
+        ({"pos_gain": 0.0}, "greater than 0"),
+        ({"vel_gain": "x"}, "a number"),
+    ],
+)
+def test_an_odrive_that_controls_no_position(tmp_path: Path, changes: dict[str, Any], part: str) -> None:
+    with pytest.raises(InputError, match=part):
+        stage_from(backup(tmp_path, **changes), None, {**MACHINE, "travel_per_turn": "5 mm"})
+
+
+def test_what_is_left_out_is_told(tmp_path: Path) -> None:
+    path = backup(tmp_path, enable_gain_scheduling=True, gain_scheduling_width=0.01, input_mode=1)
+    drawn = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"})
+    assert any("the gains go to 0 with the error" in text for text in drawn.left_out)
+    assert all(f"# Left out: {text}" in drawn.text() for text in drawn.left_out)
+    assert drawn.stage.flat()["controller.velocity_feedforward"] == 0.0
+
+
+def test_formats_are_listed() -> None:
+    assert [*FORMATS] == ["linuxcnc", "odrive"]
