@@ -32,6 +32,11 @@ from friso.stage.filters import Polynomial
 SAMPLE_TIME = key("drive.sample_time")
 
 
+def counter(loop: str) -> sp.Symbol:
+    """The samples that have passed since a loop, "position" or "velocity", was due."""
+    return state(f"samples_of_{loop}")
+
+
 @dataclass(frozen=True)
 class Rest:
     """When the integrators rest for a sample, and when they begin anew, besides at the limit of the force."""
@@ -87,7 +92,7 @@ class Sampled(Blocks):
             yield
             return
         before, first = (self.period, self.due), len(self.held)
-        passed = state(f"samples_of_{name}")
+        passed = counter(name)
         self.period, self.due = key(f"drive.{name}_sample_time"), passed < sp.Rational(1, 2)
         yield
         due = self.due

@@ -27,6 +27,9 @@ its delay is unstable anyway."""
 MOST_SECTIONS, MOST_SAMPLES = 24, 64
 """Longest row of these, and longest delay of a sampled drive in samples."""
 
+SLOW_LOOPS = ("drive.position_sample_time", "drive.velocity_sample_time")
+"""Keys of the sample times of loops that are carried out more slowly."""
+
 PADE_6 = tuple(comb(6, k) / (comb(12, k) * factorial(k)) for k in range(7))
 """Coefficients of the numerator of Pade's approximation of order 6 to the exponential."""
 
@@ -36,21 +39,25 @@ SCALED = 0.5
 
 @dataclass(frozen=True)
 class DriveTiming:
-    """Sample time [s], 0 for a controller in continuous time, and delay between measurement and force [s]."""
+    """Sample time [s], 0 for a controller in continuous time, delay between measurement and force [s], and the samples
+    after which all its loops are due again."""
 
     sample_time: float
     delay: float
+    period: int = 1
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
-        """The drive of a stage. Raises InputError for a delay of more samples than are followed, and for loops with
-        sample times of their own."""
-        for key in ("drive.position_sample_time", "drive.velocity_sample_time"):
-            if key in flat and flat[key] > flat["drive.sample_time"] * (1 + 1e-9):
-                expected = "loops that are all carried out at drive.sample_time: no others are analysed in frequency"
-                text = f"{flat[key]:g} s, with drive.sample_time = {flat['drive.sample_time']:g} s"
-                raise InputError(key, text, expected, 'sample_time = "125 us", without it')
-        drive = cls(flat.get("drive.sample_time", 0.0), flat.get("drive.delay", 0.0))
+        """The drive of a stage. Raises InputError for a delay of more samples than are followed, and for a loop that is
+        due as rarely."""
+        sample_time = flat.get("drive.sample_time", 0.0)
+        slow = {key: flat[key] for key in SLOW_LOOPS if key in flat}
+        key = max(slow, key=lambda key: slow[key], default="")
+        period = round(slow[key] / sample_time) if slow else 1
+        if period > MOST_SAMPLES:
+            text = f"{slow[key]:g} s, {period} samples of {sample_time:g} s"
+            raise InputError(key, text, f"at most {MOST_SAMPLES} samples", 'position_sample_time = "1 ms"')
+        drive = cls(sample_time, flat.get("drive.delay", 0.0), period)
         if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
             text = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
             raise InputError("drive.delay", text, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
@@ -79,14 +86,13 @@ class DriveTiming:
         return 2j / self.sample_time * np.tan(omega * self.sample_time / 2)
 
     def to_s(self, poles: Complex) -> Complex:
-        """Poles of the loop as s [rad/s]: of a sampled one, those whose exponential over a sample they are; 0 is at
-        minus infinity."""
+        """Poles of the loop as s [rad/s]: of a sampled one, those whose exponential over its period they are, as slow
+        as can be; 0 is at minus infinity."""
         if not self.sample_time:
             return poles
+        time = self.sample_time * self.period
         with np.errstate(divide="ignore"):
-            return (np.log(np.abs(poles)) / self.sample_time + 1j * (np.angle(poles) / self.sample_time)).astype(
-                complex
-            )
+            return (np.log(np.abs(poles)) / time + 1j * (np.angle(poles) / time)).astype(complex)
 
 
 def resonances(poles: Complex) -> Complex:

@@ -21,6 +21,7 @@ from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
 from friso.frequency.members import Members, joined, limit_cases
 from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
+from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.system import Complex, System
 from friso.system import usable_cores
 
@@ -102,6 +103,8 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
 
 def _about_resonances(system: Poles) -> np.ndarray:
     """The least abs(1 + L) about the lightly damped closed-loop poles of each member, shape (members,)."""
+    if system.drive.period > 1:  # its poles do not tell which alias resonates
+        return np.full(len(system.closed), np.inf)
     closed = system.in_s
     light = (closed.imag > 0) & (np.abs(closed.real) < LIGHT * closed.imag)
     omega = np.where(light, closed.imag, np.nan)[:, :, None] + NEAR * np.where(light, closed.real, np.nan)[:, :, None]
@@ -166,8 +169,13 @@ def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Compl
 
 
 def controller(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
-    s = DriveTiming.of(flat).controller_s(omega)
+    """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,); with loops at
+    several rates, the part of it that has the frequency of the deviation."""
+    drive = DriveTiming.of(flat)
+    if drive.period > 1:
+        lifted = controller_over_period(samples_controller(flat, 1, drive.period))
+        return -lifted.fundamental(omega * drive.sample_time)[0]
+    s = drive.controller_s(omega)
     answers = compensator(flat, 1).take((STAGE, VELOCITY, REFERENCE), ("force",)).at(s)[0, :, 0]
     return -(answers[:, 0] + 1j * omega * answers[:, 1])
 

@@ -21,6 +21,7 @@ from friso.frequency.parts import (
     fed_forward,
     plant,
 )
+from friso.frequency.rates import closed_over_period, cut_over_period, samples_controller
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
@@ -101,7 +102,8 @@ class Poles:
     def distance(self, omega: np.ndarray) -> np.ndarray:
         """abs(1 + L) at angular frequencies [rad/s], shape (members, k): the distances from all closed-loop poles over
         those from all poles of the cut loop."""
-        at = np.exp(1j * omega * self.drive.sample_time) if self.drive.sample_time else 1j * omega
+        time = self.drive.sample_time * self.drive.period
+        at = np.exp(1j * omega * time) if time else 1j * omega
         distance = np.ones(omega.shape)
         for k in range(self.closed.shape[1]):
             distance = distance * (np.abs(at - self.closed[:, [k]]) / np.abs(at - self.cut[:, [k]]))
@@ -116,6 +118,8 @@ def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> Pole
     if drive.sample_time:
         samples, late = drive.samples_late
         machine = waited(zero_order_hold(machine, drive.sample_time, late), samples)
+        if drive.period > 1:
+            return _over_period(flat, machine.take((FORCE,), (STAGE,)), drive, _shut(bare))
         control = bilinear(control, drive.sample_time)
     elif drive.delay:
         machine = delayed(machine, drive.delay, fastest(_shut(bare)))
@@ -125,14 +129,26 @@ def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> Pole
     return Poles(closed, cut, closed if loop is bare else _shut(bare), drive)
 
 
+def _over_period(flat: Mapping[str, Any], machine: System, drive: DriveTiming, bare: Complex) -> Poles:
+    """Poles of a loop of several rates, over its period; `bare` are those in continuous time."""
+    controls = samples_controller(flat, len(machine.a), drive.period)
+    closed, cut = closed_over_period(machine, controls), cut_over_period(machine, controls).a
+    return Poles(*(np.linalg.eigvals(matrix).astype(complex) for matrix in (closed, cut)), bare, drive)
+
+
 def response(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
-    """L over angular frequencies [rad/s], exactly, of a stage in one state."""
+    """L over angular frequencies [rad/s], exactly, of a stage in one state; with loops at several rates its
+    characteristic locus (see `friso.frequency.rates`)."""
     if not drive.sample_time:
         loop = open_loop(flat, member)
         return lambda omega: loop.at(1j * omega)[0, :, 0, 0] * np.exp(-1j * omega * drive.delay)
     machine, control = plant(flat, member).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, 1)
     samples, late = drive.samples_late
     held = zero_order_hold(machine, drive.sample_time, late)
+    if drive.period > 1:
+        machine = waited(held, samples).take((FORCE,), (STAGE,))
+        lifted = cut_over_period(machine, samples_controller(flat, 1, drive.period))
+        return lambda omega: lifted.locus(omega * drive.sample_time)[0]
     sampled = _cut(held, bilinear(control, drive.sample_time))
 
     def at(omega: np.ndarray) -> Complex:

@@ -81,7 +81,8 @@ def margins(flat: Mapping[str, Any], member: Members) -> Margins:
     drive = DriveTiming.of(flat)
     closed_poles, at = poles(flat, member, drive), response(flat, member, drive)
     closed = closed_poles.in_s[0]
-    omega = frequencies(flat, member, drive, DENSITY, [closed, drive.to_s(closed_poles.cut[0])])
+    resonant = [closed, drive.to_s(closed_poles.cut[0]), *([closed_poles.continuous] if drive.period > 1 else [])]
+    omega = frequencies(flat, member, drive, DENSITY, resonant)
     ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest]))[0]] if drive.sample_time else [])]
     return of_loop(at, closed[np.isfinite(closed)], float(closed_poles.abscissa[0]), omega, np.array(ends, complex))
 

@@ -1,0 +1,160 @@
+"""Loops carried out at several rates: a controller sample by sample, and what repeats after a period lifted to it.
+
+Over a period of N samples the loop is a system with N inputs and outputs that does not change (lifting: Chen, Francis
+1995, Optimal Sampled-Data Control Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles
+decide on stability. Cut at the actuator it has N characteristic loci; a gain or a phase that is the same at all samples
+takes the loop to the edge where one of them passes -1 (MacFarlane, Postlethwaite 1977,
+doi:10.1080/00207177708922217), so that margins are those of a locus. With all loops at one rate the loci are the
+loop's response at a frequency and at its aliases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from friso.equations.blocks import Loop
+from friso.equations.component import Held
+from friso.equations.sampled import counter, sampled_controller
+from friso.equations.structure import ControllerForm, shared_structure
+from friso.errors import InputError
+from friso.frequency.declared import Declared
+from friso.frequency.system import Complex, System
+from friso.stage.standstill import FrictionSettings
+
+POSITION, FORCE = "position", "force"
+
+LOOPS = ("position", "velocity")
+
+
+@dataclass(frozen=True)
+class Lifted:
+    """A periodic system at the ends of its periods: x' = a x + b u, y = c x + d u, u and y holding a period's N
+    samples; a (members, n, n), b (members, n, N), c (members, N, n), d (members, N, N)."""
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    d: np.ndarray
+
+    def at(self, points: np.ndarray) -> Complex:
+        """Its transfer matrices at points (k,) of z to the power N, shape (members, k, N, N)."""
+        shifted = points[:, None, None] * np.eye(self.a.shape[-1]) - self.a[:, None]
+        return self.c[:, None] @ np.linalg.solve(shifted, self.b[:, None].astype(complex)) + self.d[:, None]
+
+    def fundamental(self, turn: np.ndarray) -> Complex:
+        """The part of the answer to a harmonic signal that has its frequency, shape (members, k), for the angle (k,)
+        [rad] by which it turns in a sample."""
+        turns = np.exp(1j * turn[:, None] * np.arange(self.d.shape[-1]))  # (k, N)
+        answers = (self.at(turns[:, 1] ** self.d.shape[-1]) @ turns[..., None])[..., 0]
+        return (answers * turns.conj()).mean(axis=-1)
+
+    def locus(self, turn: np.ndarray) -> Complex:
+        """The characteristic locus that is the loop at that frequency, shape (members, k): the eigenvalue that is
+        closest to the fundamental."""
+        every = np.linalg.eigvals(self.at(np.exp(1j * turn * self.d.shape[-1])))
+        near = np.abs(every - self.fundamental(turn)[..., None]).argmin(axis=-1)
+        return np.take_along_axis(every, near[..., None], axis=-1)[..., 0]
+
+
+def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
+    """The controller at each sample of a period: from the position measured [m] to the force [N], and what is held for
+    the next sample. Raises InputError for encoders on both sides of a transmission."""
+    form = shared_structure(flat)
+    if form.transmission is not None and form.transmission.position != form.transmission.velocity:
+        actual = "position and velocity from different encoders, with loops at several rates"
+        raise InputError("encoder", actual, "one of the two", 'velocity = "load", or no position_sample_time')
+    assert form.controller is not None
+    ratios = {name: _samples(flat, name) for name in form.controller.loops}
+    kinds: dict[tuple[bool, ...], System] = {}
+    systems = []
+    for k in range(period):
+        due = tuple(name not in ratios or k % ratios[name] == 0 for name in LOOPS)
+        if due not in kinds:
+            kinds[due] = _declared(form.controller, due).at(flat, members)
+        systems.append(kinds[due])
+    return tuple(systems)
+
+
+def samples_in_period(flat: Mapping[str, Any]) -> int:
+    """Samples after which all loops are due again, 1 where all are carried out at every sample."""
+    return max(_samples(flat, name) for name in LOOPS)
+
+
+def _samples(flat: Mapping[str, Any], name: str) -> int:
+    """Samples after which a loop is due again."""
+    key = f"drive.{name}_sample_time"
+    return round(float(flat[key] / flat["drive.sample_time"])) if key in flat else 1
+
+
+@cache
+def _declared(form: ControllerForm, due: tuple[bool, ...]) -> Declared:
+    """The controller at a sample at which some loops are due, of small motions away from the reference."""
+    bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
+    y = sp.Symbol("measured_position", real=True)
+    force, held = sampled_controller(bare, Loop(-y, y, sp.S.Zero, sp.S.Zero), 1)
+    passed = {counter(name): sp.Integer(not now) for name, now in zip(LOOPS, due, strict=True)}
+    numbers: list[Held] = [number for number in held if number.symbol not in passed]
+    following = tuple(sp.sympify(number.update).subs(passed) for number in numbers)
+    symbols = tuple(number.symbol for number in numbers)
+    return Declared(symbols, following, {POSITION: y}, {FORCE: sp.sympify(force).subs(passed)})
+
+
+def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndarray:
+    """How a period takes the states of plant and controller along, shape (members, n, n), the loop being closed."""
+    whole = _identity(machine, controls[0])
+    for control in controls:
+        whole = _step(machine, control, 1.0) @ whole
+    return whole
+
+
+def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
+    """The loop cut at the actuator: from the forces of a period to those that answer, their sign reversed."""
+    steps = [_step(machine, control, 0.0) for control in controls]
+    held = np.zeros((len(machine.a), controls[0].a.shape[-1], 1))
+    push = np.concatenate([machine.b, held], axis=1)
+    answers = [-np.concatenate([control.d @ machine.c, control.c], axis=2) for control in controls]
+    return _lifted(steps, [push] * len(steps), answers)
+
+
+def controller_over_period(controls: tuple[System, ...]) -> Lifted:
+    """The controller alone: from the positions of a period to the forces."""
+    steps, pushes = ([getattr(control, part) for control in controls] for part in ("a", "b"))
+    lifted = _lifted(steps, pushes, [control.c for control in controls])
+    direct = np.zeros_like(lifted.d)
+    for k, control in enumerate(controls):
+        direct[:, k, k] = control.d[:, 0, 0]
+    return replace(lifted, d=lifted.d + direct)
+
+
+def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.ndarray]) -> Lifted:
+    """What repeats after a period, from its samples: x' = step x + push u, y = answer x."""
+    count, (members, n) = len(steps), steps[0].shape[:2]
+    along = np.broadcast_to(np.eye(n), (members, n, n))
+    inputs = np.zeros((members, n, count))  # from the inputs so far to the state
+    c, d = np.zeros((members, count, n)), np.zeros((members, count, count))
+    for k, (step, push, answer) in enumerate(zip(steps, pushes, answers, strict=True)):
+        c[:, [k]], d[:, [k]] = answer @ along, answer @ inputs
+        along, inputs = step @ along, step @ inputs
+        inputs[:, :, [k]] += push
+    return Lifted(along, inputs, c, d)
+
+
+def _step(machine: System, control: System, shut: float) -> np.ndarray:
+    """How a sample takes the states of plant and controller along; `shut` is 1 where the controller's force acts."""
+    n, k = machine.a.shape[-1], control.a.shape[-1]
+    step = np.zeros((len(machine.a), n + k, n + k))
+    step[:, :n, :n] = machine.a + shut * (machine.b @ control.d @ machine.c)
+    step[:, :n, n:] = shut * (machine.b @ control.c)
+    step[:, n:, :n], step[:, n:, n:] = control.b @ machine.c, control.a
+    return step
+
+
+def _identity(machine: System, control: System) -> np.ndarray:
+    size = machine.a.shape[-1] + control.a.shape[-1]
+    return np.broadcast_to(np.eye(size), (len(machine.a), size, size))
