@@ -16,8 +16,9 @@ PACKAGE = Path(friso.__file__).parent
 ROOT = Path(__file__).parents[1]
 GUIDE = ROOT / "CONTRIBUTING.md"
 
-KNOW_CONTROLLERS = ("equations/controllers/", "stage/stage.py", "stage/standstill.py", "templates/")
-"""Where keys of a controller may be named: its own files, the stage file's schema, and the template of one."""
+KNOW_CONTROLLERS = ("equations/controllers/", "drives/", "stage/stage.py", "stage/standstill.py", "templates/")
+"""Where keys of a controller may be named: its own files, the stage file's schema, the template of one, and parameter
+files of drives."""
 
 SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.py"}
 """Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
@@ -41,6 +42,7 @@ RECIPES = {
     "kind of experiment": "identification/experiments",
     "command and its page": "cli/commands",
     "log format": "identification/logs",
+    "parameter file": "drives/formats",
 }
 """What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
 

@@ -12,7 +12,7 @@ from math import pi, sqrt
 from typing import Any
 
 from friso.axis import LINEAR, axis_of
-from friso.drives.questions import Answers
+from friso.drives.questions import UserAnswers
 from friso.quantities import Quantity, positive
 
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
@@ -38,7 +38,7 @@ class Turn:
     per_ampere: float | None
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any], answers: Answers) -> Turn:
+    def of(cls, flat: Mapping[str, Any], answers: UserAnswers) -> Turn:
         """As the transmission or the user says. Raises InputError for an answer in another unit."""
         kind = axis_of(flat)
         travel = flat.get("transmission.lead")
@@ -54,7 +54,7 @@ class Turn:
         return cls(travel, per_ampere)
 
 
-def conversions(flat: Mapping[str, Any], answers: Answers) -> tuple[Conversion, ...]:
+def conversions(flat: Mapping[str, Any], answers: UserAnswers) -> tuple[Conversion, ...]:
     """The gains of a stage given as flat keys, by what is known of motor and screw. Raises InputError."""
     turn = Turn.of(flat, answers)
     key = {name.removeprefix("controller."): v for name, v in flat.items() if name.startswith("controller.")}

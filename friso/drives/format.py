@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from friso.drives.questions import Answers, Question
+from friso.drives.questions import OpenQuestion, UserAnswers
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.registry import Registry
@@ -61,13 +61,21 @@ class AsStage:
 
 
 @dataclass(frozen=True)
+class Parameters:
+    """Parameters of a drive by name, and the names in [controller] that they hold."""
+
+    values: Mapping[str, float]
+    held: frozenset[str]
+
+
+@dataclass(frozen=True)
 class ParameterFormat:
     """A kind of parameter file.
 
     Its `title`; the `firmware` whose formulas are used; the `source` of these; whether a file is of this kind by its
     name and text; its axes (raises InputError); what it leaves open of an axis (raises InputError for an axis that
-    friso cannot describe); the stage of an axis with the answers to that; the parameters of a stage, by name, with
-    their comments, and what they need to know; and how a file holds them.
+    friso cannot describe); the stage of an axis with the answers to that; what the parameters of a stage need to know,
+    these parameters, and how a file holds them.
     """
 
     title: str
@@ -75,10 +83,10 @@ class ParameterFormat:
     source: str
     recognises: Callable[[str, str], bool]
     axes: Callable[[str], tuple[AxisParameters, ...]]
-    questions: Callable[[AxisParameters, Answers], tuple[Question, ...]]
-    stage: Callable[[AxisParameters, Answers], AsStage]
-    questions_back: Callable[[Flat, Answers], tuple[Question, ...]]
-    parameters: Callable[[Flat, Answers], Mapping[str, float]]
+    questions: Callable[[AxisParameters, UserAnswers], tuple[OpenQuestion, ...]]
+    stage: Callable[[AxisParameters, UserAnswers], AsStage]
+    questions_back: Callable[[Flat, UserAnswers], tuple[OpenQuestion, ...]]
+    parameters: Callable[[Flat, UserAnswers], Parameters]
     text: Callable[[Mapping[str, float]], str]
     suffix: str
 

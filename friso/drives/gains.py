@@ -9,22 +9,24 @@ from typing import Any
 from friso.drives.conversions import MOTOR_CONSTANT, TRAVEL, Conversion, conversions
 from friso.drives.drawing import drawing
 from friso.drives.format import FORMATS, ParameterFormat
-from friso.drives.questions import Answers, refuse_open
+from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
 
 
 @dataclass(frozen=True)
 class Gains:
     """The gains of a stage: its loop drawn, its gains in the units of drives, and, for a kind of drive (None: for
-    none), its parameters by name and how a file holds them."""
+    none), its parameters by name, and the keys of the stage that these have no place for."""
 
     stage: Stage
     drawing: str
     conversions: tuple[Conversion, ...]
     kind: ParameterFormat | None = None
     parameters: Mapping[str, float] | None = None
+    lost: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -36,17 +38,30 @@ def gains_of(stage: Stage, told: Mapping[str, Any], to: str | None = None) -> Ga
     """The gains of a stage, also as the parameters of the kind of drive `to`. Raises InputError for a controller that
     the drive does not have, and for all that is still to be said, together."""
     flat = stage.flat()
-    answers = Answers(told)
+    answers = UserAnswers(told)
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
     known = {TRAVEL, MOTOR_CONSTANT}
     if kind is not None:
         open_questions = kind.questions_back(flat, answers)
-        known |= {question.key for question in kind.questions_back(flat, Answers({}))}
+        known |= {question.key for question in kind.questions_back(flat, UserAnswers({}))}
     for key in told:
         if key not in known:
             raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(known))}")
     if kind is None:
         return Gains(stage, drawing(flat), conversions(flat, answers))
     refuse_open(open_questions, f"--to {to}")
-    parameters = kind.parameters(flat, answers)
-    return Gains(stage, drawing(flat), conversions(flat, answers), kind, parameters)
+    back = kind.parameters(flat, answers)
+    return Gains(stage, drawing(flat), conversions(flat, answers), kind, back.values, _lost(flat, back.held))
+
+
+def _lost(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
+    """Keys of [controller] that parameters have no place for: a filter once, and nothing that is 0 or a mere choice."""
+    before = f"{CONTROLLER}."
+    names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]
+    told = [name for name in names if name not in held and (not isinstance(flat[before + name], str))]
+    return tuple(dict.fromkeys(before + ".".join(name.split(".")[:2]) for name in told if not _within(name, held)))
+
+
+def _within(name: str, held: frozenset[str]) -> bool:
+    """Whether a key of a filter belongs to one that is held."""
+    return ".".join(name.split(".")[:2]) in held

@@ -14,7 +14,7 @@ from friso.stage.tables import FRICTION, Masses, ThereAndBack, friction_law
 
 
 @dataclass(frozen=True)
-class Question:
+class OpenQuestion:
     """What is asked for: its key, what it is, and an example of an answer as --set takes it."""
 
     key: str
@@ -27,7 +27,7 @@ class Question:
         return f"--set {self.key}={self.example}"
 
 
-class Answers:
+class UserAnswers:
     """What the user says besides a file: texts by key, as --set reads them."""
 
     def __init__(self, texts: Mapping[str, Any]) -> None:
@@ -61,10 +61,10 @@ class Answers:
         raise InputError(key, quoted(str(self.texts[key])), f"number and unit in quotes, in {units}", example)
 
 
-def of_the_machine(answers: Answers, kind: AxisKind = LINEAR, moved: bool = False) -> tuple[Question, ...]:
+def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = False) -> tuple[OpenQuestion, ...]:
     """What no drive knows of its machine and nobody has said yet: what moves, its friction, and, unless a file says how
-    it is `moved`, a move to try."""
-    asked: list[Question] = []
+    it is `moved`, a move to try. Raises InputError for a friction law that there is not."""
+    asked: list[OpenQuestion] = []
     if not {"masses.cart", "masses.stage"} & answers.texts.keys():
         asked += _of_table("masses", Masses, ("stage",), {"stage": "what moves"}, kind)
     model = str(answers.texts.get("friction.model", "lugre"))
@@ -84,12 +84,12 @@ def of_the_machine(answers: Answers, kind: AxisKind = LINEAR, moved: bool = Fals
 
 def _of_table(
     table: str, section: type[Section], names: Iterable[str], what: Mapping[str, str], kind: AxisKind
-) -> list[Question]:
+) -> list[OpenQuestion]:
     fields = {name: field.on(kind) for name, field in numeric_fields(section).items()}
-    return [Question(f"{table}.{name}", what[name], fields[name].written_example) for name in names]
+    return [OpenQuestion(f"{table}.{name}", what[name], fields[name].written_example) for name in names]
 
 
-def refuse_open(questions: Iterable[Question], origin: str) -> None:
+def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
     """Raises InputError with all that is open, in one list."""
     asked = list(questions)
     if asked:

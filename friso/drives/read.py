@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.drives.format import FORMATS, AsStage, AxisParameters, ParameterFormat
-from friso.drives.questions import Answers, refuse_open
+from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import Stage
@@ -41,7 +41,7 @@ def stage_from(path: Path, axis: str | None, told: Mapping[str, Any]) -> Drawn:
     kind, axes = read(path)
     chosen = _chosen(axes, axis, path)
     try:
-        answers = Answers(told)
+        answers = UserAnswers(told)
         asked = kind.questions(chosen, answers)
         refuse_open(asked, f"{path}, {chosen.name}")
         drawn = kind.stage(chosen, answers)

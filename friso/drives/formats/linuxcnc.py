@@ -13,8 +13,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, lacks, si
-from friso.drives.questions import Answers, Question, of_the_machine
+from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, Parameters, lacks, si
+from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 
@@ -27,7 +27,6 @@ ANGLES = {"deg": 0.017453292519943295, "degree": 0.017453292519943295, "rad": 1.
 """Machine units in metres and radians."""
 
 ROTARY = KINDS["rotary"]
-NEEDED = ("P",)
 NOT_CARRIED = {
     "FF0": "FF0 = {:g}, a force in proportion to the commanded position",
     "FF3": "FF3 = {:g}, of the commanded jerk",
@@ -36,6 +35,21 @@ NOT_CARRIED = {
     "MAX_ERROR_D": "MAX_ERROR_D = {:g}, the limit of the error's derivative",
 }
 MOST_LINES = 100_000
+
+HELD = frozenset(
+    {
+        "kp",
+        "ki",
+        "kd",
+        "viscous_feedforward",
+        "acceleration_feedforward",
+        "force_limit",
+        "integral_limit",
+        "error_deadband",
+    }
+)
+HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforward", "error_deadband"))
+"""Names in [controller] that the parameters hold; the velocity loop is the drive's."""
 
 
 def recognises(name: str, text: str) -> bool:
@@ -81,27 +95,27 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
     return sections
 
 
-def questions(axis: AxisParameters, answers: Answers) -> tuple[Question, ...]:
+def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """The machine, and what 1 of the output is. Raises InputError for a stepper, which has no loop around its force."""
     if any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values):
         raise InputError("", "a stepper: its steps are counted, not its position", "a servo axis, whose loop can hunt")
     kind = _kind(axis)
-    asked: list[Question] = []
+    asked: list[OpenQuestion] = []
     if _unit_of(axis) is None and UNIT not in answers:
         example = '"mm"' if kind == LINEAR else '"deg"'
-        asked.append(Question(UNIT, "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS", example))
+        asked.append(OpenQuestion(UNIT, "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS", example))
     if "SERVO_PERIOD" not in axis.machine and "drive.sample_time" not in answers:
-        asked.append(Question("drive.sample_time", "period of the servo thread", '"1 ms"'))
+        asked.append(OpenQuestion("drive.sample_time", "period of the servo thread", '"1 ms"'))
     if FORCE not in answers and "controller.kp" not in answers:
         what = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
         gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
         what += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
-        asked.append(Question(FORCE, what, FORCE_FIELD.on(kind).written_example))
+        asked.append(OpenQuestion(FORCE, what, FORCE_FIELD.on(kind).written_example))
     moved = "MAX_ACCELERATION" in axis.values and "MAX_VELOCITY" in axis.values
     return (*asked, *of_the_machine(answers, kind, moved))
 
 
-def stage(axis: AxisParameters, answers: Answers) -> AsStage:
+def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
     kind = _kind(axis)
     unit = _metres(axis, answers, kind)
@@ -131,7 +145,9 @@ def stage(axis: AxisParameters, answers: Answers) -> AsStage:
     return AsStage(tables, (*left, *more))
 
 
-def _torque(axis: AxisParameters, answers: Answers, kind: AxisKind, unit: float) -> tuple[dict[str, object], list[str]]:
+def _torque(
+    axis: AxisParameters, answers: UserAnswers, kind: AxisKind, unit: float
+) -> tuple[dict[str, object], list[str]]:
     """The table [controller] where the output is a force."""
     scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
     gain = {name: axis.number(name, 0.0) * scale for name in ("P", "I", "D", "FF1", "FF2")}
@@ -157,7 +173,7 @@ def _torque(axis: AxisParameters, answers: Answers, kind: AxisKind, unit: float)
 
 
 def _velocity(
-    axis: AxisParameters, answers: Answers, kind: AxisKind, unit: float
+    axis: AxisParameters, answers: UserAnswers, kind: AxisKind, unit: float
 ) -> tuple[dict[str, object], list[str]]:
     """The table [controller] where the output is the velocity that the drive follows; raises InputError for a D, for
     which a cascade has no place."""
@@ -194,7 +210,7 @@ def _unit_of(axis: AxisParameters) -> str | None:
     return None if name is None else str(name).lower()
 
 
-def _metres(axis: AxisParameters, answers: Answers, kind: AxisKind) -> float:
+def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:
     """The machine unit in metres or radians. Raises InputError for an unknown one."""
     units = LENGTHS if kind == LINEAR else ANGLES
     name = answers.choice(UNIT, tuple(units)) if UNIT in answers else _unit_of(axis)
@@ -203,16 +219,16 @@ def _metres(axis: AxisParameters, answers: Answers, kind: AxisKind) -> float:
     return units[name]
 
 
-def questions_back(flat: Flat, answers: Answers) -> tuple[Question, ...]:
+def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """The unit, and, of a controller that exerts a force, what an output of 1 makes."""
     kind = axis_of(flat)
-    asked = [Question(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
+    asked = [OpenQuestion(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
     if flat["controller.kind"] != "cascade":
-        asked.append(Question(FORCE, "force that an output of 1 makes", FORCE_FIELD.on(kind).written_example))
+        asked.append(OpenQuestion(FORCE, "force that an output of 1 makes", FORCE_FIELD.on(kind).written_example))
     return tuple(question for question in asked if question.key not in answers)
 
 
-def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
+def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     """The parameters of the `pid` component. Raises InputError for a controller that it is not."""
     kind = axis_of(flat)
     units = LENGTHS if kind == LINEAR else ANGLES
@@ -240,15 +256,16 @@ def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
     }
     if "controller.integral_limit" in flat and get("ki"):
         found["MAX_ERROR_I"] = get("integral_limit") / (get("ki") * unit)
-    return found
+    return Parameters(found, HELD)
 
 
-def _of_cascade(flat: Flat, unit: float) -> dict[str, float]:
+def _of_cascade(flat: Flat, unit: float) -> Parameters:
     """Those whose output is the velocity that a drive follows."""
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
     ahead = flat["controller.velocity_feedforward"]
     found = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0}
-    return {**found, "DEADBAND": flat.get("controller.error_deadband", 0.0) / unit}
+    found["DEADBAND"] = flat.get("controller.error_deadband", 0.0) / unit
+    return Parameters(found, HELD_OF_CASCADE)
 
 
 def text(found: Mapping[str, float]) -> str:

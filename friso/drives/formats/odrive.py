@@ -13,8 +13,8 @@ from math import inf, pi
 from typing import Any
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, lacks, si
-from friso.drives.questions import Answers, Question, of_the_machine
+from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, Parameters, lacks, si
+from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
 from friso.stage.controllers import FILTERS_KEY
@@ -34,6 +34,19 @@ POSITION_CONTROL, PASSTHROUGH, AHEAD = 3, 1, (3, 5)
 """Values of control_mode and input_mode; `AHEAD`, those in which the drive feeds its own reference forward."""
 
 MOST_KEYS = 100_000
+
+HELD = frozenset(
+    {
+        "kv",
+        "kp",
+        "velocity_integral_time",
+        "velocity_feedforward",
+        "acceleration_feedforward",
+        "force_limit",
+        "integral_limit",
+    }
+)
+"""Names in [controller] that the parameters hold; a velocity fed forward by the drive's own trajectories, or not."""
 
 
 def recognises(name: str, text: str) -> bool:
@@ -75,7 +88,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     return found
 
 
-def questions(axis: AxisParameters, answers: Answers) -> tuple[Question, ...]:
+def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """The machine, and what a turn of the motor moves. Raises InputError for an axis that controls no position."""
     mode = axis.number(f"{CONFIG}.control_mode", POSITION_CONTROL)
     if mode != POSITION_CONTROL:
@@ -86,12 +99,12 @@ def questions(axis: AxisParameters, answers: Answers) -> tuple[Question, ...]:
         kind, _ = answers.kind_of(TRAVEL, TRAVELS)
     else:
         what = 'what one turn of the motor moves; an angle on a rotary axis, "360 deg" without a gear'
-        asked.append(Question(TRAVEL, what, '"10 mm"'))
+        asked.append(OpenQuestion(TRAVEL, what, '"10 mm"'))
     moved = all(axis.given(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
     return (*asked, *of_the_machine(answers, kind, moved))
 
 
-def stage(axis: AxisParameters, answers: Answers) -> AsStage:
+def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
     kind, travel = answers.kind_of(TRAVEL, TRAVELS)
     force = 2 * pi / travel  # [N] for a torque of 1 N m
@@ -175,12 +188,12 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     return tuple(left)
 
 
-def questions_back(flat: Flat, answers: Answers) -> tuple[Question, ...]:
+def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """What a turn moves, where no transmission tells."""
     if TRAVEL in answers or _travel(flat) is not None:
         return ()
     return (
-        Question(TRAVEL, "what one turn of the motor moves", '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'),
+        OpenQuestion(TRAVEL, "what one turn of the motor moves", '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'),
     )
 
 
@@ -191,7 +204,7 @@ def _travel(flat: Flat) -> float | None:
     return flat.get("transmission.lead")
 
 
-def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
+def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     """The parameters of an axis. Raises InputError for a controller that is no P over P or PI."""
     name = "controller."
     if flat["controller.kind"] != "cascade":
@@ -215,19 +228,20 @@ def parameters(flat: Flat, answers: Answers) -> dict[str, float]:
         found[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
     if f"{name}force_limit" in flat:
         found[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
-    if (bandwidth := _loop_of_velocity(flat)) is not None:
-        found[f"{ENCODER}.bandwidth"] = bandwidth
-    return found
+    held = HELD if flat[f"{name}velocity_feedforward"] in (0.0, 1.0) else HELD - {"velocity_feedforward"}
+    if place := _loop_of_velocity(flat):
+        found[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
+        held |= {place.removeprefix(name)}
+    return Parameters(found, held)
 
 
-def _loop_of_velocity(flat: Flat) -> float | None:
-    """Bandwidth [rad/s] of the phase-locked loop that the filters of the velocity stand for; None where they do not."""
+def _loop_of_velocity(flat: Flat) -> str:
+    """The filter of the velocity that a phase-locked loop can stand for; empty where there is none."""
     places = [place for place in row_keys(flat, FILTERS_KEY) if flat[f"{place}.path"] == FEEDBACK]
     if len(places) != 1 or flat[f"{places[0]}.kind"] != "low_pass":
-        return None
+        return ""
     (place,) = places
-    double = flat[f"{place}.order"] == 2 and flat[f"{place}.damping_ratio"] == 1.0
-    return 2 * pi * flat[f"{place}.frequency"] if double else None
+    return place if flat[f"{place}.order"] == 2 and flat[f"{place}.damping_ratio"] == 1.0 else ""
 
 
 def text(found: Mapping[str, float]) -> str:

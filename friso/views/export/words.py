@@ -31,44 +31,9 @@ def notes(gains: Gains) -> list[str]:
         found.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission]).')
     if gains.kind is not None:
         found.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source}).")
-        left = lost(gains)
-        if left:
-            found.append(f"Not among them: {', '.join(left)}.")
+        if gains.lost:
+            found.append(f"Not among them: {', '.join(gains.lost)}.")
     return found
-
-
-def lost(gains: Gains) -> list[str]:
-    """What the stage has and the parameters have no place for."""
-    flat = gains.stage.flat()
-    names = (
-        "integral_deadband",
-        "integral_leak",
-        "integral_reset",
-        "standstill_factor",
-        "stiction_push",
-        "dither_amplitude",
-    )
-    left = [f"controller.{name}" for name in names if flat.get(f"controller.{name}")]
-    held = " ".join(gains.parameters or ())
-    taken = ["feedback"] if "encoder.config.bandwidth" in held else []
-    paths = [value for key, value in flat.items() if key.startswith("controller.filters.") and key.endswith(".path")]
-    filters = ["the filters"] if any(path not in taken for path in paths) else []
-    return [*left, *filters, *_feedforward(gains)]
-
-
-def _feedforward(gains: Gains) -> list[str]:
-    """Feedforwards that are in none of the parameters."""
-    flat, held = gains.stage.flat(), " ".join(gains.parameters or ())
-    in_file = {"coulomb_feedforward": "no", "viscous_feedforward": "FF1", "acceleration_feedforward": "FF2"}
-    if "inertia" in held:
-        in_file["acceleration_feedforward"] = "inertia"
-    elif flat["controller.kind"] == "cascade":
-        in_file = dict.fromkeys(in_file, "no")
-    if flat["controller.kind"] == "cascade":
-        in_file["viscous_feedforward"] = "no"
-    return [
-        f"controller.{name}" for name, place in in_file.items() if flat.get(f"controller.{name}") and place not in held
-    ]
 
 
 def _with_unit(value: tuple[float, str]) -> str:
