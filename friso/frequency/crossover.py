@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import PoleStability, controller, distance_to_lines, grid, plants, scan, stability_by_poles
+from friso.frequency.family import PoleStability, bare_loops, distance_to_lines, grid, scan, stability_by_poles
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 
@@ -133,8 +133,8 @@ def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
     """Least distance of the loop from -1, shape (crossovers, members)."""
     # frequencies that show the loop at all crossovers searched, always the same: the distance stays a smooth function
     omega = np.unique(np.concatenate([grid(_at(flat, np.array(end)), DENSITY) for end in searched(flat)]))
-    bare = plants(flat, members, omega) * DriveTiming.of(flat).transfer(omega)
-    shared = np.array([distance_to_lines(bare * controller(_at(flat, f), omega)) for f in crossover])
+    loops_of, held = bare_loops(flat, members, omega), DriveTiming.of(flat).transfer(omega)
+    shared = np.array([distance_to_lines(loops_of(_at(flat, f)) * held) for f in crossover])
     return np.minimum(shared, _stability(flat, members, crossover).resonant.reshape(shared.shape))
 
 

@@ -20,7 +20,7 @@ from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
 from friso.frequency.members import Members, joined, limit_cases
-from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
+from friso.frequency.parts import FORCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.system import Complex, System
 from friso.system import usable_cores
@@ -30,6 +30,9 @@ CHUNK = 256
 
 DENSITY = 35
 """Frequencies per decade at which all members are looked at, besides those about resonances of the limit cases."""
+
+FEW = 16
+"""Members whose whole plants are solved together, at all frequencies."""
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
@@ -164,20 +167,46 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """L at angular frequencies [rad/s], shape (members, k); of a sampled loop without the aliases of the plant."""
-    drive = DriveTiming.of(flat)
-    return plants(flat, members, omega) * controller(flat, omega) * drive.transfer(omega)
+    return bare_loops(flat, members, omega)(flat) * DriveTiming.of(flat).transfer(omega)
+
+
+def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Callable[[Mapping[str, Any]], Complex]:
+    """L without hold and delay for the keys of any controller, shape (members, k): what it moves is computed once."""
+    if shared_structure(flat).transmission is None:
+        bare = plants(flat, members, omega)
+        return lambda keys: bare * controller(keys, omega)
+    seen = _measured(flat, members, omega)
+    return lambda keys: (seen * _channels(keys, omega)).sum(axis=-1)
+
+
+def _measured(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
+    """Position and velocity measured over the force [m/N, m/(N s)], shape (members, k, 2): by the whole plant, whose
+    encoders may be on different sides of a transmission."""
+    answers = np.empty((len(members), len(omega), 2), complex)
+    for mask in (members.stuck, ~members.stuck):
+        for part in np.array_split(np.flatnonzero(mask), -(-int(mask.sum()) // FEW) or 1):
+            machine = plant(flat, members[part]).take((FORCE,), (STAGE, VELOCITY)) if len(part) else None
+            if machine is not None:
+                answers[part] = machine.at(1j * omega)[..., 0]
+    return answers
 
 
 def controller(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,); with loops at
-    several rates, the part of it that has the frequency of the deviation."""
+    """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
+    position, velocity = _channels(flat, omega).T
+    return position + 1j * omega * velocity
+
+
+def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
+    """Force over position and velocity measured [N/m, N s/m], its sign reversed, shape (k, 2); with loops at several
+    rates, the part of it that has the frequency of the position, of which the velocity is a difference."""
     drive = DriveTiming.of(flat)
     if drive.period > 1:
         lifted = controller_over_period(samples_controller(flat, 1, drive.period))
-        return -lifted.fundamental(omega * drive.sample_time)[0]
+        position = -lifted.fundamental(omega * drive.sample_time)[0]
+        return np.stack([position, np.zeros_like(position)], axis=1)
     s = drive.controller_s(omega)
-    answers = compensator(flat, 1).take((STAGE, VELOCITY, REFERENCE), ("force",)).at(s)[0, :, 0]
-    return -(answers[:, 0] + 1j * omega * answers[:, 1])
+    return -compensator(flat, 1).take((STAGE, VELOCITY), (FORCE,)).at(s)[0, :, 0]
 
 
 def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Complex:

@@ -101,8 +101,8 @@ def _started(moves: HuntingResult) -> list[str]:
     ]
     if moves.startable is not None:
         texts.append(
-            f"At {moves.startable.crossover:.3g} Hz no peaks are counted on rail "
-            f"{moves.rails[moves.startable.rail]:.0f} after the move, but released from "
+            f"At {moves.startable.crossover:.3g} Hz no peaks are counted{_rail(moves, moves.startable.rail, ' on')} "
+            "after the move, but released from "
             f"{with_unit(moves.startable.displacement, 'm')} the stage swings to the end: a run that rests does not "
             "prove that the stage cannot hunt."
         )
@@ -143,7 +143,12 @@ def _locked_and_free(moves: HuntingResult) -> Figure:
 
 
 def _on(moves: HuntingResult) -> str:
-    return f", rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else ""
+    return _rail(moves, moves.rail, ",")
+
+
+def _rail(moves: HuntingResult, number: int, before: str) -> str:
+    """A rail by its name, where there are several; a stage file without [rail] has one without a name."""
+    return f"{before} rail {moves.rails[number]:.0f}" if len(moves.rails) > 1 else ""
 
 
 def _reach(traces: list[Trace]) -> float:
@@ -205,7 +210,7 @@ def _startable(moves: HuntingResult) -> Figure:
     reach = _reach([startable.after_move, startable.after_release])
     return Figure(
         "hunting_started",
-        f"{startable.crossover:.3g} Hz, joint locked, rail {moves.rails[startable.rail]:.0f}: swinging once started",
+        f"{startable.crossover:.3g} Hz, joint locked{_rail(moves, startable.rail, ',')}: swinging once started",
         "The same machine twice.",
         (Panel("", TIME, Axis("Position minus reference", "m", (-reach, reach)), lines),),
     )
