@@ -6,18 +6,23 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 import friso
-from friso.equations.as_built import AsBuilt
+from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import numbers
 from friso.equations.structure import structure
-from friso.errors import InputError, StageError
-from friso.frequency.members import limit_cases, member
+from friso.errors import StageError
+from friso.frequency.crossover import limits, settled_members
+from friso.frequency.drive import DriveTiming
+from friso.frequency.family import loops, spectral_abscissa
+from friso.frequency.loops import response
+from friso.frequency.members import joined, limit_cases, member
 from friso.frequency.parts import plant
 from friso.hunting.cycle.hunting import cannot_hunt, hunting
 from friso.hunting.feeding import Decline, Feeding, dry_friction
 from friso.hunting.loop import unstable
 from friso.stage import Stage
 from friso.views.check.feeding_words import feeding_sentences
-from friso.virtual_rig.run import as_built_keys
+from friso.virtual_rig.run import run
+from friso.virtual_rig.task import own_motion
 
 LUGRE = {
     "model": "lugre",
@@ -37,6 +42,7 @@ SCREW = {
     "damping": "4e3 N*s/m",
     "backlash": "20 um",
 }
+BY_RATE = {"kind": "pid", "kp": "2e5 N/m", "kd": "8e3 N*s/m", "ki": "2e6 N/(m*s)", "derivative_on": "measurement"}
 BELT = {"mass": "40 kg", "stiffness": "2.5 N/um", "damping": "440 N*s/m", "backlash": "20 um"}
 
 
@@ -253,7 +259,34 @@ def test_what_feeds_it_is_told() -> None:
     assert len(feeding_sentences(Feeding(None, Decline(0.5, 0.3, False)))) == 2
 
 
-def test_a_drive_with_two_encoders_is_refused_where_one_is_sampled() -> None:
-    stage = machine(encoder={"position": "load", "velocity": "motor"})
-    with pytest.raises(InputError, match=r"one encoder for both"):
-        AsBuilt.of(as_built_keys(stage))
+@pytest.mark.parametrize(("position", "velocity"), [("load", "motor"), ("motor", "motor")])
+def test_a_drive_as_built_reads_its_encoders(position: str, velocity: str) -> None:
+    """Sampled fast, it moves as in continuous time, where each encoder is on its side."""
+    move = {"acceleration": "2 m/s^2", "acceleration_time": "10 ms", "return_at": "60 ms", "duration": "0.12 s"}
+    motion = {"kind": "there_and_back", **move}
+    sides = {"position": position, "velocity": velocity}
+    stage = machine(encoder=sides, controller=BY_RATE, motion=motion)
+    fast = stage.replace({"drive": {"sample_time": "20 us"}})
+    (recorded,) = run(fast, own_motion(fast), [1], 1e-3)
+    smooth = friso.simulate(stage, 1e-7, 1e-3)["position"].values
+    others = machine(encoder={**sides, "velocity": "load"}, controller=BY_RATE, motion=motion)
+    other = friso.simulate(others, 1e-7, 1e-3)["position"].values
+    count = min(smooth.size, recorded.true["position"].shape[1])
+    error = np.abs(recorded.true["position"][0, :count] - smooth[:count]).max()
+    assert error < 2e-6
+    assert np.abs(other[:count] - smooth[:count]).max() > 5 * error, "the side makes no difference"
+
+
+def test_bode_across_a_transmission() -> None:
+    """Loops of all states with encoders on both sides, sampled: as they are one by one; the fastest controller."""
+    drive = {"sample_time": "100 us", "delay": "100 us"}
+    stage = machine(encoder={"position": "load", "velocity": "motor"}, drive=drive, controller=BY_RATE)
+    flat, omega = stage.flat(), np.geomspace(1.0, 300.0, 7)
+    every = limit_cases(flat).values()
+    together = loops(flat, joined([*every]), omega)
+    one_by_one = [response(flat, case, DriveTiming.of(flat))(omega) for case in every]
+    assert together == pytest.approx(np.array(one_by_one), rel=0.03)  # but for the aliases of the plant
+    highest = limits(flat).highest_stable
+    assert highest is not None
+    edge = [spectral_abscissa(faster(flat, highest * f), settled_members(flat)).max() for f in (0.99, 1.01)]
+    assert edge[0] < 0 < edge[1]

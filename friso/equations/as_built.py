@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from friso.equations.structure import Structure, structure
-from friso.errors import InputError
 
 if TYPE_CHECKING:
     import sympy as sp
 
+    from friso.equations.blocks import Loop
     from friso.equations.model import Control, Model
 
 STATIC_FACTOR, COULOMB_FACTOR, MOTOR_FACTOR = PLACES = ("static_factor", "coulomb_factor", "motor_factor")
@@ -26,6 +26,12 @@ READING, COMMANDED = "reading", "commanded"
 """Names of what is held between samples that the drive logs: the position that its encoder reads [m], and the force
 [N] that it commands."""
 
+RATED = "seen_rated"
+"""The position at the encoder of the velocity, where that is another one."""
+
+OF_RATED = 2**50
+"""What its noise adds to the seed of the drive's, larger than any of these."""
+
 
 @dataclass(frozen=True)
 class AsBuilt:
@@ -39,15 +45,9 @@ class AsBuilt:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
-        """The form of a stage's drive, given as flat keys. Raises InputError for encoders on both sides of a
-        transmission."""
-        form, lags = structure(flat), "drive.current_bandwidth" in flat
-        if form.transmission and form.transmission.position != form.transmission.velocity:
-            actual = f"position at the {form.transmission.position}, velocity at the {form.transmission.velocity}"
-            expected = "one encoder for both: the drive as built samples a single one"
-            raise InputError("encoder.velocity", actual, expected, f'velocity = "{form.transmission.position}"')
+        """The form of a stage's drive, given as flat keys."""
         samples = round(flat.get("drive.velocity_samples", 1.0))
-        return cls(form, whole_samples(flat), lags, samples)
+        return cls(structure(flat), whole_samples(flat), "drive.current_bandwidth" in flat, samples)
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:
@@ -82,10 +82,14 @@ def as_built(form: AsBuilt) -> Model:
     from friso.equations.model import assemble, resets
     from friso.equations.sampled import SAMPLE_TIME
 
-    model = assemble(form.structure, lambda stage: _cable(stage.position, stage.velocity), _drive(form))
+    loops: list[Loop] = []
+    model = assemble(form.structure, lambda stage: _cable(stage.position, stage.velocity), _drive(form, loops))
     position, cart = model.stage.position, model.cart.position
+    seen = {state("seen"): position}
+    if loops[0].rated is not None:
+        seen[state(RATED)] = loops[0].rated
     places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))
-    clock = Clock(SAMPLE_TIME, key("drive.late"), {state("seen"): position}, places, tuple(map(state, TIMES)))
+    clock = Clock(SAMPLE_TIME, key("drive.late"), seen, places, tuple(map(state, TIMES)))
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in LEVELS}
     states = tuple(replace(part, derivative=_shaken(part).xreplace(varied)) for part in model.states)
     outputs = {n: replace(output, expression=output.expression.xreplace(varied)) for n, output in model.outputs.items()}
@@ -111,15 +115,16 @@ def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
     return -key("cable.stiffness") * position - key("cable.drag") * velocity
 
 
-def _drive(form: AsBuilt) -> Control:
-    """Everything between the encoder and the motor's force."""
+def _drive(form: AsBuilt, loops: list[Loop]) -> Control:
+    """Everything between the encoders and the motor's force; what it sees is added to `loops`."""
     from sympy import pi
 
-    from friso.equations.blocks import Controller, Loop
+    from friso.equations.blocks import Controller
     from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, state
     from friso.equations.model import loop_stiffness
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+        loops.append(loop)
         reading, command, sampled = _command(form, loop)
         commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
         held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command)]
@@ -149,9 +154,13 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
 
     assert form.structure.controller is not None
     drive = {name.split(".")[1]: key(name) for name in NEUTRAL}
-    noisy = state("seen") + drive["encoder_noise"] * gaussian(key("drive.seed"), TICK)
-    digit = drive["encoder_resolution"]
-    reading: Any = quantised(noisy, digit)
+
+    def read(seen: str, seed: sp.Expr) -> Any:
+        noisy = state(seen) + drive["encoder_noise"] * gaussian(seed, TICK)
+        return quantised(noisy, drive["encoder_resolution"])
+
+    reading = read("seen", key("drive.seed"))
+    rated = None if loop.rated is None else read(RATED, key("drive.seed") + OF_RATED)
     error = loop.error.xreplace({loop.position: reading})
     acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
@@ -160,7 +169,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
         rests=sp.Abs(error) < drive["integrator_deadband"],
         restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
     )
-    measured = replace(loop, error=error, position=reading)
+    measured = replace(loop, error=error, position=reading, rated=rated)
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, measured, form.velocity_samples, extra, rest)
     last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none

@@ -25,7 +25,8 @@ from friso.stage.standstill import FrictionSettings
 @dataclass(frozen=True)
 class Loop:
     """What a controller sees: error [m], position [m], its rate, that of the reference [m/s], its acceleration
-    [m/s^2], and its direction: 1 ahead, -1 back, 0 at rest."""
+    [m/s^2], and its direction: 1 ahead, -1 back, 0 at rest; and the position [m] at the encoder of the velocity, where
+    that is another one."""
 
     error: sp.Expr
     position: sp.Expr
@@ -33,6 +34,7 @@ class Loop:
     reference_velocity: sp.Expr
     reference_acceleration: sp.Expr = sp.S.Zero
     reference_direction: sp.Expr = sp.S.Zero
+    rated: sp.Expr | None = None
 
 
 def direction(*rates: sp.Expr) -> sp.Expr:
@@ -95,11 +97,12 @@ class Signal:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a controller acts on: error and position [m], velocity [m/s], acceleration [m/s^2] and direction (1, -1, 0)
-    of the reference."""
+    """What a controller acts on: error and position [m]; the position of which the velocity is the rate, from the same
+    encoder or another; velocity [m/s], acceleration [m/s^2] and direction (1, -1, 0) of the reference."""
 
     error: Signal
     position: Signal
+    rated: Signal
     reference_velocity: Signal
     reference_acceleration: Signal
     reference_direction: Signal
@@ -108,9 +111,11 @@ class Measured:
 def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
     """The signals of a loop, which are as large as a length [m], and change at a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
+    position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
     return Measured(
         Signal(loop.error, length, STEADY.error, drift, rate=loop.reference_velocity - loop.velocity),
-        Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity),
+        position,
+        position if loop.rated is None else replace(position, value=loop.rated),
         Signal(
             loop.reference_velocity,
             length * rate,
@@ -251,7 +256,8 @@ def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
     error, settings = seen.error, form.settings
     if form.law.feeds_back == "position":
         position = blocks.fed_back(seen.position)
-        seen = replace(seen, position=position, error=seen.error + seen.position - position)
+        rated = position if seen.rated is seen.position else seen.rated
+        seen = replace(seen, position=position, rated=rated, error=seen.error + seen.position - position)
     if settings.dead_zone:
         seen = replace(seen, error=blocks.dead_zone(seen.error))
     shares = form.law.declare(seen, blocks, form.variant)

@@ -135,8 +135,9 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     length, rate = _scales(structure, breakaway, chain.mass)
     stage, rated = chain.measured(structure)
     directions = direction(velocity, acceleration)  # as they are at the last corner: where it turns there is another
+    two = None if rated is stage else rated.position
     loop = Loop(
-        reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, directions
+        reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, directions, two
     )
     form = structure.controller
     if control is None and form is not None:

@@ -124,7 +124,7 @@ class Cascade(ControllerSection):
             command = blocks.handed_on(command, "command")
         integral = blocks.nothing
         with blocks.loop("velocity"):
-            velocity = blocks.derivative(measured.position, "position")
+            velocity = blocks.derivative(measured.rated, "position")
             if variant.filtered:
                 velocity = blocks.low_pass(velocity, blocks.key("velocity_filter"), "velocity")
             velocity = blocks.fed_back(velocity)

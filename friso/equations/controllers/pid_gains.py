@@ -96,7 +96,7 @@ class PidGains(Pid):
         derivative = {
             "none": lambda: blocks.nothing,
             "error": lambda: blocks.derivative(measured.error, "error", lag) * kd,
-            "measurement": lambda: -(blocks.derivative(measured.position, "position", lag) * kd),
+            "measurement": lambda: -(blocks.derivative(measured.rated, "position", lag) * kd),
         }
         shares = {
             "p": measured.error * kp,
