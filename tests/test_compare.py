@@ -16,6 +16,8 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 from friso.cli.output import MARKER
+from friso.equations.structure import structure
+from friso.errors import InputError
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
@@ -26,13 +28,14 @@ from friso.studies.compare import measures, study
 from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
+from friso.studies.compare.settings import SETTINGS, settings_named
 from friso.studies.compare.statistics import difference, median
 from friso.studies.compare.study import Comparison, Result, compare
 from friso.studies.shares import share
 from friso.views.compare.document import compare_document
 from friso.views.compare.figures import figures
 from friso.views.compare.page import page
-from friso.views.compare.words import conclusion, paired_rows, sentences, table_rows
+from friso.views.compare.words import _setting, conclusion, paired_rows, sentences, table_rows
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
@@ -488,3 +491,21 @@ def test_bad_input(tmp_path: Path, given: list[object], refused: Refused) -> Non
 def test_no_controller_no_comparison(built: Stage, refused: Refused) -> None:
     with refused("controller"):
         built.replace({"controller": {"kind": "pid"}})
+
+
+@pytest.mark.parametrize("name", SETTINGS)
+def test_a_setting_against_friction_is_one_that_the_stage_can_have(name: str) -> None:
+    """Sized for the machine: keys that are read again, and words with the numbers."""
+    stage = load(EXAMPLE)
+    (setting,) = settings_named((name,))
+    numbers = setting.numbers(stage.flat(), 1e-6)
+    chosen = stage.with_numbers(numbers)
+    assert {key: chosen.flat()[key] for key in numbers} == pytest.approx(numbers)
+    assert structure(chosen.flat()) != structure(stage.flat())
+    assert _setting(Option(setting.letter, chosen))
+
+
+def test_settings_that_are_asked_for_are_tried() -> None:
+    assert [setting.letter for setting in settings_named(("all",))] == list("hijklm")
+    with pytest.raises(InputError, match="--also leak"):
+        settings_named(("leek",))

@@ -171,7 +171,8 @@ def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Compl
 
 
 def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Callable[[Mapping[str, Any]], Complex]:
-    """L without hold and delay for the keys of any controller, shape (members, k): what it moves is computed once."""
+    """L without hold and delay at angular frequencies (k,) [rad/s], for the keys of any controller: shape (members, k);
+    what it moves is computed once."""
     if shared_structure(flat).transmission is None:
         bare = plants(flat, members, omega)
         return lambda keys: bare * controller(keys, omega)

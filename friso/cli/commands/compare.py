@@ -38,6 +38,14 @@ Within = Annotated[
     str | None,
     typer.Option("--within", metavar="LENGTH", help="Deviation that counts as in position; 1 um if not given."),
 ]
+Also = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--also",
+        metavar="SETTING",
+        help="Also a setting of drives against friction: limit, leak, hysteresis, standstill, push, dither, or all.",
+    ),
+]
 
 
 def compare(
@@ -46,6 +54,7 @@ def compare(
     machines: Machines = 2000,
     seed: Seed = 1,
     within: Within = None,
+    also: Also = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -61,7 +70,7 @@ def compare(
     target = output_folder("compare", out, overwrite, [stage_file])
     files = []
     with ProgressBar() as progress:
-        comparison = compared(stage, machines, seed, tolerance, correlations, progress)
+        comparison = compared(stage, machines, seed, tolerance, correlations, progress, tuple(also or ()))
         if target is not None:
             from friso.views.compare.page import compare_files
 

@@ -1,4 +1,4 @@
-"""The seven ways to settle a machine: settings of its controller, a joint, or both."""
+"""The ways to settle a machine: settings of its controller, a joint, or both."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from friso.frequency.crossover import WANTED, limits
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.studies.compare.machines import Machines
+from friso.studies.compare.settings import SETTINGS, Setting
 
 DEADBAND = 0.5
 """Deadband of the integrator, in tolerances for being in position: our choice. It rests while the stage is in position,
@@ -32,6 +33,7 @@ NAMES = {
     "e": "reset",
     "f": "feedforward",
     "g": "isolator, faster",
+    **{setting.letter: setting.name for setting in SETTINGS.values()},
 }
 
 JOINT: tuple[str, ...] = ("c", "g")
@@ -55,12 +57,12 @@ class Option:
     @property
     def loop(self) -> str:
         """The option whose linear loop it has: rests of the integrator and feedforward are no part of that."""
-        return "a" if self.letter in "def" else self.letter
+        return self.letter if self.letter in "abcg" else "a"
 
 
 @dataclass(frozen=True)
 class CompareOptions:
-    """Those that the stage can have, a to g; why others are left out; and the deadband of the integrator [m]."""
+    """Those that the stage can have; why others, by letter, are left out; and the deadband of the integrator [m]."""
 
     options: tuple[Option, ...]
     left_out: Mapping[str, str]
@@ -78,8 +80,8 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     return {**flat, **{key: ratio * flat[key] for key in map(law.key, law.loop_gain)}, "drive.delay": late}
 
 
-def options(machines: Machines, within: float) -> CompareOptions:
-    """The options of machines that are to be in position `within` a tolerance [m]."""
+def options(machines: Machines, within: float, also: tuple[Setting, ...] = ()) -> CompareOptions:
+    """The options of machines that are to be in position `within` a tolerance [m], and some settings `also`."""
     stage = machines.stage
     variants = stage.variants()
     locked, free = variants.get("locked", stage), variants.get("free")
@@ -100,6 +102,12 @@ def options(machines: Machines, within: float) -> CompareOptions:
         left_out["f"] = "the stage file has neither Coulomb nor viscous friction"
     if free:
         listed += _faster("g", free, left_out)
+    for setting in also:
+        if setting.integral and not _integrates(stage):
+            left_out[setting.letter] = "the controller does not integrate"
+        else:
+            numbers = setting.numbers(locked.flat(), within)
+            listed.append(Option(setting.letter, locked.with_numbers(numbers)))
     return CompareOptions(tuple(listed), dict(sorted(left_out.items())), deadband)
 
 

@@ -23,6 +23,7 @@ from friso.studies.compare.measures import (
     measured,
 )
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
+from friso.studies.compare.settings import settings_named
 from friso.studies.compare.statistics import EstimatedValue, difference, median
 from friso.studies.shares import Share, share
 from friso.virtual_rig.run import Recorded, run
@@ -172,17 +173,20 @@ def compare(
     within: float = 1e-6,
     correlations: Correlations | None = None,
     progress: Progress = silent,
+    also: tuple[str, ...] = (),
 ) -> Comparison:
-    """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position.
+    """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
+    named `also` of the settings against friction (`friso.studies.compare.settings`).
 
     Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
     """
     if not 0 < within < np.inf:
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
+    settings = settings_named(also)
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     corner = _corner(machines.stage)
     progress(0, 1, "how fast the controller may be")
-    tried = options(machines, within)
+    tried = options(machines, within, settings)
     work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(tried.options))
     results: list[Result] = []
     for option in tried.options:

@@ -34,6 +34,12 @@ LINES: dict[str, tuple[str, Dash]] = {
     "e": (PINK, "dashed"),
     "f": (SKY, "dashed"),
     "g": (GREEN, "solid"),
+    "h": (BLUE, "dotted"),
+    "i": (VERMILLION, "dotted"),
+    "j": (ORANGE, "dotted"),
+    "k": (PINK, "dotted"),
+    "l": (SKY, "dotted"),
+    "m": (GREEN, "dotted"),
 }
 """Colour and dash of the options."""
 

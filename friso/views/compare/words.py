@@ -48,6 +48,12 @@ PROSE = {
     "e": "the reset",
     "f": "feedforward",
     "g": "isolator and faster controller",
+    "h": "the limit of the integral",
+    "i": "the leak",
+    "j": "the deadband with hysteresis",
+    "k": "the lower gain at standstill",
+    "l": "the push",
+    "m": "the dither",
 }
 
 
@@ -78,7 +84,30 @@ def _about(option: Option, comparison: Comparison) -> str:
         "drawn for each machine",
         "g": _bandwidth(option, comparison),
     }
-    return f"{joint}; {meanings[option.letter]}"
+    return f"{joint}; {meanings.get(option.letter) or _setting(option)}"
+
+
+def _setting(option: Option) -> str:
+    """A setting against friction, with its numbers."""
+    flat = option.stage.flat()
+
+    def shown(name: str, unit: str) -> str:
+        return with_unit(flat[f"controller.{name}"], unit)
+
+    if option.letter == "h":
+        return f"the force that an integral holds stays below {shown('integral_limit', 'N')}"
+    if option.letter == "i":
+        return f"the integral leaks below {shown('integral_leak', 'Hz')}"
+    if option.letter == "j":
+        enter, leave = shown("integral_deadband", "m"), shown("integral_deadband_exit", "m")
+        return f"the integrator pauses from an error of {enter} on, until it is {leave}"
+    if option.letter == "k":
+        factor, window = shown("standstill_factor", ""), shown("standstill_window", "m")
+        return f"all gains times {factor} while the error is below {window}"
+    if option.letter == "l":
+        push, window = shown("stiction_push", "N"), shown("stiction_push_window", "m")
+        return f"a force of {push} towards the reference while that rests and the error is above {window}"
+    return f"a sinusoidal force of {shown('dither_amplitude', 'N')} at {shown('dither_frequency', 'Hz')}"
 
 
 def _bandwidth(option: Option, comparison: Comparison) -> str:
