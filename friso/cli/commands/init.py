@@ -50,7 +50,9 @@ def init(
     """
     told = dict(parse_set(text) for text in overrides or [])
     if source is None and (axis is not None or told):
-        raise InputError("--set" if told else "--axis", "no --from", "a parameter file that it is about", "--from machine.ini")
+        raise InputError(
+            "--set" if told else "--axis", "no --from", "a parameter file that it is about", "--from machine.ini"
+        )
     path = Path("spec.toml") if spec_of is not None and path == STAGE else path
     refuse_device("STAGE.toml", path)
     if path.exists() and not overwrite:
