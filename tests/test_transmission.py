@@ -1,5 +1,7 @@
 """A screw or belt between motor and load, with encoders on either side: against models written by hand."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -20,6 +22,7 @@ from friso.hunting.cycle.hunting import cannot_hunt, hunting
 from friso.hunting.feeding import Decline, Feeding, dry_friction
 from friso.hunting.loop import unstable
 from friso.stage import Stage
+from friso.views.bode.words import caveats
 from friso.views.check.feeding_words import feeding_sentences
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import own_motion
@@ -290,3 +293,10 @@ def test_bode_across_a_transmission() -> None:
     assert highest is not None
     edge = [spectral_abscissa(faster(flat, highest * f), settled_members(flat)).max() for f in (0.99, 1.01)]
     assert edge[0] < 0 < edge[1]
+
+
+def test_what_bode_says_of_a_backlash() -> None:
+    said = " ".join(caveats(SimpleNamespace(stage=machine(), limits={})))  # type: ignore[arg-type]
+    assert "one flank" in said
+    without = machine(transmission={**SCREW, "backlash": "0 um"})
+    assert not caveats(SimpleNamespace(stage=without, limits={}))  # type: ignore[arg-type]

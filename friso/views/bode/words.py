@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth
+from friso.equations.structure import structure
 from friso.frequency.bode import Bode, Unstable
 from friso.frequency.crossover import WANTED, Limits
 from friso.frequency.margins import Margins
@@ -18,6 +19,12 @@ from friso.views.bode.table import growth
 from friso.views.drawing.prefixes import listed, range_with_unit, window_with_unit, with_unit
 
 SETTLED = "the limit cases, and stuck under any bias force"
+
+
+BACKLASH = (
+    "All this is for a load that stays on one flank of the backlash; friso check says whether the loop, however stable "
+    "there, swings across it."
+)
 
 
 def sentences(bode: Bode) -> list[str]:
@@ -77,10 +84,12 @@ def crossovers(bode: Bode) -> dict[str, str]:
 
 
 def caveats(bode: Bode) -> list[str]:
-    """That stability does not go on for ever, where the search found no end."""
+    """That a loop is looked at on one flank of a backlash; that stability does not go on for ever, where the search
+    found no end."""
     ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
+    flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
     if not ends:
-        return []
+        return flanks
     drive = bode.stage.drive
     timed = drive is not None and drive.sample_time is not None
     causes = [] if timed else ["sampling (drive.sample_time)"]
@@ -88,8 +97,9 @@ def caveats(bode: Bode) -> list[str]:
     half = ", half the sampling frequency" if timed and _crossing(bode) else ""
     end, causes = with_unit(max(ends), _unit(bode)), listed([*causes, "modes"], "and")
     return [
+        *flanks,
         f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes}, which the "
-        "stage file leaves out, set a lower limit."
+        "stage file leaves out, set a lower limit.",
     ]
 
 
