@@ -99,7 +99,7 @@ def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) 
 @pytest.fixture(scope="module")
 def over_friction() -> Plane:
     axes = [KeyRange("friction.static", 1.0, 6.0, unit="N"), KeyRange("friction.coulomb", 0.3, 2.5, unit="N")]
-    return plane(Space.of(AT_8_HZ, axes), nodes=9)
+    return plane(Space.of(AT_8_HZ, axes), nodes=6)
 
 
 def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> None:

@@ -224,7 +224,8 @@ def test_sampled_blocks_are_the_difference_equations() -> None:
     force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, r, sp.S.Zero, way), 1)
     parts = (force, *(number.update for number in held))
     keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
-    step_once = sp.lambdify([e, y, r, *keys, *(number.symbol for number in held)], parts, [CLIP, "math"])
+    arguments = [e, y, r, *keys, *(number.symbol for number in held)]
+    step_once = sp.lambdify(arguments, parts, [CLIP, "math"], cse=True)
     passed = {state("position_before_1")}
     kept = [reading[0] if number.symbol in passed else 0.0 for number in held]
     forces = []
