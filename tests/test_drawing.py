@@ -9,7 +9,6 @@ import subprocess
 import sys
 from dataclasses import replace
 
-import matplotlib
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -226,7 +225,7 @@ def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
         (tmp_path / seed / "matplotlibrc").write_text("font.size: 30\n" if seed == "2" else "")
         environment = {"PYTHONHASHSEED": seed, "MATPLOTLIBRC": str(tmp_path / seed), "HOME": str(tmp_path)}
         environment |= {"PYTHONPATH": str(request.config.rootpath), "PATH": "/usr/bin:/bin"}
-        environment |= {"MPLCONFIGDIR": matplotlib.get_cachedir()}  # its list of fonts takes a while to make
+        environment |= {"MPLCONFIGDIR": str(tmp_path / "cache")}
         done = subprocess.run(
             [sys.executable, "-c", code],
             env=environment,
