@@ -122,7 +122,7 @@ class Search:
             cost,
             [(0.0, 1.0)] * variables,
             maxiter=self.budget.generations - 1,
-            init=start,
+            init=start,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
             tol=0.01,
             rng=SEED,
             polish=False,

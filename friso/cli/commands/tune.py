@@ -112,7 +112,7 @@ def _goal(
     from friso.cure.goal import Goal
 
     if only is not None and only == keep:
-        raise InputError("--keep", keep, f"something else than --only {only}, or nothing is left to change", "")
+        raise InputError("--keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
 
     def read(option: str, text: str | None, unit: str, example: str) -> float | None:
         quantity = Quantity(unit, positive, example).on(stage.axis_kind)

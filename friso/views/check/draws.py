@@ -58,8 +58,8 @@ def _sentence(fates: Fates, draws: Draws) -> str:
         f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}."
     ]
     if failed:
-        draws, them = ("draw", "it") if failed == 1 else ("draws", "them")
-        sentences.append(f"{failed} {draws} failed; the intervals cover both outcomes for {them}.")
+        noun, pronoun = ("draw", "it") if failed == 1 else ("draws", "them")
+        sentences.append(f"{failed} {noun} failed; the intervals cover both outcomes for {pronoun}.")
     if keys:
         key, separation = next(iter(keys.items()))
         sentences.append(
