@@ -18,8 +18,9 @@ from friso.frequency.family import loops, spectral_abscissa
 from friso.frequency.loops import response
 from friso.frequency.members import joined, limit_cases, member
 from friso.frequency.parts import plant
+from friso.hunting import feeding as hunting_feeding
 from friso.hunting.cycle.hunting import cannot_hunt, hunting
-from friso.hunting.feeding import Decline, Feeding, dry_friction
+from friso.hunting.feeding import Decline, Feeding, dry_friction, feeding
 from friso.hunting.loop import unstable
 from friso.stage import Stage
 from friso.views.bode.words import caveats
@@ -249,6 +250,24 @@ def test_an_integrator_across_a_backlash_hunts_without_friction(backlash_alone: 
 
 def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> None:
     assert cannot_hunt(backlash_alone.replace({"transmission.backlash": "0 um"}))
+
+
+def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
+    """All motions shrink with it, so that no small share of it ends them."""
+    found = feeding(backlash_alone)
+    assert found is not None
+    assert (found.friction, found.backlash.needed, found.backlash.gone) == (None, True, 0.0)
+    (sentence,) = feeding_sentences(found)
+    assert sentence.startswith("The backlash feeds it")
+
+
+def test_what_feeds_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A belt with play and little friction: without friction it swings on, without play it rests."""
+    monkeypatch.setattr(hunting_feeding, "SHARES", np.array([0.001]))
+    keys = {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2}
+    little = {**LUGRE, "static": "3 N", "coulomb": "2 N"}
+    found = feeding(machine(transmission=BELT, friction=little, motor_friction=None, controller=keys))
+    assert found == Feeding(Decline(0.001, None, True), Decline(1.0, 0.001, True))
 
 
 def test_what_feeds_it_is_told() -> None:

@@ -60,11 +60,12 @@ def _cascade(key: Mapping[str, Any]) -> str:
     if key["velocity_feedforward"]:
         place = canvas.junction()
         canvas.put(BELOW, place, "|")
-        canvas.put(LAST, place, "f dr/dt")
+        canvas.put(LAST, place - 6, "f dr/dt")
     place = canvas.junction()
     how = ", filtered" if key["velocity_filter"] or _filters(key, "feedback") else ""
     canvas.put(BELOW, place, "| -")
-    canvas.put(LOWEST if key["velocity_feedforward"] else LAST, place, f"dy/dt{how}")
+    canvas.put(LAST, place, "|")
+    canvas.put(LOWEST, place, f"dy/dt{how}")
     on_error, integral = key["proportional_on"] == "error", "velocity_integral_time" in key
     velocity = "kp (1 + 1/(Tn s))" if integral and on_error else "kp/(Tn s)" if integral else "kp"
     canvas.add(f"--[ {velocity} ]")

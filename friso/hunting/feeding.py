@@ -16,19 +16,20 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.loop import unstable
 from friso.stage import Stage
 from friso.stage.stage import declared_keys
 from friso.stage.transmission import BACKLASH, MOTOR_FRICTION
 
-SHARES = np.array([0.7, 0.5, 0.3, 0.1, 0.03, 0.01, 0.003, 0.001])
+SHARES = np.array([0.5, 0.1, 0.01, 0.001])
 """Of what feeds, the last of which stands for nothing."""
 
 
 @dataclass(frozen=True)
 class Decline:
     """What becomes of hunting as one cause is scaled down: the least share at which something `lasts` that attracts,
-    and the greatest below it at which nothing does, `gone` (None: something attracts down to the last share); and
-    whether all of this is `certain`."""
+    and the greatest below it at which nothing does, `gone` (None: something attracts down to the last share; 0: it
+    shrinks in proportion to its cause, and is gone without that alone); and whether all of this is `certain`."""
 
     lasts: float
     gone: float | None
@@ -54,7 +55,16 @@ def feeding(stage: Stage) -> Feeding | None:
     if not structure(flat).plays:
         return None
     dry = dry_friction(flat)
-    return Feeding(_decline(flat, dry) if dry else None, _decline(flat, (BACKLASH,)))
+    if not dry:
+        return Feeding(None, _without_friction(stage))
+    return Feeding(_decline(flat, dry), _decline(flat, (BACKLASH,)))
+
+
+def _without_friction(stage: Stage) -> Decline:
+    """What becomes of a stage without dry friction as its backlash goes: all motions are as much smaller as that is, so
+    that nothing changes until it is gone, and with it all that is not linear."""
+    rests = not unstable(stage.replace({BACKLASH: None}))
+    return Decline(lasts=float(SHARES[-1]), gone=0.0 if rests else None, certain=True)
 
 
 def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:

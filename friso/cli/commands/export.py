@@ -75,7 +75,7 @@ def _print(gains: Gains) -> None:
     if gains.parameters:
         print(gains.text)
     for note in notes(gains):
-        print_wrapped(note)
+        print_wrapped(f"note: {note}")
 
 
 def listed_formats() -> list[tuple[str, str]]:

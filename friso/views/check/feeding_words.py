@@ -25,6 +25,8 @@ def feeding_sentences(feeding: Feeding) -> list[str]:
 
 def _course(name: str, decline: Decline) -> str:
     """What becomes of it as one of both is scaled down."""
+    if decline.gone == 0:
+        return f"it shrinks in proportion to the {name}, and is gone without it"
     if decline.gone is None:
         return f"it lasts with {decline.lasts:.1%} of the {name}"
     return f"it lasts with {decline.lasts:.3g} times the {name} and is gone with {decline.gone:.3g} times"

@@ -26,13 +26,13 @@ def notes(gains: Gains) -> list[str]:
     """What to know of the numbers."""
     found = []
     if not gains.conversions:
-        found.append("This controller is not one of friso's own: its gains have no other units than those of its file.")
+        found.append("This controller is not one of friso's own: its gains have no other units than those of its file")
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
-        found.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission]).')
+        found.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
     if gains.kind is not None:
-        found.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source}).")
+        found.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source})")
         if gains.lost:
-            found.append(f"Not among them: {', '.join(gains.lost)}.")
+            found.append(f"Not among them: {', '.join(gains.lost)}")
     return found
 
 
