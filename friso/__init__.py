@@ -12,6 +12,7 @@ from friso.stage import Stage, load, loads, save
 from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:
+    from friso.cure.sensitivities import Sensitivities, sensitivity
     from friso.engine.simulate import simulate
     from friso.frequency.analysis import linear
     from friso.frequency.bode import Bode, bode
@@ -43,6 +44,8 @@ _LAZY = {
     "member": "friso.frequency.members",
     "Members": "friso.frequency.members",
     "plant_response": "friso.frequency.describing.response",
+    "sensitivity": "friso.cure.sensitivities",
+    "Sensitivities": "friso.cure.sensitivities",
     "tuning": "friso.frequency.tuning",
     "Tuning": "friso.frequency.tuning",
     "boundary": "friso.studies.boundary",
@@ -57,6 +60,7 @@ __all__ = [
     "LogError",
     "Members",
     "Samples",
+    "Sensitivities",
     "SpecError",
     "Stage",
     "StageError",
@@ -77,6 +81,7 @@ __all__ = [
     "plant_response",
     "read_store",
     "save",
+    "sensitivity",
     "simulate",
     "sweep",
     "tuning",

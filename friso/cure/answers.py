@@ -97,9 +97,11 @@ class Cure:
     @property
     def sure(self) -> Sure:
         """Whether it works: all was verified, or not."""
+        if self.interrupted:
+            return "unsure"
         if self.stage is None:
             return "does not work"
-        return "unsure" if self.doubts or self.interrupted else "works"
+        return "unsure" if self.doubts else "works"
 
 
 @np.errstate(all="ignore")

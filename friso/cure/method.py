@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from friso.cure.goal import Goal
 from friso.cure.machines import TRAVEL, Fleet, drawn
 from friso.cure.relax import Relaxed, relaxations
 from friso.cure.search import Budget, Search
+from friso.cure.sensitivities import Sensitivities, edge_sensitivities
 from friso.cure.ways import WayOut, ways
 from friso.cure.window import windows
 from friso.engine.kernel import KernelRequest, kernels
@@ -35,7 +36,8 @@ FRESH = 1000
 @dataclass(frozen=True)
 class Advice:
     """The answers, those that change least first, for a stage that was checked and measured itself (`present`); the
-    bandwidths with which it keeps its margin; what to relax where nothing works; whether it was interrupted."""
+    bandwidths with which it keeps its margin; what its edge of hunting depends on; what to relax where nothing works;
+    whether it was interrupted."""
 
     stage: Stage
     goal: Goal
@@ -47,6 +49,7 @@ class Advice:
     machines: Fleet
     seed: int
     interrupted: bool = False
+    sensitivities: Sensitivities | None = None
 
     @property
     def needed(self) -> bool:
@@ -92,10 +95,11 @@ def tune(
     case, present = verified(ideal), measure(ideal, fresh, goal, stage)
     answers: list[Cure] = []
     relaxed: tuple[Relaxed, ...] = ()
-    interrupted = False
+    interrupted, searches = False, list[Search]()
     try:
         for way in listed:
             search = Search(way, goal, machines, stage, budget, report)
+            searches = [search]
             answers.append(Cure(way, None, None, None, (), interrupted=True))  # as long as it is not there
             answers[-1] = _answer(search, fresh, stage, answers)
             report.after(_steps(way, budget))
@@ -104,6 +108,7 @@ def tune(
             relaxed = relaxations(answers, goal, machines)
     except KeyboardInterrupt:
         interrupted = True
+        answers[-1:] = [_so_far(search, found) for search, found in zip(searches, answers[-1:], strict=True)]
     return Advice(
         ideal,
         goal,
@@ -115,6 +120,7 @@ def tune(
         fresh,
         seed,
         interrupted,
+        None if interrupted else edge_sensitivities(ideal, case.judgement.margin),
     )
 
 
@@ -148,6 +154,18 @@ def _answer(search: Search, fresh: Fleet, drive: Stage, answers: list[Cure]) -> 
         if number + 1 == TRIES:
             break
     return unsure or Cure(way, None, None, None, (), (), search.settings, search.attracted)
+
+
+def _so_far(search: Search, found: Cure) -> Cure:
+    """What is known of a way whose search was interrupted: its best settings so far, not verified."""
+    if not found.interrupted or not search.tried:
+        return found
+    settings = search.settings
+    best = int(settings.cost(search.goal).argmin())
+    if any(broken[best] for broken in settings.broken(search.goal).values()):
+        return found
+    shares = settings.shares[best]
+    return replace(found, stage=search.way.tuned(shares), settings=settings, shares=shares)
 
 
 def _moves(stage: Stage) -> None:

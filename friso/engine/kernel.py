@@ -167,12 +167,14 @@ class Kernel:
 
 @dataclass(frozen=True)
 class KernelRequest:
-    """Which kernel: for what, with variational equations or without, by the named method, in so many lanes."""
+    """Which kernel: for what, with variational equations or without, by the named method, in so many lanes. The
+    deviations of variational equations may be `along` keys of the stage file too."""
 
     structure: Form
     variational: bool = False
     method: str = "Rodas5P"
     lanes: int = LANES
+    along: tuple[str, ...] = ()
 
     @property
     def sections(self) -> tuple[type[Section], ...]:
@@ -190,19 +192,27 @@ class KernelRequest:
             words.insert(0, "rigid stage" if form.joint == "rigid" else f"{form.joint} joint")
             words += [form.controller.kind] if form.controller else []
         words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
-        return ", ".join([*words, *(["variational equations"] if self.variational else [])])
+        words += ["variational equations"] if self.variational else []
+        return ", ".join([*words, *([f"along {len(self.along)} keys"] if self.along else [])])
 
 
 _CIRCUMSTANCES = {Imposed: "imposed motion", Driven: "following a log", AsBuilt: "drive as built"}
 """What a form is for that is not a stage by itself, for people."""
 
 
-def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
+def kernel(
+    structure: Form,
+    variational: bool = False,
+    method: str = "Rodas5P",
+    lanes: int = LANES,
+    along: tuple[str, ...] = (),
+) -> Kernel:
     """The kernel for a form, stepping by the named method in so many lanes.
 
-    A variational one carries a small deviation beside every state (`friso.equations.variational`).
+    A variational one carries a small deviation beside every state, which may be `along` keys of the stage file too
+    (`friso.equations.variational`).
     """
-    return kernels([KernelRequest(structure, variational, method, lanes)])[0]
+    return kernels([KernelRequest(structure, variational, method, lanes, along)])[0]
 
 
 def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:

@@ -7,7 +7,7 @@ the saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chap
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import cast
 
@@ -15,16 +15,26 @@ import sympy as sp
 from mpmath import mp
 from sympy import prime
 
-from friso.equations.component import TIME, Kink, Role, State, Switch, state
+from friso.equations.component import TIME, Kink, Role, State, Switch, key, state
 from friso.equations.model import Model
 
 PREFIX = "small_"
 """How the names of the deviations begin."""
 
 
-def variational(model: Model) -> Model:
-    """The model with a deviation beside each state, the states first; it takes no part in the control of the step."""
-    small = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
+def along(name: str) -> str:
+    """The parameter that holds by how much a key differs on the motion beside."""
+    return f"along.{name}"
+
+
+def variational(model: Model, keys: Sequence[str] = ()) -> Model:
+    """The model with a deviation beside each state, the states first; it takes no part in the control of the step.
+
+    The motion beside may be that of a stage some of whose `keys` differ, each by its parameter `along` (times the unit
+    of the deviation): then the deviations are the sensitivities to these keys.
+    """
+    beside = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
+    small = beside | {key(name): key(along(name)) for name in keys}
     deviations = tuple(
         State(
             small[part.symbol], _along(part.derivative, small), part.unit, part.scale, Role.DEVIATION, controlled=False

@@ -140,10 +140,11 @@ def _correlations(path: Path, stage: Stage) -> Correlations:
 
 
 def _print(tuning: Advice, files: Sequence[Path]) -> None:
+    from friso.views.tune.sensitivity_words import sensitivity_sentences
     from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
 
     print_answer([*answer(tuning), *failing(tuning)], tuning.stage.name, COLUMNS, rows(tuning))
-    for sentence in (*window_lines(tuning), *assumptions(tuning)):
+    for sentence in (*window_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)):
         print_wrapped(sentence)
     print_written(files)
     for file in files:

@@ -149,13 +149,15 @@ class Ensemble:
         rtol: float,
         variational: bool = False,
         with_modes: bool = False,
+        along: tuple[str, ...] = (),
         **run_options: Any,
     ) -> Results:
         """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`. Modes that remember are
-        those in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too."""
+        those in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too.
+        Deviations may be `along` keys (see `KernelRequest`), by what the flat keys say of them."""
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
-        parts = list(run_chunks(kernel(self.structure, variational), flat, self.count, options, starts))
+        parts = list(run_chunks(kernel(self.structure, variational, along=along), flat, self.count, options, starts))
         order = np.argsort(np.concatenate([part.numbers for part in parts]))
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
         columns = zip(*(_with_room(part.results, room) for part in parts), strict=True)

@@ -8,7 +8,7 @@ from typing import Any
 from friso.cure.answers import Cure, Performance
 from friso.cure.method import Advice
 from friso.views.documents import plain_json
-from friso.views.tune.words import answer, changes, failing, reason
+from friso.views.tune.words import answer, changes, failing, reason, unsure_why
 
 
 def tune_document(tuning: Advice) -> dict[str, Any]:
@@ -35,6 +35,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
             },
             "as_is": _measured(tuning.present, tuning) | {"verdict": tuning.case.verdict},
             "ways": {found.way.name: _way(found, tuning) for found in tuning.answers},
+            "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
             "relaxed": [
                 {"way": relaxed.way.name, "values": dict(relaxed.values), "factor": relaxed.factor}
                 for relaxed in tuning.relaxed
@@ -45,7 +46,8 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
 
 def _way(found: Cure, tuning: Advice) -> dict[str, Any]:
     if found.stage is None or found.measured is None or found.case is None:
-        return {"works": found.sure, "why": reason(found, tuning)}
+        why = unsure_why(found) if found.interrupted else reason(found, tuning)
+        return {"works": found.sure, "why": why}
     edge = found.case.judgement.margin
     return {
         "works": found.sure,

@@ -9,6 +9,7 @@ from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
 from friso.views.tune.figures import figures as tune_figures
+from friso.views.tune.sensitivity_words import sensitivity_sentences
 from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
 
 
@@ -38,7 +39,7 @@ def page(tuning: Advice, figures: Sequence[Figure]) -> str:
         tuning.stage,
         figures,
         sentences=answer(tuning),
-        notes=[*failing(tuning), *window_lines(tuning), *assumptions(tuning)],
+        notes=[*failing(tuning), *window_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)],
         columns=COLUMNS,
         rows=rows(tuning),
         computed=f", seed {tuning.seed}",

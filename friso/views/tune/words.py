@@ -153,9 +153,13 @@ def _ratio(now: float, before: float) -> str:
 
 def _nothing(tuning: Advice) -> list[str]:
     """That nothing is sure to work, what is not sure to, and what to relax."""
-    unsure = [found for found in tuning.answers if found.sure == "unsure" and found.stage is not None]
+    unsure = [found for found in tuning.answers if found.sure == "unsure"]
     lines = [f"No way was found that surely meets the goal: {goal_words(tuning.goal)}."]
-    lines += [f"{found.way.name} may do, but {unsure_why(found)}." for found in unsure]
+    lines += [
+        f"{found.way.name} may do ({listed(changes(tuning.stage, found.stage), 'and')}), but {unsure_why(found)}."
+        for found in unsure
+        if found.stage is not None
+    ]
     lines += [_relax(relaxed, tuning.goal) for relaxed in tuning.relaxed]
     if not tuning.relaxed and not tuning.interrupted:
         lines.append("No relaxation of one part of the goal, or of two, was found with which a way meets it.")
@@ -176,7 +180,7 @@ def _relax(relaxed: Relaxed, goal: Goal) -> str:
 def unsure_why(found: Cure) -> str:
     """Why a way is not sure to work."""
     if found.interrupted and not found.doubts:
-        return "it was not verified"
+        return "it was not verified: the search was interrupted"
     return listed([DOUBTS[doubt] for doubt in found.doubts], "and")
 
 

@@ -1,0 +1,264 @@
+"""What matters: derivatives of the cycle, the edge of hunting and the modulus margin to keys of the stage file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import bandwidth, faster
+from friso.equations.variational import along
+from friso.errors import InputError
+from friso.frequency.crossover import settled_members
+from friso.frequency.drive import DriveTiming
+from friso.frequency.family import scan
+from friso.frequency.loops import response
+from friso.frequency.margins import margins
+from friso.frequency.members import Members
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.find import Cycles, hunting_cycles
+from friso.hunting.cycle.multipliers import multipliers
+from friso.hunting.cycle.shooting import Orbits, close
+from friso.hunting.margin import Margin
+from friso.hunting.verdict import can_hunt
+from friso.stage import Stage, numeric_keys
+from friso.stage.controllers import as_tuned, controller_of
+
+RTOL = 1e-11
+"""Relative tolerance of the runs: derivatives are needed to six digits."""
+
+NUDGE = 1e-3
+"""Share by which keys are changed to see how the multiplier changes, which is itself a derivative."""
+
+INSIDE = 1e-3
+"""Share of the bandwidth by which the cycle is looked at inside of the edge of hunting."""
+
+FLIP = 0.8
+"""Size of the multiplier from which on a cycle next to an edge is about to flip."""
+
+SMALL = 1e-5
+"""Share by which keys are changed to see how the loop changes at one frequency, which is smooth."""
+
+TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmission.", "motor_friction.")
+"""Where keys stand of which the cycle may depend."""
+
+
+@dataclass(frozen=True)
+class CycleDerivatives:
+    """The symmetric cycle (that over a whole period, of stages that are not symmetric), whether it `attracts`, its
+    `amplitude` [m] and `period` [s], and their derivatives to the keys [SI], each of shape (keys,)."""
+
+    attracts: bool
+    amplitude: float
+    period: float
+    amplitude_by: np.ndarray
+    period_by: np.ndarray
+
+
+@dataclass(frozen=True)
+class EdgeDerivatives:
+    """The edge of hunting as a bandwidth [Hz] (a factor of it for a controller that states none), and its derivatives
+    to the keys [per SI unit], shape (keys,)."""
+
+    edge: float
+    by: np.ndarray
+
+
+@dataclass(frozen=True)
+class MarginDerivatives:
+    """The least modulus margin in all settled states and its derivatives to the keys [1/SI], shape (keys,), of the
+    state and at the frequency where the loop comes closest."""
+
+    margin: float
+    by: np.ndarray
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives of a stage to some keys, whose `values` are SI: of its cycle, edge of hunting and margin; None where
+    there is no such thing, or none that is smooth."""
+
+    stage: Stage
+    keys: tuple[str, ...]
+    values: np.ndarray
+    cycle: CycleDerivatives | None
+    edge: EdgeDerivatives | None
+    margin: MarginDerivatives | None
+
+    def ranked(self) -> list[tuple[str, float]]:
+        """The keys with what a change of 1 % moves the edge by, the one that matters most first; empty without one."""
+        if self.edge is None:
+            return []
+        moves = 0.01 * self.values * self.edge.by
+        return [(self.keys[k], float(moves[k])) for k in np.argsort(-np.abs(moves), kind="stable")]
+
+
+def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None) -> Sensitivities:
+    """Derivatives of cycle, edge of hunting and modulus margin to keys; all that the equations contain if none are
+    named. The `edge` is located unless it is given (that of a check).
+
+    The cycle's are exact: from variational equations along the keys, with saltation at kinks. The edge's follow from
+    the multipliers, exact derivatives of the flow, whose own change is taken by central differences; they are those of
+    a flip. The margin's are central differences of the loop at one frequency. Raises InputError for an unknown key.
+    """
+    flat = {**stage.flat(), **as_tuned(stage.flat())}
+    names = _keys(flat) if keys is None else tuple(keys)
+    known = numeric_keys(flat)
+    for name in names:
+        if name not in known or name not in flat:
+            raise InputError("keys", name, "numeric keys of the stage", "friction.static")
+    values = np.array([flat[name] for name in names])
+    hunts = can_hunt(flat)
+    return Sensitivities(
+        stage,
+        names,
+        values,
+        _of_cycle(flat, names) if hunts else None,
+        _of_edge(stage, flat, names, edge) if hunts else None,
+        _of_margin(flat, names),
+    )
+
+
+def edge_sensitivities(stage: Stage, edge: Margin | None) -> Sensitivities:
+    """Those of the edge of hunting and of the margin alone, to all keys that the equations contain."""
+    flat = {**stage.flat(), **as_tuned(stage.flat())}
+    names = _keys(flat)
+    values = np.array([flat[name] for name in names])
+    by = _of_edge(stage, flat, names, edge) if edge is not None and can_hunt(flat) else None
+    return Sensitivities(stage, names, values, None, by, _of_margin(flat, names))
+
+
+def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
+    """The keys that the equations contain, without those of the motion, and not 0."""
+    contained = Ensemble.held(flat, 1).kernel.parameters
+    return tuple(name for name in contained if name.startswith(TABLES) and flat[name])
+
+
+@np.errstate(all="ignore")
+def _of_cycle(flat: Mapping[str, Any], keys: tuple[str, ...]) -> CycleDerivatives | None:
+    stages = Ensemble.held(flat, 1)
+    cycles = hunting_cycles(stages)
+    if not cycles.closed[0]:
+        return None
+    orbits = close(stages, cycles.states, cycles.orbits.times, cycles.sign, RTOL, cycles.swings)
+    flow = _flow(stages, keys, orbits.states, orbits.times)
+    if flow is None:
+        return None
+    ends, by_states, by_keys = flow
+    size, sign = stages.scales.shape[1], orbits.sign
+    system = np.zeros((size + 1, size + 1))
+    system[:size, :size] = sign * by_states - np.eye(size)
+    system[:size, size] = stages.rates(sign * ends[None])[0]
+    system[size, stages.integral] = 1.0  # the section: period and amplitude do not depend on it
+    moved = np.linalg.solve(system, np.vstack([-sign * by_keys, np.zeros(len(keys))]))
+    halves = 2.0 if sign < 0 else 1.0
+    extremes = _extremes(stages, keys, orbits, moved[:size])
+    if extremes is None:
+        return None
+    amplitude, amplitude_by = extremes
+    attracts = bool(cycles.attracting[0])
+    return CycleDerivatives(attracts, amplitude, halves * float(orbits.times[0]), amplitude_by, halves * moved[size])
+
+
+def _flow(
+    stages: Ensemble, keys: tuple[str, ...], state: np.ndarray, time: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Where the flow takes a state (1, states) in a time (1,), with its derivatives to state and keys: (states,),
+    (states, states) and (states, keys)."""
+    size, count = state.shape[1], state.shape[1] + len(keys)
+    several = stages.take(np.zeros(count, np.int64))
+    beside = {along(name): np.eye(len(keys))[k] for k, name in enumerate(keys)}
+    flat = {**several.flat, **{name: np.concatenate([np.zeros(size), row]) for name, row in beside.items()}}
+    begun = Ensemble(flat, count, form=stages.structure)
+    starts = np.hstack([np.repeat(state, count, axis=0), np.eye(count, size)])
+    results = begun.run(starts, np.repeat(time, count), RTOL, variational=True, along=keys, window=0.0)
+    if not done(results).all():
+        return None
+    columns = results.ends[:, size : 2 * size]
+    return results.ends[0, :size], columns[:size].T, columns[size:].T
+
+
+def _extremes(
+    stages: Ensemble, keys: tuple[str, ...], orbits: Orbits, moved: np.ndarray
+) -> tuple[float, np.ndarray] | None:
+    """Half of peak to peak of the position on an orbit and its derivatives to the keys, the orbit's state being moved
+    (states, keys) by these."""
+    whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
+    results = stages.run(orbits.states, whole, RTOL)
+    turns = int(results.turn_counts[0])
+    if not turns:
+        return None
+    times, values = results.turn_times[0, :turns], results.turn_values[0, :turns]
+    sides = []
+    for at in (int(values.argmax()), int(values.argmin())):
+        flow = _flow(stages, keys, orbits.states, times[[at]])
+        if flow is None:
+            return None
+        _, by_states, by_keys = flow
+        sides.append((by_states @ moved + by_keys)[stages.kernel.position])
+    return float(np.ptp(values) / 2), (sides[0] - sides[1]) / 2
+
+
+@np.errstate(all="ignore")
+def _of_edge(
+    stage: Stage, flat: Mapping[str, Any], keys: tuple[str, ...], edge: Margin | None
+) -> EdgeDerivatives | None:
+    """The edge's derivatives: along it the multiplier stays what it is."""
+    if edge is None:
+        from friso.hunting.check import check_given
+
+        edge = check_given(stage).judgement.margin
+    if edge is None or not edge.certain:
+        return None
+    inside = faster(flat, edge.factor * (1 - INSIDE))
+    first = hunting_cycles(Ensemble.held(inside, 1))
+    if not (first.closed[0] and -1 <= first.multiplier[0] < -FLIP) or Ensemble.held(inside, 1).chatters:
+        return None
+    changed = [{name: inside[name] * (1 + step)} for name in keys for step in (-NUDGE, NUDGE)]
+    changed += [faster(inside, 1 + step) for step in (-NUDGE, NUDGE)]
+    multiplier = _multipliers(inside, changed, first)
+    if multiplier is None:
+        return None
+    slopes = (multiplier[1::2] - multiplier[::2]) / (2 * NUDGE)
+    named = bandwidth(stage.flat())
+    hertz = edge.factor * (1.0 if named is None else float(named))
+    stated = controller_of(flat).bandwidth_key  # the edge itself stays where it is when that changes
+    relative = -slopes[:-1] / slopes[-1] + np.array([float(name == stated) for name in keys])
+    return EdgeDerivatives(hertz, hertz * relative / np.array([flat[name] for name in keys]))
+
+
+def _multipliers(inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]], first: Cycles) -> np.ndarray | None:
+    """The multipliers of stages that are a little different from one whose cycle is known, shape (stages,)."""
+    count = len(changed)
+    names = {name for change in changed for name, value in change.items() if value != inside[name]}
+    flat = {**inside, **{name: np.array([change.get(name, inside[name]) for change in changed]) for name in names}}
+    stages = Ensemble.held(flat, count)
+    start = np.repeat(first.states, count, axis=0), np.repeat(first.orbits.times, count)
+    orbits = close(stages, *start, first.sign, RTOL, first.swings)
+    if not orbits.closed.all():
+        return None
+    local = multipliers(stages, orbits, RTOL).local[:, 0]
+    return np.real(local) if np.all(np.abs(np.imag(local)) < 1e-9) else None
+
+
+def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
+    members = settled_members(flat)
+    loops = scan(flat, members)
+    if not loops.stable.all():
+        return None
+    worst: Members = members[loops.worst()]
+    here = margins(flat, worst)
+    omega = np.array([2 * np.pi * here.closest])
+
+    def distance(changes: Mapping[str, float]) -> float:
+        nearby = {**flat, **changes}
+        return float(np.abs(1 + response(nearby, worst, DriveTiming.of(nearby))(omega))[0])
+
+    by = [
+        (distance({name: flat[name] * (1 + SMALL)}) - distance({name: flat[name] * (1 - SMALL)}))
+        / (2 * SMALL * flat[name])
+        for name in keys
+    ]
+    return MarginDerivatives(here.modulus_margin, np.array(by))
