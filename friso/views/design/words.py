@@ -89,6 +89,11 @@ def leaf_words(geometry: Geometry) -> str:
 def _verified(design: Design) -> tuple[str, str]:
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
     held = f" (with the joint locked, {restless(locked)})" if locked.missed else ""
+    if design.needed and not locked.missed:
+        held = (
+            f" (with the joint locked as well: it does not hunt in this sample, but lies closer to the edge of hunting "
+            f"than the safety factor of {design.spec.safety.hunting:g} allows)"
+        )
     text = f"Of {free.tried} simulated moves {restless(free)}{held}: {probability(free)}. {settling(free)}"
     if limit is None:
         return (VERMILLION if free.missed else GREEN), f"{text}."

@@ -104,7 +104,10 @@ def plus_minus(half: float, unit: str, digits: int = 3) -> str:
 
 def percent(share: float, digits: int = 2) -> str:
     """A share in percent; a dash where there is none."""
-    return f"{100 * share:.{digits}g} %" if math.isfinite(share) else NOTHING
+    if not math.isfinite(share):
+        return NOTHING
+    number = float(f"{100 * share:.{digits}g}")
+    return f"{number:.0f} %" if abs(number) >= 10**digits else f"{number:g} %"
 
 
 def share_with_interval(share: Share) -> str:
