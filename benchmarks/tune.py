@@ -1,4 +1,4 @@
-"""The cure held against a brute search: `python -m benchmarks.tune [--machines N] [--settings N] [--fresh N]`.
+"""The cure held against a brute search: `python -m benchmarks.tune [--machines N] [--settings N] [--fresh N] [--thesis]`.
 
 Axes with four controllers, three levels of friction, with and without a parasitic mode are tuned way by way, the joint
 kept. For the ways that work a Sobol sequence of settings over the same ranges is measured by the same moves and margins
@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from pathlib import Path
 from time import perf_counter
 
 import numpy as np
@@ -23,8 +24,9 @@ from friso.cure.goal import Goal
 from friso.cure.machines import Fleet, drawn
 from friso.cure.method import tune
 from friso.cure.search import Budget, Search
-from friso.stage import Stage, loads
+from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
+from friso.views.tune.words import changes
 
 AXIS = """
 [masses]
@@ -96,6 +98,31 @@ def brute(found: Cure, stage: Stage, goal: Goal, machines: Fleet, count: int) ->
     return float(search.measured(best[None]).settling[0])
 
 
+def thesis() -> None:
+    """The thesis's rig at 8 Hz: bandwidth and isolator with their prices, and its own design (Sec. 3.4)."""
+    rig = load(Path(__file__).parents[1] / "examples" / "thesis_rig.toml")
+    locked, free = rig.replace({"joint.locked": True}), rig.replace({"joint.locked": False})
+    goal = Goal(bandwidth_limit=25.0)
+    begun = perf_counter()
+    advice = tune(locked, goal, chosen=["bandwidth", "isolator"])
+    print(f"{perf_counter() - begun:.0f} s")
+    listed = {"locked": advice.present, "thesis, Sec. 3.4": measure(free, advice.machines, goal, free)}
+    listed |= {found.way.name: found.measured for found in advice.answers if found.measured}
+    head = ("", "meet the goal", "95 % settle in", "median", "force", "margin", "stiffness")
+    rows = [
+        (
+            name,
+            f"{100 * part.share(goal).probability:.0f} %",
+            *(f"{value:.3g}" for value in (part.slowest(goal), part.median, part.force(goal), part.least_margin(goal))),
+            f"{part.stiffness:.3g}",
+        )
+        for name, part in listed.items()
+    ]
+    print_table(head, rows)
+    for found in advice.answers:
+        print(found.way.name, found.sure, found.doubts, found.stage and changes(advice.stage, found.stage))
+
+
 def main() -> None:
     """Tune machines, search by brute force, measure on fresh machines."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -104,7 +131,10 @@ def main() -> None:
     parser.add_argument("--settings", type=int, default=1024)
     parser.add_argument("--fresh", type=int, default=400)
     parser.add_argument("--ways", nargs="*", default=["bandwidth", "gains"])
+    parser.add_argument("--thesis", action="store_true")
     options = parser.parse_args()
+    if options.thesis:
+        return thesis()
     goal = Goal(within=WITHIN, bandwidth_limit=LIMIT, joint=False)
     rows: list[tuple[str, ...]] = []
     worst, least = 0.0, 1.0
