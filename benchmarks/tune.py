@@ -1,10 +1,10 @@
-"""The cure held against a brute search: `python -m benchmarks.tune [--machines N] [--settings N] [--fresh N] [--thesis]`.
+"""The cure held against a brute search: `python -m benchmarks.tune [--machines N] [--settings N] [--fresh N]`.
 
 Axes with four controllers, three levels of friction, with and without a parasitic mode are tuned way by way, the joint
 kept. For the ways that work a Sobol sequence of settings over the same ranges is measured by the same moves and margins
 on the same machines, and the best of them, surveyed for what attracts like the tuned one, is compared with it in the
 settling time of the slowest twentieth. The tuned stages are then measured on fresh machines, and a share is counted of
-those that break a constraint.
+those that break a constraint. `--thesis` tunes the rig of the thesis instead.
 """
 
 from __future__ import annotations
