@@ -58,15 +58,20 @@ def of_key(key: str, low: float, high: float) -> Variable:
 
 def bandwidth_factor(stage: Stage, limit: float | None) -> Variable:
     """How fast the controller is as a whole, as a factor of what it is, up to a limit of the bandwidth [Hz]."""
-    high = FASTEST if limit is None else min(FASTEST, limit / crossover(stage))
+    present = crossover(stage)
+    high = FASTEST if limit is None or not present > 0 else min(FASTEST, limit / present)
     return Variable(BANDWIDTH, min(SLOWEST, high / 2), high, sped_up)
 
 
 def crossover(stage: Stage) -> float:
-    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1."""
+    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1 (NaN:
+    there is none)."""
     flat = stage.flat()
     stated = bandwidth(flat)
-    return float(margins(flat, member()).crossovers[-1] if stated is None else stated)
+    if stated is not None:
+        return float(stated)
+    crossings = margins(flat, member()).crossovers
+    return float(crossings[-1]) if crossings else float("nan")
 
 
 def gains(stage: Stage, bandwidth: Variable) -> tuple[Variable, ...]:
