@@ -27,7 +27,7 @@ from friso.views.check.figures import check_figures
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Axis, Figure, Map, Panel, Series
-from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
+from friso.views.drawing.prefixes import choose, percent, plus_minus, pretty, range_with_unit, with_unit
 from friso.views.drawing.thinning import BUCKETS, KEPT, thin
 
 # ---------------------------------------------------------------- plain data
@@ -88,6 +88,17 @@ def test_values_in_sentences():
     assert plus_minus(0.52e-3, "m") == "±0.52 mm"
     assert plus_minus(0.345e-3, "m") == "±345 µm"
     assert range_with_unit(0.233e-3, 2.07e-3, "m") == "0.233 to 2.07 mm"
+
+
+def test_shares_in_percent_have_no_exponents():
+    """A share of all is 100 %, not 1e+02 %."""
+    assert [percent(share) for share in (1.0, 0.954, 12.3, 0.00012, math.nan)] == [
+        "100 %",
+        "95 %",
+        "1200 %",
+        "0.012 %",
+        "–",
+    ]
 
 
 # ---------------------------------------------------------------- thinning
