@@ -319,3 +319,31 @@ def test_what_bode_says_of_a_backlash() -> None:
     assert "one flank" in said
     without = machine(transmission={**SCREW, "backlash": "0 um"})
     assert not caveats(SimpleNamespace(stage=without, limits={}))  # type: ignore[arg-type]
+
+
+def test_the_isolator_stands_on_the_load_side() -> None:
+    """Motor, screw, stage, joint and cart in a row, the actuator acting on the stage and the bearing on the cart: poles
+    and answers of a model by hand."""
+    joint = {"stiffness": "0.4 N/um", "damping": "30 N*s/m", "stroke": "1 mm", "limiter_stiffness": "50 N/um",
+             "limiter_damping": "100 N*s/m"}  # fmt: skip
+    stage = machine(
+        masses={"cart": "12 kg", "stage": "8 kg"}, joint=joint, friction=None, motor_friction=None,
+        transmission={**SCREW, "backlash": "0 um"}, controller=BY_RATE)  # fmt: skip
+    flat = stage.flat()
+    masses = np.array([flat["transmission.mass"], 8.0, 12.0])
+    springs = np.array([flat["transmission.stiffness"], flat["joint.stiffness"]])
+    dampers = np.array([flat["transmission.damping"], flat["joint.damping"]])
+    between = np.array([[-1.0, 1.0, 0.0], [0.0, -1.0, 1.0]])
+    k, d = (between.T @ np.diag(values) @ between for values in (springs, dampers))
+    a = np.block([[np.zeros((3, 3)), np.eye(3)], [-k / masses[:, None], -d / masses[:, None]]])
+    system = plant(flat, next(iter(limit_cases(flat).values())))
+    s = 2j * np.pi * np.array([3.0, 30.0, 300.0])
+    for encoder, body in (("load", 1), ("motor", 0)):
+        seen = plant(stage.replace({"encoder.position": encoder}).flat(), next(iter(limit_cases(flat).values())))
+        ours = seen.take(("force",), ("stage",)).at(s)[0, :, 0, 0]
+        theirs = [np.linalg.solve(w * np.eye(6) - a, np.eye(6)[3] / masses[0])[body] for w in s]
+        assert ours == pytest.approx(np.array(theirs), rel=1e-9)
+    moving = np.sort_complex(np.linalg.eigvals(system.a[0]))
+    assert moving[np.abs(moving) > 1] == pytest.approx(
+        np.sort_complex(np.linalg.eigvals(a))[np.abs(np.sort_complex(np.linalg.eigvals(a))) > 1], rel=1e-6
+    )
