@@ -312,5 +312,12 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
     assert drawn.stage.flat()["controller.velocity_feedforward"] == 0.0
 
 
+def test_what_these_firmwares_do_not_have_is_told(tmp_path: Path) -> None:
+    path = backup(tmp_path, gain_scheduling_min_ratio=0.2, load_encoder_axis=1)
+    left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
+    assert any(text.startswith("gain_scheduling_min_ratio, which") for text in left_out)
+    assert any(text.startswith("load_encoder_axis = 1") for text in left_out)
+
+
 def test_formats_are_listed() -> None:
     assert [*FORMATS] == ["linuxcnc", "odrive"]

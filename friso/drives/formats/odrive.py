@@ -35,6 +35,41 @@ POSITION_CONTROL, PASSTHROUGH, AHEAD = 3, 1, (3, 5)
 
 MOST_KEYS = 100_000
 
+OTHERS = frozenset(
+    [
+        "control_mode",
+        "input_mode",
+        "vel_limit",
+        "vel_limit_tolerance",
+        "vel_ramp_rate",
+        "torque_ramp_rate",
+        "circular_setpoints",
+        "circular_setpoint_range",
+        "steps_per_circular_range",
+        "homing_speed",
+        "inertia",
+        "axis_to_mirror",
+        "mirror_ratio",
+        "torque_mirror_ratio",
+        "load_encoder_axis",
+        "input_filter_bandwidth",
+        "enable_vel_limit",
+        "enable_current_mode_vel_limit",
+        "enable_torque_mode_vel_limit",
+        "enable_gain_scheduling",
+        "gain_scheduling_width",
+        "enable_overspeed_error",
+        "vel_integrator_limit",
+        "mechanical_power_bandwidth",
+        "electrical_power_bandwidth",
+        "spinout_mechanical_power_threshold",
+        "spinout_electrical_power_threshold",
+        "anticogging",
+    ]
+)
+KNOWN = OTHERS.union(GAINS)
+"""Names in controller.config of these firmwares; `OTHERS` are those beside the gains."""
+
 HELD = frozenset(
     {
         "kv",
@@ -183,6 +218,14 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         left.append("the filter of the commanded position (input_filter_bandwidth)")
     if limited:
         left.append("at the limit of the torque the integral decays by 1 % a sample; here it rests")
+    own, load = axis.name.removeprefix("axis"), axis.values.get(f"{CONFIG}.load_encoder_axis")
+    if isinstance(load, int) and str(load) != own:
+        left.append(
+            f"load_encoder_axis = {load}: position and velocity come from that axis's encoder; where it is behind a "
+            "screw or belt, [transmission] and [encoder] have to be added"
+        )
+    names = (key.removeprefix(f"{CONFIG}.").split(".")[0] for key in axis.values if key.startswith(f"{CONFIG}."))
+    left += [f"{name}, which these firmwares do not have" for name in dict.fromkeys(names) if name not in KNOWN]
     if axis.values.get(f"{CONFIG}.anticogging.anticogging_enabled"):
         left.append("the map against cogging")
     return tuple(left)
