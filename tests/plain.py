@@ -5,7 +5,7 @@ Nothing here is shared with friso but the names of states and of the keys of the
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import exp, pi, sqrt, tanh
+from math import exp, pi, sin, sqrt, tanh
 from typing import Any
 
 Flat = Mapping[str, Any]
@@ -56,6 +56,14 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
     if law == "dahl":
         return sigma_0 * z + viscous, v - sigma_0 * abs(v) / flat["friction.coulomb"] * z
     z_rate = v - sigma_0 * abs(v) / stribeck_level(flat, v) * z
+    if law == "elasto_plastic":
+        begins, limit = flat["friction.breakaway_deflection"], stribeck_level(flat, v) / sigma_0
+        rising = 0.5 * (1 + sin(pi * (abs(z) - (limit + begins) / 2) / (limit - begins)))
+        alpha = 0.0 if abs(z) < begins or z * v < 0 else 1.0 if abs(z) >= limit else rising
+        z_rate = v * (1 - alpha * abs(z) / limit)
+    if law == "rolling":
+        lacking = 1 - (1 if v > 0 else -1) * sigma_0 * z / stribeck_level(flat, v)
+        z_rate = v * lacking * abs(lacking) ** (flat["friction.rolling_exponent"] - 1)
     return sigma_0 * z + flat["friction.bristle_damping"] * z_rate + viscous, z_rate
 
 
@@ -69,6 +77,22 @@ def elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
         slips = at_limit and z * v > 0 and "friction.kinetic_share" not in flat
         rate[f"deflection_{number}"] = 0.0 if slips else v
         force += stiffness * z
+    return force, rate
+
+
+def generalised_elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
+    """The same of elements that slip towards their share of a Stribeck curve."""
+    level, pull = stribeck_level(flat, v), flat["friction.attraction"]
+    force, rate, number = flat["friction.viscous"] * v, {}, 1
+    while (name := f"deflection_{number}") in s:
+        z = s[name]
+        stiffness, share, damping = (
+            flat.get(f"friction.element_{key}.{number}", 0.0) for key in ("stiffness", "share", "damping")
+        )
+        slips = z * v > 0 and stiffness * abs(z) >= share * level
+        rate[name] = pull * (share * (1 if v > 0 else -1) - stiffness * z / level) / stiffness if slips else v
+        force += stiffness * z + damping * rate[name]
+        number += 1
     return force, rate
 
 
@@ -201,6 +225,9 @@ def joint(flat: Flat, deflection: float, rate: float) -> float:
     return force
 
 
+SIDE_BY_SIDE = {"maxwell_slip": elements, "gms": generalised_elements}
+
+
 def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]], list[float]]:
     """dx/dt as a function of time [s] and the states called `names`."""
 
@@ -211,8 +238,8 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
         force += flat.get("bias.stage", 0.0)
         rate |= {"position": v}
         cart_velocity = s.get("cart_velocity", v)
-        if flat["friction.model"] == "maxwell_slip":
-            drag, rates_within = elements(flat, cart_velocity, s)
+        if flat["friction.model"] in SIDE_BY_SIDE:
+            drag, rates_within = SIDE_BY_SIDE[flat["friction.model"]](flat, cart_velocity, s)
             rate |= rates_within
         else:
             drag, rate["bristle_deflection"] = friction(flat, cart_velocity, s.get("bristle_deflection", 0.0))

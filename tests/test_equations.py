@@ -16,6 +16,7 @@ from friso.equations import motion
 from friso.equations.component import TIME
 from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.structure import structure
+from friso.frequency.declared import sine
 
 Point = tuple[np.ndarray, np.ndarray, float, np.ndarray]
 
@@ -46,7 +47,7 @@ def compiled(name: str, expressions: Any) -> Callable[[Point], np.ndarray]:
     """The expressions as a function of states, modes, time since the corner and the reference there."""
     m = model(name)
     symbols = [m.symbols, [k.beyond for k in m.kinks], TIME, REFERENCE, m.parameters]
-    function, values = sp.lambdify(symbols, expressions, modules="numpy"), parameters(name)
+    function, values = sp.lambdify(symbols, expressions, modules=[{"sine": sine}, "numpy"]), parameters(name)
     return lambda point: np.array(function(*point, values), dtype=float)
 
 
@@ -94,8 +95,9 @@ def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleT
 
 
 def test_every_state_and_kink_matters(name: str) -> None:
-    """No dead states or kinks: each appears in the right-hand side, or lets states jump."""
+    """No dead states or kinks: each appears in the right-hand side, lets states jump, or decides on a mode."""
     used = set().union(*(sp.sympify(f).free_symbols for f in model(name).rhs))
+    used |= set().union(*(switch.enter.free_symbols for switch in model(name).switches))
     used |= {kink.beyond for kink in model(name).jumps}
     dead = {kink.name for kink in model(name).kinks if kink.beyond not in used}
     assert dead == set()

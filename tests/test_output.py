@@ -33,6 +33,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
     "logs": (RIG,),
     "export": ("gains", RIG),
+    "convert": (RIG, "--friction", "gms"),
     "identify": (RIG,),
     "rig": ("stiffness", DRIVE),
     "compare": (DRIVE,),

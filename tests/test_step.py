@@ -15,6 +15,7 @@ from variants import VARIANTS, plain_module
 
 from friso.engine.kernel import Kernel, kernel
 from friso.engine.layout import ROW
+from friso.engine.simd_math import quarter_sine
 from friso.engine.tableaus import TABLEAUS
 from friso.equations import motion
 from friso.equations.component import TIME
@@ -86,6 +87,11 @@ class Lanes:
             return [bool(self.module.step(column, *numbers)) for column in self.row(0, self.layout.rows).T]
 
 
+def sine(turn: Any) -> Any:
+    """As the engine computes it, to more digits than a float has: its rounding to whole turns takes a float."""
+    return quarter_sine(0.25 - abs((turn + 0.25) % 1 - 0.5))
+
+
 class Twin:
     """A variant's step in plain Python and extended precision."""
 
@@ -99,7 +105,7 @@ class Twin:
     def _function(self, expressions: list[Any]) -> Callable[..., list[Any]]:
         m = self.model
         symbols = [m.symbols, TIME, [kink.beyond for kink in m.kinks], REFERENCE, m.parameters]
-        return sp.lambdify(symbols, expressions, modules="numpy", cse=True)
+        return sp.lambdify(symbols, expressions, modules=[{"sine": sine}, "numpy"], cse=True)
 
     def step(self, lanes: Lanes, lane: int, x: np.ndarray) -> rosenbrock.Step:
         """Raises FloatingPointError where the step goes so far astray that a power overflows."""

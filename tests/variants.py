@@ -54,6 +54,39 @@ viscous = "{viscous}"
 """
 
 
+def elasto_plastic(exponent: float = 2, deflection: str = "7 um", damping: str = "316.2277660168379 N*s/m") -> str:
+    return f"""model = "elasto_plastic"
+static = "3 N"
+coulomb = "1 N"
+stribeck_velocity = "1.6 mm/s"
+stribeck_exponent = {exponent}
+bristle_stiffness = "1e5 N/m"
+bristle_damping = "{damping}"
+breakaway_deflection = "{deflection}"
+viscous = "0.5 N*s/m"
+"""
+
+
+def rolling(exponent: float = 1.5) -> str:
+    bristles = lugre(2).replace('"lugre"', '"rolling"')
+    return f"{bristles}rolling_exponent = {exponent}\n"
+
+
+def gms(exponent: float = 2, damping: str = "", **keys: str) -> str:
+    """Three elements as stiff as the bristles of `lugre`."""
+    values = {"static": "3 N", "coulomb": "1 N", "attraction": "500 N/s", "viscous": "0.5 N*s/m", **keys}
+    lines = [f'{name} = "{value}"' for name, value in values.items()]
+    return "\n".join([
+        'model = "gms"',
+        *lines,
+        f'stribeck_velocity = "1.6 mm/s"\nstribeck_exponent = {exponent}',
+        'element_stiffness = ["50 N/mm", "30 N/mm", "20 N/mm"]\nelement_share = [0.2, 0.3, 0.5]',
+        damping,
+    ])  # fmt: skip
+
+
+MICRO_DAMPING = 'element_damping = ["150 N*s/m", "100 N*s/m", "60 N*s/m"]'
+
 DAHL = 'model = "dahl"\ncoulomb = "1 N"\nbristle_stiffness = "1e5 N/m"\nviscous = "0.5 N*s/m"'
 NO_FRICTION = 'model = "none"'
 
@@ -162,6 +195,15 @@ VARIANTS: dict[str, Stage] = {
     "rigid, Maxwell slip, PID": stage(step(), friction=maxwell(), controller=gains(**FULL, tau=1e-3)),
     "free, parasitic, Maxwell slip": stage(
         there_and_back(), friction=maxwell(), joint=free(), parasitic=PARASITIC, controller=van_dijk()
+    ),
+    "rigid, elasto-plastic": stage(step(), friction=elasto_plastic(), controller=van_dijk()),
+    "free, elasto-plastic 1": stage(
+        there_and_back(), friction=elasto_plastic(1), joint=free(), controller=gains(**FULL, tau=1e-3)
+    ),
+    "rigid, rolling": stage(release(), friction=rolling(), controller=van_dijk()),
+    "rigid, GMS": stage(release(), friction=gms(damping=MICRO_DAMPING), controller=van_dijk()),
+    "free, parasitic, GMS 1": stage(
+        there_and_back(), friction=gms(1), joint=free(), parasitic=PARASITIC, controller=van_dijk()
     ),
     "rigid, van Dijk, limit": stage(step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))),
     "rigid, limit, wound up": stage(

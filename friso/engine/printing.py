@@ -40,6 +40,7 @@ class _KernelPrinter(PythonCodePrinter):
 
     _print_Integer = _print_Rational
     _print_NumberSymbol = _print_Rational
+    _print_Pi = _print_Rational
 
     def _print_exp(self, expr: sp.exp) -> str:
         return f"exp({self._print(expr.args[0])})"
@@ -60,6 +61,8 @@ class _KernelPrinter(PythonCodePrinter):
         text = f"({self._print(base)})"
         if exponent.is_Integer:
             return "(" + " * ".join([text] * int(exponent)) + ")"
+        if abs(exponent) == sp.S.Half:
+            return f"sqrt({text})" if exponent > 0 else f"(1.0 / sqrt({text}))"
         return f"power({text}, {self._print(exponent)})"
 
     def _print_Mul(self, expr: sp.Mul) -> str:

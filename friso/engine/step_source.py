@@ -401,7 +401,6 @@ class StepWriter:
             "t_n = edge if arrived else (t + fraction * h if good else t)",
             *self._jump(),
         ]
-        lines += [f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}" for k in range(self.kinks)]
         return [
             *lines,
             *self._step_factor(),
@@ -426,12 +425,16 @@ class StepWriter:
         return lines
 
     def _jump(self) -> list[str]:
-        """Let the states jump that do so at the kinks just crossed."""
-        lines = []
+        """Let the states jump that do so at the kinks just crossed, and the modes change; where there are modes that
+        remember, one after the other, since several may change at one instant: what follows from the first belongs to
+        what is before the second."""
+        lines: list[str] = []
+        flips = [f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}" for k in range(self.kinks)]
         for k, (block, jumping) in enumerate(self._jumps):
             lines += block.code(f"_k{k}", self._rename("n", "t_n"))
             lines += [f"n{i} = n{i} + jump{i}__k{k} if flip{k} else n{i}" for i in jumping]
-        return lines
+            lines += flips[k : k + 1] if self.model.switches else []
+        return lines if self.model.switches else lines + flips
 
     def _step_factor(self) -> list[str]:
         """SAFETY / error^(1/order), from the mean square error by roots alone: 3/32 of it stands for 1/10."""

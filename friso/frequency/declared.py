@@ -31,7 +31,7 @@ class Declared:
         matrix = rows.jacobian([*self.states, *self.inputs.values()])
         entries = {place: entry for place, entry in matrix.todok().items() if entry != 0}
         symbols = sorted(set[Any]().union(*(entry.free_symbols for entry in entries.values())), key=str)
-        function = sp.lambdify(symbols, list(entries.values()), "numpy", cse=True)
+        function = sp.lambdify(symbols, list(entries.values()), [{"sine": sine}, "numpy"], cse=True)
         return list(entries), function, [str(symbol) for symbol in symbols]
 
     def at(self, values: Mapping[str, Any], members: int) -> System:
@@ -43,3 +43,8 @@ class Declared:
             matrices[:, i, j] = entry
         parts = matrices[:, :n, :n], matrices[:, :n, n:], matrices[:, n:, :n], matrices[:, n:, n:]
         return System(*parts, tuple(map(str, self.states)), tuple(self.inputs), tuple(self.outputs))
+
+
+def sine(turns: Any) -> Any:
+    """sin(2 pi x) of a number of turns x, for `friso.equations.component.sine`."""
+    return np.sin(2 * np.pi * turns)

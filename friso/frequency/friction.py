@@ -13,7 +13,7 @@ import sympy as sp
 from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction, solved
 from friso.equations.structure import shared_structure
-from friso.frequency.declared import Declared
+from friso.frequency.declared import Declared, sine
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
 from friso.stage.transmission import STATE_PREFIX, as_friction, leading_friction
@@ -40,8 +40,8 @@ BRISTLES = 1e-6
 @dataclass(frozen=True)
 class LinearFriction:
     """A friction law as a linear system from the velocity of the cart to its force, and its steady states: those of its
-    internal states, and then of its modes that remember, that slide at a velocity, and that bear a bias force at rest;
-    and the lengths [m] among the scales of its states."""
+    internal states, and then of its modes that remember and the sides of its kinks, that slide at a velocity, and that
+    bear a bias force at rest; and the lengths [m] among the scales of its states."""
 
     declared: Declared
     modes: tuple[str, ...]
@@ -94,12 +94,13 @@ def _law(name: str, variant: Hashable) -> LinearFriction | None:
     left: dict[Any, Any] = dict.fromkeys(modes, sp.S.Zero)
     slid: dict[Any, Any] = friction.slid()
     stuck = _stuck(states, [rate.subs(left) for rate in rates], friction.force.subs(left)) | left
+    stuck |= friction.sides(stuck)
     lengths = [state.scale for state in component.states if state.unit == "m"]
     return LinearFriction(
         Declared(states, rates, {"velocity": VELOCITY}, {"force": friction.force}),
-        tuple(map(str, modes)),
+        tuple(map(str, slid))[len(states) :],
         _compiled([*slid.values()]),
-        _compiled([*stuck.values()]),
+        _compiled([stuck[symbol] for symbol in slid]),
         _compiled([friction.force.subs(slid)]),
         _compiled(lengths),
     )
@@ -121,7 +122,7 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
     """The expressions as a function of the values of their symbols by name."""
     symbols = sorted(set[Any]().union(*(expression.free_symbols for expression in expressions)), key=str)
-    function = sp.lambdify(symbols, expressions, "numpy")
+    function = sp.lambdify(symbols, expressions, [{"sine": sine}, "numpy"])
     return lambda values: function(*(values[str(symbol)] for symbol in symbols))
 
 
@@ -152,8 +153,8 @@ def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
 
 
 def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Values of the internal states of the law, of its modes that remember and of its direction, by name, each of shape
-    (members,)."""
+    """Values of the internal states of the law, of its modes that remember, of the sides of its kinks and of its
+    direction, by name, each of shape (members,)."""
     law, forward = law_of(flat), members.forward.astype(float)
     if law is None:
         return {}

@@ -42,6 +42,9 @@ class FrictionSection(UncertainSection):
     model: Any
     decisive: ClassVar[tuple[str, ...]] = ()
     """The numeric keys on which `variant` depends."""
+    decided_by: ClassVar[Mapping[str, str]] = {}
+    """The experiment that would tell the value of a key that other measurements leave open; under "", the one that
+    tells the law from others."""
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
@@ -52,6 +55,27 @@ class FrictionSection(UncertainSection):
     def declare(velocity: Any, variant: Any) -> Any:
         """The equations of the law for a body moving at `velocity`, or None if there is no force."""
         return None
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> Any:
+        """What measurements show of the law (`friso.equations.friction.measured.MeasuredFriction`)."""
+
+    @staticmethod
+    def keeping(measured: Any, elements: int) -> dict[str, Any]:
+        """Keys of the law, as flat SI values, with which it shows what was measured, as nearly as it can; `elements`
+        side by side, of a law that has several."""
+        return {}
+
+    @staticmethod
+    def left_open(measured: Any) -> dict[str, tuple[float, float]]:
+        """The keys on which the measurements do not decide, and their ranges."""
+        return {}
+
+    @staticmethod
+    def active(flat: Mapping[str, Any]) -> str:
+        """Why the law may give energy back, which no friction does: the condition for passivity that the stage does
+        not meet; "" where it is passive or does not say."""
+        return ""
 
 
 FRICTION = Variants("model", "friso.friction")

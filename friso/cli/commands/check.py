@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from friso.hunting import Case
     from friso.stage.correlations import Sample
     from friso.studies.draws import Draws
+    from friso.studies.laws.verdicts import VerdictsByLaw
 
 Count = Annotated[
     int | None,
@@ -32,6 +33,11 @@ Seed = Annotated[
     int, typer.Option("--seed", metavar="K", help="Seed of the draws: the same seed gives the same stages.")
 ]
 
+AcrossLaws = Annotated[
+    bool,
+    typer.Option("--laws", help="The verdict under every friction law that shows the same in measurements, too."),
+]
+
 
 def check(
     stage_file: StageFile,
@@ -39,6 +45,7 @@ def check(
     rtol: Tolerance = "1e-9",
     count: Count = None,
     seed: Seed = 0,
+    laws: AcrossLaws = False,
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -57,19 +64,22 @@ def check(
         cases = check_stage(stage, rtol=tolerance, traces=target is not None, progress=progress)
     draws = None if sample is None else _draws(stage, sample, seed, max(tolerance, LONG))
     isolator = _isolator(cases["given"])
+    across = _across_laws(stage, max(tolerance, LONG)) if laws else None
     files = []
     if target is not None:
         from friso.views.check.page import check_files
 
-        files = target.write(check_files(cases, draws, isolator))
+        files = target.write(check_files(cases, draws, isolator, across))
     if as_json:
         from friso.views.check.document import check_document
 
-        print_document(check_document(cases, draws, isolator), files)
+        print_document(check_document(cases, draws, isolator, across), files)
     else:
         _print_cases(stage, cases, isolator)
         if draws is not None:
             _print_draws(draws)
+        if across is not None:
+            _print_laws(across)
         print_written(files)
     leave(all(case.solver.done for case in cases.values()))
 
@@ -95,6 +105,21 @@ def _draws(stage: Stage, sample: Sample, seed: int, tolerance: float) -> Draws:
 
     with ProgressBar("draws") as progress:
         return Draws(stage, sample, seed, fates(stage, sample, tolerance, progress))
+
+
+def _across_laws(stage: Stage, tolerance: float) -> VerdictsByLaw:
+    """What becomes of the stage under each law."""
+    from friso.studies.laws.verdicts import verdicts_by_law
+
+    with ProgressBar("laws") as progress:
+        return verdicts_by_law(stage, tolerance, progress=progress)
+
+
+def _print_laws(laws: VerdictsByLaw) -> None:
+    """A sentence per case, and the table of the laws."""
+    from friso.views.check.laws import laws_columns, laws_rows, laws_sentences
+
+    print_answer(laws_sentences(laws), "Across friction laws", laws_columns(laws), laws_rows(laws))
 
 
 def _print_draws(draws: Draws) -> None:

@@ -25,8 +25,9 @@ class Friction:
     """A declared friction law: force [N] that opposes the velocity, its component and its scales.
 
     `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` gives the
-    law's own states, and its modes that remember, in a steady motion at the velocity; without it they are those at
-    which the states do not change. At rest all modes that remember have been left.
+    law's own states, its modes that remember, and the sides of its other kinks than the direction, in a steady motion
+    at the velocity; without it they are those at which the states do not change. At rest all modes that remember have
+    been left.
     """
 
     def __init__(
@@ -39,33 +40,43 @@ class Friction:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
-        """The law's own states, and its modes that remember, in a steady motion at the velocity. Raises ValueError
-        where the law does not declare them and its rates are not linear in its states."""
+        """The law's own states, and the sides of its kinks but the direction, in a steady motion at the velocity.
+        Raises ValueError where the law does not declare them and its rates are not linear in its states."""
         import sympy as sp
 
         from friso.equations.component import Switch
 
         states = [state.symbol for state in self.component.states]
-        modes = [kink.beyond for kink in self.component.kinks if isinstance(kink, Switch)]
         if self.sliding is not None:
-            return {x: sp.sympify(self.sliding.get(x, 0)) for x in (*states, *modes)}
-        steady = solved([state.derivative for state in self.component.states], states) if states else []
-        return {**dict(zip(states, steady, strict=True)), **dict.fromkeys(modes, sp.S.Zero)}
+            slid = {x: sp.sympify(self.sliding.get(x, 0)) for x in states}
+        else:
+            unchanged = solved([state.derivative for state in self.component.states], states) if states else []
+            slid = dict(zip(states, unchanged, strict=True))
+        sides = self.sides(slid)
+        modes = {kink.beyond: sp.S.Zero for kink in self.component.kinks if isinstance(kink, Switch)}
+        stated = {x: sp.sympify(side) for x, side in (self.sliding or {}).items() if x in sides or x in modes}
+        return slid | modes | sides | stated
 
     def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
         """The force [N] in a steady motion at the velocity; None where it cannot be said."""
         from sympy import Piecewise
 
-        from friso.equations.component import Switch
-
         try:
             slid: dict[Any, Any] = {**self.slid()}
         except ValueError:
             return None
-        kinks = [kink for kink in self.component.kinks if not isinstance(kink, Switch)]
-        surfaces = {direction(velocity).beyond: velocity, **{kink.beyond: kink.surface.subs(slid) for kink in kinks}}
-        sides: dict[Any, Any] = {side: Piecewise((1, surface > 0), (0, True)) for side, surface in surfaces.items()}
-        return self.force.subs(slid).subs(sides)
+        ways: dict[Any, Any] = {direction(velocity).beyond: Piecewise((1, velocity > 0), (0, True))}
+        return self.force.subs(slid).subs(ways)
+
+    def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
+        """On which side of its kinks the law is in `states`: conditions, by the kinks' symbols; without the direction
+        of the motion and modes that remember."""
+        from sympy import Piecewise
+
+        from friso.equations.component import Switch
+
+        kinks = [k for k in self.component.kinks if not isinstance(k, Switch) and k.name != DIRECTION]
+        return {kink.beyond: Piecewise((1, kink.surface.subs({**states}) >= 0), (0, True)) for kink in kinks}
 
 
 def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
@@ -82,7 +93,11 @@ def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
     others know it, and set it. About it friction may have a peak that is `narrow` [m/s]."""
     from friso.equations.component import Kink
 
-    return Kink("forward", velocity) if narrow is None else Kink("forward", velocity, narrow=narrow)
+    return Kink(DIRECTION, velocity) if narrow is None else Kink(DIRECTION, velocity, narrow=narrow)
+
+
+DIRECTION = "forward"
+"""Name of the kink of the direction."""
 
 
 class StribeckCurve(NamedTuple):
@@ -133,12 +148,26 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp
     exponent = curve.exponent
     ratio = velocity / key("friction.stribeck_velocity")
     if exponent is None:
-        tiny = 1e-60  # keeps the power differentiable at rest
-        power = (ratio**2 + tiny) ** (key("friction.stribeck_exponent") / 2)
+        power = (ratio**2 + TINY) ** (key("friction.stribeck_exponent") / 2)
     else:
         power = ratio**exponent if exponent % 2 == 0 else (sign * ratio) ** exponent
     level = coulomb + (static - coulomb) * exp(-power)
     return level * (1 + key("friction.asymmetry") * sign) if curve.asymmetric else level
+
+
+def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Expr:
+    """The same g(v) [N] where no sign is held: not differentiable at rest."""
+    from sympy import Integer, sqrt
+
+    from friso.equations.component import key
+
+    speed = sqrt(velocity**2 + TINY)
+    level = stribeck_level(speed, Integer(1), curve._replace(asymmetric=False))
+    return level * (1 + key("friction.asymmetry") * velocity / speed) if curve.asymmetric else level
+
+
+TINY = 1e-60
+"""Keeps roots and powers of squares differentiable at 0."""
 
 
 def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:

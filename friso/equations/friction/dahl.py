@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
 
 from friso.equations.friction.common import Friction, direction
+from friso.equations.friction.measured import Levels, MeasuredFriction, displacements
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import FrictionSection, register_friction
 
@@ -34,3 +38,25 @@ class Dahl(FrictionSection):
         outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
         force = stiffness * deflection + key("friction.viscous") * velocity
         return Friction(force, coulomb, Component((bristles,), (forward,), outputs))
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
+        """One level of friction at all speeds, which no Stribeck velocity follows from, and no damping at rest but the
+        viscous."""
+        coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
+        levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])
+        way = displacements(coulomb, stiffness)
+        return MeasuredFriction(levels, stiffness, 0.0, way, -coulomb * np.expm1(-way * stiffness / coulomb))
+
+    @staticmethod
+    def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
+        """The stiffness, and friction at speed: break-away is lost."""
+        return {
+            "friction.coulomb": measured.levels.coulomb,
+            "friction.viscous": measured.levels.viscous,
+            "friction.bristle_stiffness": measured.stiffness,
+        }
+
+
+NO_SPEED = 1e-3
+"""Stribeck velocity [m/s] of a law whose friction does not depend on speed: any will do."""

@@ -3,7 +3,10 @@ doi:10.1016/0005-1098(94)90209-7."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import numpy as np
 
 from friso.equations.friction.common import (
     Friction,
@@ -13,6 +16,7 @@ from friso.equations.friction.common import (
     stribeck_level,
     viscous_force,
 )
+from friso.equations.friction.measured import MeasuredFriction, levels_of
 from friso.quantities import Quantity, Value, positive
 from friso.stage import register_friction
 
@@ -41,3 +45,20 @@ class Stribeck(StribeckSection):
         smooth = even and not variant.asymmetric  # at rest
         component = Component(kinks=() if smooth else (forward,))
         return Friction(force + viscous_force(velocity, forward.sign, variant), key("friction.static"), component)
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
+        """Friction over speed alone: before sliding there is none."""
+        return MeasuredFriction(levels_of(flat), 0.0, 0.0, np.zeros(1), np.zeros(1))
+
+    @staticmethod
+    def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
+        """Friction over speed, down to a hundredth of the Stribeck velocity."""
+        return {
+            **measured.levels.keys,
+            "friction.regularisation_velocity": SLOWEST * measured.levels.stribeck_velocity,
+        }
+
+
+SLOWEST = 0.01
+"""Share of the Stribeck velocity at which the curve rises from 0."""

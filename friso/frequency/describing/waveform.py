@@ -18,7 +18,7 @@ import sympy as sp
 from scipy.linalg import solve_banded
 
 from friso.equations.component import Switch, state
-from friso.equations.friction.common import direction
+from friso.equations.friction.common import DIRECTION, direction
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
 from friso.stage.tables import friction_law
@@ -59,6 +59,9 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
     inner = friction.component.states
     if any(isinstance(kink, Switch) for kink in friction.component.kinks):
         actual = f'"{form.friction}", with modes that remember'
+        raise InputError("friction.model", actual, "a law that is smooth but for the direction", 'model = "lugre"')
+    if any(kink.name != DIRECTION for kink in friction.component.kinks):
+        actual = f'"{form.friction}", with kinks of its own'
         raise InputError("friction.model", actual, "a law that is smooth but for the direction", 'model = "lugre"')
     if len(inner) > 1:
         law = f'"{form.friction}", with {len(inner)} states of its own'

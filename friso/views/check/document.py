@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from friso.views.check.laws import laws_document
 from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
@@ -15,13 +16,18 @@ if TYPE_CHECKING:
     from friso.hunting.feeding import Feeding
     from friso.hunting.outward import AttractionEnd
     from friso.studies.draws import Draws
+    from friso.studies.laws.verdicts import VerdictsByLaw
     from friso.studies.shares import Share
 
 
 def check_document(
-    cases: Mapping[str, Case], draws: Draws | None = None, isolator: Suggestion | None = None
+    cases: Mapping[str, Case],
+    draws: Draws | None = None,
+    isolator: Suggestion | None = None,
+    laws: VerdictsByLaw | None = None,
 ) -> dict[str, Any]:
-    """The cases with their verdicts, what stages drawn from an uncertain one do, and what an isolator would."""
+    """The cases with their verdicts, what stages drawn from an uncertain one do, what an isolator would, and the
+    verdicts across friction laws."""
     document = {name: _case(case) for name, case in cases.items()}
     if draws is not None:
         for name, case in document.items():
@@ -32,6 +38,7 @@ def check_document(
             "stage": cases["given"].stage.name,
             "cases": document,
             **({"isolator": _isolator(isolator)} if isolator else {}),
+            **({"laws": laws_document(laws)} if laws else {}),
         }
     )
 

@@ -10,6 +10,7 @@ from friso.views.check.cases import shown_cases
 from friso.views.check.draws import draws_figure, draws_sentences
 from friso.views.check.figures import check_figures
 from friso.views.check.isolator_words import isolator_sentence
+from friso.views.check.laws import laws_sentences
 from friso.views.check.table import rows
 from friso.views.check.words import conclusion, verdict_sentence
 from friso.views.files import Content
@@ -18,6 +19,7 @@ from friso.views.pages import Report
 if TYPE_CHECKING:
     from friso.cure.suggestion import Suggestion
     from friso.hunting import Case
+    from friso.studies.laws.verdicts import VerdictsByLaw
 
 
 BASIS = (
@@ -27,15 +29,24 @@ BASIS = (
 
 
 def check_files(
-    cases: Mapping[str, Case], draws: Draws | None = None, isolator: Suggestion | None = None
+    cases: Mapping[str, Case],
+    draws: Draws | None = None,
+    isolator: Suggestion | None = None,
+    laws: VerdictsByLaw | None = None,
 ) -> dict[str, Content]:
     """The page, as `check_html`."""
-    return {"report.html": check_html(cases, draws, isolator)}
+    return {"report.html": check_html(cases, draws, isolator, laws)}
 
 
-def check_html(cases: Mapping[str, Case], draws: Draws | None = None, isolator: Suggestion | None = None) -> str:
+def check_html(
+    cases: Mapping[str, Case],
+    draws: Draws | None = None,
+    isolator: Suggestion | None = None,
+    laws: VerdictsByLaw | None = None,
+) -> str:
     """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
-    adds what stages drawn from an uncertain one do, `isolator` what an isolator would."""
+    adds what stages drawn from an uncertain one do, `isolator` what an isolator would, `laws` the verdict across
+    friction laws."""
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
     tolerances = sorted({f"{item.case.solver.rtol:g}" for item in in_order})
@@ -48,6 +59,7 @@ def check_html(cases: Mapping[str, Case], draws: Draws | None = None, isolator: 
             *filter(None, [conclusion(cases)]),
             *([isolator_sentence(isolator)] if isolator else []),
             *(draws_sentences(draws) if draws else []),
+            *(laws_sentences(laws) if laws else []),
         ],
         columns=in_order,
         rows=rows(in_order),

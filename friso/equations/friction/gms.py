@@ -1,0 +1,207 @@
+"""Generalised Maxwell-slip friction: Al-Bender, Lampaert, Swevers 2005, doi:10.1109/TAC.2005.858676.
+
+How the source's conditions are read: an element sticks until its force *along the motion* reaches its share of the
+level, sgn(v) F_i = alpha_i s(v), and then slips until the velocity passes zero. An element that is still bent against
+the motion after a reversal goes on sticking, however far s(v) falls below its force; codes that compare abs(F_i) with
+the level let it jump to the other side there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
+
+import numpy as np
+
+from friso.equations.friction.common import (
+    COULOMB_BELOW_STATIC,
+    TINY,
+    Friction,
+    StribeckCurve,
+    StribeckSection,
+    direction,
+    stribeck_level,
+    stribeck_level_from_speed,
+    viscous_force,
+)
+from friso.equations.friction.measured import MeasuredFriction, displacements, levels_of
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage import Rule, Several, Values, element_keys, register_friction
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+STIFFNESS, SHARE, DAMPING = (f"friction.element_{name}" for name in ("stiffness", "share", "damping"))
+
+AT = 1 - 1e-9
+"""Share of the limit from which on an element that is pulled further is taken to slip at the start of a run."""
+
+MOST = 12
+"""Elements at most."""
+
+
+class Elements(NamedTuple):
+    """What the equations depend on: the Stribeck curve, the number of elements, and whether they are damped."""
+
+    curve: StribeckCurve
+    count: int
+    damped: bool
+
+
+def _as_many(key: str, what: str) -> Rule:
+    """The rule that a list is as long as that of the stiffnesses."""
+    example = 'element_stiffness = ["70 N/mm", "30 N/mm"], element_share = [0.4, 0.6]'
+    return Rule(
+        (STIFFNESS, key),
+        lambda flat: len(element_keys(flat, key)) in (len(element_keys(flat, STIFFNESS)), 0),
+        f"one {what} for each stiffness",
+        example,
+    )
+
+
+@register_friction
+class GeneralisedMaxwellSlip(StribeckSection):
+    """Elements side by side, each a spring that sticks, F_i' = k_i v, or slips, F_i' = C (alpha_i sgn(v) - F_i/s(v));
+    F = sum of F_i + sigma_i z_i' + sigma_2 v, z_i = F_i/k_i being the deflection of an element."""
+
+    model: Literal["gms"]
+    element_stiffness: Annotated[Values, Several(Quantity("N/m", positive, "70 N/mm"), ("70 N/mm", "30 N/mm"), 1, MOST)]
+    element_share: Annotated[Values, Several(Number(positive, "0.5"), ("0.4", "0.6"), 1, MOST)]
+    element_damping: Annotated[
+        Values | None, Several(Quantity("N*s/m", non_negative, "100 N*s/m"), ("220 N*s/m", "95 N*s/m"), 1, MOST)
+    ] = None
+    """Of the rate of each element's deflection (micro-damping); without it there is none."""
+    attraction: Annotated[Value, Quantity("N/s", positive, "1000 N/s")]
+    """The attraction parameter C: with the time constant s(v)/C the force of what slips follows its level."""
+    decided_by: ClassVar[Mapping[str, str]] = {
+        "": "loops within loops of force over displacement before sliding: whether the inner ones close",
+        "friction.attraction": "friction while the speed swings about the Stribeck velocity: how far it lags",
+    }
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        COULOMB_BELOW_STATIC,
+        _as_many(SHARE, "share"),
+        _as_many(DAMPING, "damping"),
+        Rule(
+            (SHARE,),
+            lambda flat: abs(sum(flat[name] for name in element_keys(flat, SHARE)) - 1) < 1e-9,
+            "shares that add up to 1",
+            "element_share = [0.4, 0.6]",
+        ),
+    )
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> Elements:
+        """What decides on the code: the curve, the number of elements, and whether these are damped."""
+        return Elements(
+            StribeckSection.variant(flat), len(element_keys(flat, STIFFNESS)), bool(element_keys(flat, DAMPING))
+        )
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: Elements) -> Friction:
+        """Friction on a body moving at `velocity` [m/s]."""
+        from sympy import And, Integer, Piecewise, sqrt
+
+        from friso.equations.component import Component, Output, Role, State, Switch, key, state
+
+        curve = variant.curve
+        forward = direction(velocity, key("friction.stribeck_velocity"))
+        level, level_at_start = (
+            stribeck_level(velocity, forward.sign, curve),
+            stribeck_level_from_speed(velocity, curve),
+        )
+        static, attraction = key("friction.static"), key("friction.attraction")
+        force = viscous_force(velocity, forward.sign, curve)
+        states, switches, outputs, sliding = [], [], {}, {}
+        for number in range(1, variant.count + 1):
+            z, stiffness, share = state(f"deflection_{number}"), key(f"{STIFFNESS}.{number}"), key(f"{SHARE}.{number}")
+            scale = share * static / stiffness
+            limit = share * level / stiffness
+            pulled_on = And(z * velocity > 0, z**2 >= (AT * share * level_at_start / stiffness) ** 2)
+            slip = Switch(
+                f"slip_{number}",
+                enter=forward.sign * z - limit,
+                leave=-z * velocity / scale,
+                begins=Piecewise((1, pulled_on), (-1, True)),
+                # the limit to either side, but for the square of what rounding leaves
+                entered={z: (z + limit**2 / z) / 2},
+            )
+            side = z / sqrt(z**2 + TINY)  # what slips is bent along the motion
+            slipping = attraction / stiffness * (share * side - stiffness * z / level)
+            rate = velocity * (1 - slip.beyond) + slipping * slip.beyond
+            states.append(State(z, rate, "m", scale, Role.BRISTLE))
+            switches.append(slip)
+            outputs[f"deflection_{number}"] = Output(z, "m", f"deflection of element {number}")
+            outputs[f"slip_{number}"] = Output(slip.beyond, "1", f"element {number} slips")
+            sliding |= {z: forward.sign * limit, slip.beyond: Integer(1)}
+            force += stiffness * z + (key(f"{DAMPING}.{number}") * rate if variant.damped else 0)
+        return Friction(force, static, Component(tuple(states), (forward, *switches), outputs), sliding)
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
+        """From rest each element is drawn along until it bears its share of static friction."""
+        levels, stiffness, strength = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
+        strength = strength * levels.static
+        way = displacements(levels.static, float(stiffness.sum()))
+        force = np.minimum(stiffness * way[:, None], strength).sum(axis=1)
+        damping = sum(flat[name] for name in element_keys(flat, DAMPING))
+        return MeasuredFriction(levels, float(stiffness.sum()), float(damping), way, force)
+
+    @staticmethod
+    def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
+        """The virgin curve as a polygon of its tangents: the first stiffness and break-away are kept exactly. The
+        attraction lets friction lag as LuGre's does at the Stribeck velocity, s/C = g/(sigma_0 v_s)."""
+        stiffness, slips = polygon(measured, elements)
+        strength = stiffness * slips
+        damped = {f"{DAMPING}.{n}": measured.damping * k / measured.stiffness for n, k in enumerate(stiffness, 1)}
+        return {
+            **measured.levels.keys,
+            **{f"{STIFFNESS}.{n}": float(k) for n, k in enumerate(stiffness, 1)},
+            **{f"{SHARE}.{n}": float(f) for n, f in enumerate(strength / strength.sum(), 1)},
+            **(damped if measured.damping else {}),
+            "friction.attraction": measured.stiffness * measured.levels.stribeck_velocity,
+        }
+
+    @staticmethod
+    def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
+        """How far friction lags behind a changing speed: a decade to either side."""
+        usual = measured.stiffness * measured.levels.stribeck_velocity
+        return {"friction.attraction": (usual / 10, usual * 10)}
+
+    @staticmethod
+    def active(flat: Mapping[str, Any]) -> str:
+        """Passive where static and Coulomb friction are the same: else a slip that slows down loads the elements
+        without a displacement, and they give that back as they are unloaded."""
+        levels, stiffness, share = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
+        gained = float((share**2 * (levels.static**2 - levels.coulomb**2) / (2 * stiffness)).sum())
+        return (
+            f"static = coulomb; with more static friction a reversal gives back up to {gained:.3g} J" if gained else ""
+        )
+
+
+def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
+    """The values of a list, shape (elements,)."""
+    return np.array([flat[name] for name in element_keys(flat, key)])
+
+
+POWERS = np.linspace(0.6, 4.0, 69)
+"""How closely the tangents may lie towards the end of the virgin curve."""
+
+
+def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness [N/m] and deflection at which it slips [m] of elements that together have the virgin curve, both of
+    shape (elements,): the polygon of tangents at slopes spaced so that it is off the least."""
+    tried = [_tangents(measured, (1 - np.arange(elements + 1) / elements) ** power) for power in POWERS]
+    curves = [np.minimum(k * measured.displacement[:, None], k * x).sum(axis=1) for k, x in tried]
+    return tried[int(np.argmin([measured.misfit(curve) for curve in curves]))]
+
+
+def _tangents(measured: MeasuredFriction, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The elements of the polygon of tangents with the slopes `levels`, in units of the first stiffness, from 1 to
+    0."""
+    slope = measured.stiffness * levels
+    touched = np.interp(-slope, -measured.slope, measured.displacement)
+    force = np.interp(touched, measured.displacement, measured.force)
+    force[0], force[-1], touched[0], touched[-1] = 0.0, measured.levels.static, 0.0, 0.0
+    stiffness = -np.diff(slope)
+    return stiffness, np.diff(force - slope * touched) / stiffness

@@ -1,0 +1,93 @@
+"""What measurements show of friction, whatever the law: steady friction over speed, the force over displacement before
+sliding from rest (the virgin curve), and damping at rest. Laws declare theirs, and what else they leave open."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+REACH, POINTS = 60.0, 2000
+"""How far the virgin curve goes, in units of the deflection that static friction would cause at the first stiffness;
+and its points, which lie the closer the nearer to rest."""
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Steady friction over speed: a Stribeck curve (see `StribeckSection`)."""
+
+    static: float
+    coulomb: float
+    stribeck_velocity: float
+    stribeck_exponent: float
+    viscous: float
+    asymmetry: float = 0.0
+    viscous_asymmetry: float = 0.0
+
+    @property
+    def keys(self) -> dict[str, float]:
+        """As keys of the stage file; asymmetries only where there are any."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {f"friction.{name}": value for name, value in values.items() if value or "asymmetry" not in name}
+
+
+@dataclass(frozen=True)
+class MeasuredFriction:
+    """Friction as measurements show it: `levels` over speed; `stiffness` [N/m] and `damping` [N s/m] of small motions
+    at rest; and `force` [N] over `displacement` [m] from rest without load, slowly, both of shape (n,), from 0 on. No
+    stiffness, 0, is that of a law that does not stick."""
+
+    levels: Levels
+    stiffness: float
+    damping: float
+    displacement: np.ndarray
+    force: np.ndarray
+
+    @property
+    def slope(self) -> np.ndarray:
+        """Of the virgin curve [N/m], shape (n,)."""
+        slopes = np.gradient(self.force, self.displacement)
+        slopes[0] = self.stiffness
+        return np.minimum.accumulate(np.clip(slopes, 0.0, self.stiffness))
+
+    def misfit(self, force: np.ndarray) -> float:
+        """How far another virgin curve [N], over the same displacements, is off at most, as a share of static
+        friction."""
+        return float(np.max(np.abs(force - self.force)) / self.levels.static)
+
+
+def displacements(static: float, stiffness: float) -> np.ndarray:
+    """Displacements [m] at which virgin curves are compared, shape (n,)."""
+    return static / stiffness * REACH * np.linspace(0.0, 1.0, POINTS) ** 2
+
+
+def levels_of(flat: Mapping[str, Any]) -> Levels:
+    """The Stribeck curve of a law that has one."""
+    values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
+    return Levels(**{name: float(value) for name, value in values.items()})
+
+
+def on_bristles(flat: Mapping[str, Any], force: np.ndarray) -> MeasuredFriction:
+    """What is measured of a law with a Stribeck curve whose bristles, as stiff and damped as those of LuGre, give the
+    virgin curve `force` [N] at the `displacements` that belong to them."""
+    levels, stiffness = levels_of(flat), float(flat["friction.bristle_stiffness"])
+    return MeasuredFriction(
+        levels, stiffness, float(flat["friction.bristle_damping"]), displacements(levels.static, stiffness), force
+    )
+
+
+def best(candidates: np.ndarray, misfits: np.ndarray) -> float:
+    """The candidate whose misfit is the smallest."""
+    return float(candidates[int(np.argmin(misfits))])
+
+
+SLACK = 0.02
+"""Share of static friction by which a virgin curve may be off more than the best, and still pass for the measured."""
+
+
+def as_good(candidates: np.ndarray, misfits: np.ndarray) -> tuple[float, float]:
+    """The range of the candidates that a measurement could not tell from the best."""
+    good = candidates[misfits <= np.min(misfits) + SLACK]
+    return float(good.min()), float(good.max())

@@ -1,0 +1,111 @@
+"""Rolling friction whose stiffness before gross rolling falls as a power of the force: Dahl 1976, doi:10.2514/3.61511,
+in the frame of LuGre (a Stribeck level, bristle damping and viscous friction).
+
+Dahl's exponent i shapes the virgin curve: d(sigma_0 z)/dx = sigma_0 (1 - sigma_0 z/g)^i, so that from rest
+1 - F/F_s = (1 + (i - 1) sigma_0 x/F_s)^(-1/(i - 1)). With i = 1 this is LuGre. The memory is that of one state:
+Masing's rule, which ball guideways obey (Al-Bender, Symens 2005, doi:10.1016/j.wear.2004.11.018), holds for elements
+side by side (`gms`), not here: behind a reversal from rolling the stiffness is 2^i sigma_0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+import numpy as np
+
+from friso.equations.friction.common import (
+    TINY,
+    Friction,
+    StribeckCurve,
+    StribeckSection,
+    direction,
+    stribeck_level,
+    viscous_force,
+)
+from friso.equations.friction.lugre import bristles_active
+from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, on_bristles
+from friso.quantities import Bound, Number, Quantity, Value, non_negative, positive
+from friso.stage import register_friction
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+from_1_to_4 = Bound("from 1 to 4", lambda value: (value >= 1) & (value <= 4))
+
+
+@register_friction
+class Rolling(StribeckSection):
+    """Bristles that give way by a power of what they lack: z' = v r abs(r)^(i - 1), r = 1 - sigma_0 z sgn(v)/g(v),
+    F = sigma_0 z + sigma_1 z' + sigma_2 v."""
+
+    model: Literal["rolling"]
+    bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
+    bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
+    rolling_exponent: Annotated[float, Number(from_1_to_4, "1.5")]
+    decided_by: ClassVar[Mapping[str, str]] = {
+        "": "force over displacement from rest up to break-away",
+        "friction.rolling_exponent": "force over displacement from rest up to break-away",
+    }
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
+        """Friction on a body moving at `velocity` [m/s]."""
+        from friso.equations.component import Component, Output, Role, State, key, state
+
+        forward = direction(velocity, key("friction.stribeck_velocity"))
+        deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
+        level = stribeck_level(velocity, forward.sign, variant)
+        lacking = 1 - stiffness * forward.sign * deflection / level
+        rate = velocity * lacking * (lacking**2 + TINY) ** ((key("friction.rolling_exponent") - 1) / 2)
+        force = (
+            stiffness * deflection
+            + key("friction.bristle_damping") * rate
+            + viscous_force(velocity, forward.sign, variant)
+        )
+        static = key("friction.static")
+        bristles = State(deflection, rate, "m", static / stiffness, Role.BRISTLE)
+        outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
+        sliding = {deflection: forward.sign * level / stiffness}
+        return Friction(force, static, Component((bristles,), (forward,), outputs), sliding)
+
+    @staticmethod
+    def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
+        """From rest as Dahl's exponent has it."""
+        static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
+        way = displacements(static, stiffness)
+        return on_bristles(flat, virgin(static, stiffness, flat["friction.rolling_exponent"], way))
+
+    @staticmethod
+    def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
+        """Bristles as stiff and damped as measured; the exponent fits the virgin curve best."""
+        return {
+            **measured.levels.keys,
+            "friction.bristle_stiffness": measured.stiffness,
+            "friction.bristle_damping": measured.damping,
+            "friction.rolling_exponent": best(*_tried(measured)),
+        }
+
+    @staticmethod
+    def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
+        """Exponents with which the virgin curve is hardly another."""
+        return {"friction.rolling_exponent": as_good(*_tried(measured))}
+
+    @staticmethod
+    def active(flat: Mapping[str, Any]) -> str:
+        """Passive where sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i: z' v >= -v^2 ((F_s - F_c)/F_c)^i."""
+        return bristles_active(flat, flat["friction.rolling_exponent"])
+
+
+def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
+    """Exponents, and how far the virgin curve is off with each."""
+    tried = np.linspace(1.0, 4.0, 301)
+    curves = (virgin(measured.levels.static, measured.stiffness, i, measured.displacement) for i in tried)
+    return tried, np.array([measured.misfit(curve) for curve in curves])
+
+
+def virgin(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
+    """Force [N] over displacement [m] from rest, both of shape (n,)."""
+    way, more = stiffness * displacement / static, exponent - 1
+    lacking = np.exp(-way) if more == 0 else (1 + more * way) ** (-1 / more)
+    return static * (1 - lacking)

@@ -1,0 +1,168 @@
+"""From one friction law to another that shows the same in measurements, and what could not be kept."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.friction.measured import MeasuredFriction
+from friso.errors import InputError
+from friso.frequency.friction import steady_force
+from friso.stage import Stage
+from friso.stage.section import list_fields, nearest, numeric_fields
+from friso.stage.tables import FRICTION, FrictionSection, friction_law
+
+ELEMENTS = 6
+"""Elements of a law that has several, unless told otherwise."""
+
+KEPT = 1e-6
+"""Relative difference below which a number is kept."""
+
+SPEEDS = np.geomspace(1e-2, 1e3, 201)
+"""Speeds, in Stribeck velocities, at which steady friction is compared."""
+
+
+@dataclass(frozen=True)
+class MeasuredChange:
+    """One thing that a measurement shows, `before` and `after` the conversion [unit], and by how much it is off, as a
+    share of static friction for curves and of the number itself for numbers; it is kept where that is below
+    `allowed`."""
+
+    what: str
+    unit: str
+    before: float
+    after: float
+    off: float
+    allowed: float = KEPT
+
+    @property
+    def kept(self) -> bool:
+        return self.off <= self.allowed
+
+
+@dataclass(frozen=True)
+class Conversion:
+    """A stage with another friction law: what it was made from, what was compared, the keys that the measurements leave
+    open, with their ranges [SI], and the condition of passivity that the law does not meet ("" where it is passive)."""
+
+    stage: Stage
+    source: Stage
+    before: MeasuredFriction
+    after: MeasuredFriction
+    compared: tuple[MeasuredChange, ...]
+    open: Mapping[str, tuple[float, float]]
+    active: str
+
+    @property
+    def law(self) -> str:
+        """The name of the law."""
+        return self.stage.flat()["friction.model"]
+
+    @property
+    def lost(self) -> tuple[MeasuredChange, ...]:
+        """What could not be kept."""
+        return tuple(item for item in self.compared if not item.kept)
+
+
+def convertible() -> list[str]:
+    """The laws that can be made from measurements."""
+    return [
+        name
+        for name, law in FRICTION.classes.items()
+        if issubclass(law, FrictionSection) and law.keeping is not FrictionSection.keeping
+    ]
+
+
+def measured(flat: Mapping[str, Any]) -> MeasuredFriction:
+    """What measurements would show of the friction of a stage given as flat keys, moving forward. Raises InputError for
+    a law that does not declare it."""
+    name = flat["friction.model"]
+    law = friction_law(name)
+    if law.shown is FrictionSection.shown:
+        actual = (
+            "no friction at the guide" if name == "none" else f'"{name}", which does not declare what is measured of it'
+        )
+        raise InputError("friction.model", actual, f"one of {', '.join(convertible())}", 'model = "lugre"')
+    return law.shown(flat)
+
+
+def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> Conversion:
+    """The stage with the named law in the place of its own, which shows the same in measurements as nearly as the law
+    can; `elements` side by side, of a law that has several. Raises InputError for a law that cannot be made from
+    measurements, and for a stage whose own does not stick."""
+    if law not in convertible():
+        near = nearest(law, convertible()) or "gms"
+        raise InputError("--friction", f'"{law}"', f"one of {', '.join(convertible())}", f"--friction {near}")
+    before = measured(stage.flat())
+    if not before.stiffness and law != stage.flat()["friction.model"]:
+        actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
+        raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
+    keys = friction_law(law).keeping(before, elements)
+    made = stage.replace({"friction": _table(stage, law, keys)})
+    return compared(stage, made, before)
+
+
+def compared(source: Stage, made: Stage, before: MeasuredFriction) -> Conversion:
+    """A stage `made` from another, whose friction was measured `before`."""
+    flat = made.flat()
+    after, law = measured(flat), friction_law(flat["friction.model"])
+    items = (
+        _curve(source, made, before),
+        _number("break-away", "N", before.levels.static, after.levels.static),
+        _number("stiffness before sliding", "N/m", before.stiffness, after.stiffness),
+        _virgin(before, after),
+        _number("damping at rest", "N*s/m", before.damping, after.damping),
+        _number("viscous damping", "N*s/m", before.levels.viscous, after.levels.viscous),
+    )
+    return Conversion(made, source, before, after, items, law.left_open(before), law.active(flat))
+
+
+def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
+    """The table [friction] with such keys, as a stage file has it, in the units of the stage's axis."""
+    cls, kind = friction_law(law), stage.axis_kind
+    table: dict[str, Any] = {"model": law}
+    for name, field in numeric_fields(cls).items():
+        if f"friction.{name}" in keys:
+            table[name] = _text(float(keys[f"friction.{name}"]), getattr(field.on(kind), "unit", ""))
+    for name, several in list_fields(cls).items():
+        values = [value for key, value in keys.items() if key.startswith(f"friction.{name}.")]
+        if values:
+            table[name] = [_text(float(value), getattr(several.on(kind).of, "unit", "")) for value in values]
+    return table
+
+
+def _text(value: float, unit: str) -> Any:
+    """A value as a stage file has it, read again as the same number."""
+    return f"{value!r} {unit}" if unit else value
+
+
+def _number(what: str, unit: str, before: float, after: float) -> MeasuredChange:
+    size = max(abs(before), abs(after)) or 1.0
+    return MeasuredChange(what, unit, before, after, abs(after - before) / size)
+
+
+def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChange:
+    """Steady friction, where the curves are farthest apart, forward and back."""
+    speeds = SPEEDS * before.levels.stribeck_velocity
+    old, new = (
+        np.stack([steady_force(stage.flat(), speeds, way) for way in (True, False)]) for stage in (source, made)
+    )
+    at = np.unravel_index(int(np.argmax(np.abs(new - old))), old.shape)
+    off = float(np.abs(new - old)[at] / before.levels.static)
+    return MeasuredChange("steady friction over speed", "N", float(old[at]), float(new[at]), off)
+
+
+WITHIN = 0.02
+"""Share of static friction by which a virgin curve may be off and still be the same in a measurement."""
+
+
+def _virgin(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
+    """The virgin curve, where the two are farthest apart."""
+    if not after.stiffness:
+        return MeasuredChange("virgin curve", "N", before.levels.static, 0.0, 1.0, WITHIN)
+    force = np.interp(before.displacement, after.displacement, after.force)
+    at = int(np.argmax(np.abs(force - before.force)))
+    return MeasuredChange("virgin curve", "N", float(before.force[at]), float(force[at]), before.misfit(force), WITHIN)

@@ -1,0 +1,1 @@
+"""What `friso convert` shows."""

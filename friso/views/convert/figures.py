@@ -1,0 +1,39 @@
+"""The figure of a conversion: both laws as measurements show them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.frequency.friction import steady_force
+from friso.views.drawing.figure import BLUE, VERMILLION, Axis, Figure, Panel, Series
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import Conversion
+
+SHOWN = 5.0
+"""How far virgin curves are drawn, in units of the deflection that static friction causes at the first stiffness."""
+
+
+def conversion_figure(conversion: Conversion) -> Figure:
+    """Virgin curves and steady friction over speed, before and after."""
+    levels, before = conversion.before.levels, conversion.before
+    stages = (
+        (conversion.source, before, VERMILLION, "solid"),
+        (conversion.stage, conversion.after, BLUE, "dashed"),
+    )
+    speeds = np.geomspace(1e-2, 1e2, 400) * levels.stribeck_velocity
+    reach = SHOWN * levels.static / before.stiffness if before.stiffness else np.inf
+    virgin, steady = [], []
+    for stage, curve, colour, dash in stages:
+        flat, near = stage.flat(), curve.displacement <= reach
+        label = flat["friction.model"]
+        virgin.append(Series(curve.displacement[near], curve.force[near], label, colour, dash))  # type: ignore[arg-type]
+        steady.append(Series(speeds, steady_force(flat, speeds, True), label, colour, dash))  # type: ignore[arg-type]
+    panels = (
+        Panel("From rest, slowly", Axis("Displacement", "m"), Axis("Friction force", "N"), tuple(virgin)),
+        Panel("Steady motion", Axis("Speed", "m/s", log=True), Axis("Friction force", "N"), tuple(steady)),
+    )
+    caption = "Friction as measurements show it, before and after the conversion."
+    return Figure("friction", "Friction before and after", caption, panels, 2, conversion.stage.name)

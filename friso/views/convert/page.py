@@ -1,0 +1,19 @@
+"""The files of `friso convert`: the stage file, and the figure."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING
+
+from friso.views.convert.figures import conversion_figure
+from friso.views.drawing.matplotlib_renderer import save
+from friso.views.files import Content
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import Conversion
+
+
+def convert_files(conversion: Conversion, stem: str) -> dict[str, Content]:
+    """The stage file with the law, and the figure."""
+    figure = conversion_figure(conversion)
+    return {f"{stem}.toml": conversion.stage.to_toml(), f"{stem}.png": partial(save, figure)}

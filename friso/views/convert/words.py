@@ -1,0 +1,63 @@
+"""A conversion to another friction law in words: what is kept, what is not, and what is left open."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from friso.stage.stage import declared_keys
+from friso.views.drawing.prefixes import listed, with_unit
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import Conversion, MeasuredChange
+
+COLUMNS = ("before", "after", "off by", "kept")
+"""Of the table of what is compared."""
+
+
+def conversion_sentences(conversion: Conversion) -> list[str]:
+    """What could not be kept comes first; then what is left open, and whether the law may give energy back."""
+    law, lost = conversion.law, conversion.lost
+    name = conversion.stage.name or "the stage"
+    if lost:
+        says = [f"{name} under {law}: {listed([_lost(item) for item in lost], 'and')}."]
+    else:
+        says = [f"{name} under {law} shows the same in measurements."]
+    says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
+    if conversion.active:
+        says.append(f"The law may give energy back, which no friction does. It is passive where {conversion.active}.")
+    return says
+
+
+def _lost(item: MeasuredChange) -> str:
+    return f"{item.what} is not kept ({with_unit(item.before, item.unit)} becomes {with_unit(item.after, item.unit)})"
+
+
+def _open(key: str, ends: tuple[float, float], conversion: Conversion) -> str:
+    flat = conversion.stage.flat()
+    unit = getattr(declared_keys(flat)[key], "unit", "")
+    low, high, value = (with_unit(x, unit) if unit else f"{x:.3g}" for x in (*ends, flat[key]))
+    return f"The measurements leave {key} open between {low} and {high}; it is {value}."
+
+
+def conversion_rows(conversion: Conversion) -> list[tuple[str, list[str]]]:
+    """The rows of the table: before, after, by how much it is off, whether it is kept."""
+    return [
+        (
+            item.what,
+            [
+                with_unit(item.before, item.unit),
+                with_unit(item.after, item.unit),
+                f"{100 * item.off:.2g} %",
+                "yes" if item.kept else "no",
+            ],
+        )
+        for item in conversion.compared
+    ]
+
+
+def friction_table(conversion: Conversion) -> str:
+    """The table [friction] of the stage file."""
+    text = conversion.stage.to_toml()
+    begin = text.index("[friction]")
+    end = text.find("\n[", begin + 1)
+    return text[begin : end if end > 0 else None].strip()

@@ -1,0 +1,144 @@
+"""Elasto-plastic and rolling friction: laws of one bristle that differ from LuGre in how it gives way."""
+
+import numpy as np
+import plain
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from variants import FULL, HOLD, VARIANTS, elasto_plastic, gains, gms, lugre, release, rolling, stage, step, van_dijk
+
+import friso
+from friso.engine.driven import Inputs, follow
+from friso.engine.kernel import KernelRequest, kernel, kernels
+from friso.equations.driven import Driven
+from friso.equations.imposed import imposed_form
+from friso.equations.structure import structure
+from friso.errors import InputError
+from friso.frequency.describing.function import describing
+from friso.frequency.describing.waveform import OneStateLaw
+from friso.frequency.members import member
+from friso.frequency.parts import plant
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import hunting_cycles
+from friso.stage.tables import friction_law
+from friso.virtual_rig.run import failures, run
+from friso.virtual_rig.task import own_motion
+
+pytestmark = pytest.mark.xdist_group("bristle_laws")
+
+LAWS = {"elasto_plastic": elasto_plastic(), "rolling": rolling()}
+
+HUNTING = {name: stage(release("1 mm", "1 s"), friction=law, controller=van_dijk("5 Hz")) for name, law in LAWS.items()}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    forms = [structure(each.flat()) for each in HUNTING.values()]
+    kernels([*map(KernelRequest, forms), *(KernelRequest(form, True) for form in forms)])
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_cycles_against_simulation_and_scipy(law: str) -> None:
+    """Amplitude by a long run at two tolerances, and half a period by Radau on the law written by hand."""
+    hunting = HUNTING[law]
+    stages = Ensemble.held(hunting.flat(), 1)
+    cycles = hunting_cycles(stages)
+    assert cycles.closed[0], cycles.reasons[0]
+    period, amplitude = float(cycles.period[0]), float(cycles.amplitude[0])
+    assert abs(cycles.multiplier[0]) < 1
+    for rtol in (1e-7, 1e-9):
+        long = friso.simulate(hunting.replace({"motion.duration": "100 s"}), rtol, 1.0)
+        late = long.turning_deviation.values[long.turning_time.values > 100 - 2 * period]
+        assert np.ptp(late) / 2 == pytest.approx(amplitude, rel=1e-4)
+    names = stages.kernel.states
+    rates = plain.rates({**hunting.flat(), "motion.kind": "hold"}, names)
+    scale, start = stages.scales[0], cycles.states[0]
+    half = solve_ivp(rates, (0, period / 2), start, "Radau", rtol=1e-7, atol=1e-9 * scale)
+    assert np.max(np.abs(half.y[:, -1] + start) / scale) < 1e-4
+
+
+def drift(friction: str, periods: int) -> float:
+    """By how much [m] a body moves between the tenth and the last period of a load of 0.4 N +/- 0.25 N at 20 Hz."""
+    held = stage(HOLD, friction=friction, controller=gains(1e-6))
+    shape, frequency, per = kernel(Driven(structure(held.flat()))), 20.0, 40
+    t = np.arange(periods * per + 1) / per / frequency
+    force = (0.4 + 0.25 * np.sin(2 * np.pi * frequency * t)) * np.minimum(1, t * frequency / 4)
+    inputs = Inputs(np.zeros(len(t)), force, 1 / per / frequency, held=False)
+    (runs,) = follow(shape, held.flat(), 1, inputs, np.zeros((1, shape.initial_size)), 1e-8)
+    position = runs.states[0, :, shape.position]
+    return float(position[-per - 1 : -1].mean() - position[10 * per : 11 * per].mean())
+
+
+def test_a_load_below_break_away_makes_lugre_drift_and_others_not() -> None:
+    """friso's docs tell the numbers after 10 000 periods (docs/friction.md)."""
+    assert drift(lugre(2), 200) > 1e-6
+    assert abs(drift(elasto_plastic(), 200)) < 1e-12
+    assert abs(drift(gms(), 200)) < 1e-10
+
+
+def test_up_to_break_away_it_is_a_spring_and_a_damper() -> None:
+    """The describing function is sigma_0 + i omega (sigma_1 + sigma_2) exactly, not in the limit alone."""
+    one = VARIANTS["rigid, elasto-plastic"]
+    table = describing(one, [1e-7, 5e-6], [10.0])
+    assert table.stiffness.values[:, 0] == pytest.approx([1e5 + 2j * np.pi * 10 * (316.2277660168379 + 0.5)] * 2)
+    assert abs(describing(one, [2e-5], [10.0]).stiffness.values[0, 0]) < 0.9e5
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_small_motions(law: str) -> None:
+    """Stuck on the bristles; sliding on the Stribeck curve."""
+    flat = HUNTING[law].flat()
+    stuck, sliding = plant(flat, member()), plant(flat, member(2e-3))
+    assert stuck.a[0, 1, :2] == pytest.approx([-1e5 / 1.7, -(316.2277660168379 + 0.5) / 1.7], rel=1e-12)
+    assert len(sliding.states) == {"elasto_plastic": 3, "rolling": 2}[law]
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(st.sampled_from([*LAWS]), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(1.0, 4.0), st.floats(0.3, 1.0))
+def test_passive_laws_create_no_energy(law: str, speed: float, bent: float, exponent: float, share: float) -> None:
+    """F v is no less than what the bristles store, wherever the law says that it is passive; and where it is not, there
+    are states in which it is less."""
+    flat = {**HUNTING[law].flat(), "friction.coulomb": 3 * share, "friction.rolling_exponent": exponent}
+    flat["friction.breakaway_deflection"] = 0.5 * flat["friction.coulomb"] / 1e5
+    least = 316.2277660168379 * (1 / share - 1) ** (exponent if law == "rolling" else 1)
+    assert bool(friction_law(law).active({**flat, "friction.viscous": 0.999 * least})) == (least > 0)
+    passive = {**flat, "friction.viscous": least * (1 + 1e-9)}
+    assert not friction_law(law).active(passive)
+    v, z = 0.01 * speed**3, bent * 3.0 / 1e5
+    force, rate = plain.friction(passive, v, z)
+    assert force * v - 1e5 * z * rate >= -1e-12
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_an_active_law_gives_energy_back_somewhere(law: str) -> None:
+    flat = HUNTING[law].flat()
+    assert friction_law(law).active(flat)
+    force, rate = plain.friction(flat, 0.05, 2.99e-5)
+    assert force * 0.05 - 1e5 * 2.99e-5 * rate < 0
+
+
+def test_the_drive_as_built() -> None:
+    """A quick drive without imperfections moves the stage as the continuous loop does."""
+    moves = stage(step("100 um", "0.3 s"), friction=elasto_plastic(), controller=gains(**FULL, tau=1e-3))
+    built = moves.replace({"drive": {"sample_time": "20 us"}})
+    (recorded,) = run(built, own_motion(built), [0], 1e-3)
+    assert not failures(recorded)
+    response = friso.simulate(moves, 1e-8, 1e-3)
+    position = recorded.true["position"][0]
+    assert np.ptp(position) > 1e-5
+    assert np.abs(position - response.position.values[: len(position)]).max() < 0.05 * np.ptp(position)
+
+
+def test_harmonic_balance_refuses_kinks_of_its_own() -> None:
+    with pytest.raises(InputError, match="kinks of its own"):
+        OneStateLaw.of(HUNTING["elasto_plastic"].flat())
+
+
+def test_bristles_that_would_not_slip_are_refused() -> None:
+    with pytest.raises(InputError, match="less than Coulomb friction"):
+        HUNTING["elasto_plastic"].replace({"friction.breakaway_deflection": "10 um"})
+
+
+def test_imposed_motion_takes_every_law() -> None:
+    assert {imposed_form(each.flat()).friction for each in HUNTING.values()} == {*LAWS}
