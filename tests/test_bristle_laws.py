@@ -6,7 +6,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
-from variants import FULL, HOLD, VARIANTS, elasto_plastic, gains, gms, lugre, release, rolling, stage, step, van_dijk
+from variants import (
+    FULL,
+    HOLD,
+    MICRO_DAMPING,
+    VARIANTS,
+    elasto_plastic,
+    gains,
+    gms,
+    lugre,
+    release,
+    rolling,
+    stage,
+    step,
+    van_dijk,
+)
 
 import friso
 from friso.engine.driven import Inputs, follow
@@ -29,7 +43,7 @@ pytestmark = pytest.mark.xdist_group("bristle_laws")
 
 LAWS = {"elasto_plastic": elasto_plastic(), "rolling": rolling()}
 
-HUNTING = {name: stage(release("1 mm", "1 s"), friction=law, controller=van_dijk("5 Hz")) for name, law in LAWS.items()}
+HUNTING = {name: stage(release("1 mm", "1 s"), friction=law, controller=van_dijk("3 Hz")) for name, law in LAWS.items()}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -74,7 +88,7 @@ def test_a_load_below_break_away_makes_lugre_drift_and_others_not() -> None:
     """friso's docs tell the numbers after 10 000 periods (docs/friction.md)."""
     assert drift(lugre(2), 200) > 1e-6
     assert abs(drift(elasto_plastic(), 200)) < 1e-12
-    assert abs(drift(gms(), 200)) < 1e-10
+    assert abs(drift(gms(damping=MICRO_DAMPING), 200)) < 1e-12
 
 
 def test_up_to_break_away_it_is_a_spring_and_a_damper() -> None:
@@ -82,7 +96,9 @@ def test_up_to_break_away_it_is_a_spring_and_a_damper() -> None:
     one = VARIANTS["rigid, elasto-plastic"]
     table = describing(one, [1e-7, 5e-6], [10.0])
     assert table.stiffness.values[:, 0] == pytest.approx([1e5 + 2j * np.pi * 10 * (316.2277660168379 + 0.5)] * 2)
-    assert abs(describing(one, [2e-5], [10.0]).stiffness.values[0, 0]) < 0.9e5
+    beyond = describing(one, [2e-5], [10.0]).stiffness.values[0, 0]
+    assert beyond.real < 0.95e5
+    assert beyond.imag > 1.2 * table.stiffness.values[0, 0].imag
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -91,7 +107,9 @@ def test_small_motions(law: str) -> None:
     flat = HUNTING[law].flat()
     stuck, sliding = plant(flat, member()), plant(flat, member(2e-3))
     assert stuck.a[0, 1, :2] == pytest.approx([-1e5 / 1.7, -(316.2277660168379 + 0.5) / 1.7], rel=1e-12)
-    assert len(sliding.states) == {"elasto_plastic": 3, "rolling": 2}[law]
+    gives_way = sliding.a[0, sliding.states.index("bristle_deflection"), sliding.states.index("bristle_deflection")]
+    level = 1 + 2 * np.exp(-((2 / 1.6) ** 2))
+    assert gives_way == pytest.approx({"elasto_plastic": -2e-3 * 1e5 / level, "rolling": 0.0}[law], abs=1e-4)
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)

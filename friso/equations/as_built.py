@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import sympy as sp
 
     from friso.equations.blocks import Loop
+    from friso.equations.component import Kink
     from friso.equations.model import Control, Model
 
 STATIC_FACTOR, COULOMB_FACTOR, MOTOR_FACTOR = PLACES = ("static_factor", "coulomb_factor", "motor_factor")
@@ -93,8 +94,21 @@ def as_built(form: AsBuilt) -> Model:
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in LEVELS}
     states = tuple(replace(part, derivative=_shaken(part).xreplace(varied)) for part in model.states)
     outputs = {n: replace(output, expression=output.expression.xreplace(varied)) for n, output in model.outputs.items()}
-    kinks = tuple(kink.with_values(varied) for kink in model.kinks)
+    kinks = tuple(_varied(kink, varied) for kink in model.kinks)
     return replace(model, states=states, outputs=outputs, kinks=kinks, jumps=resets(kinks), clock=clock)
+
+
+def _varied(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
+    """A kink whose levels vary along the rail; on which side a run begins is told before anything is looked up, by the
+    levels as they are given."""
+    from friso.equations.component import Kink, Switch
+
+    there = kink.with_values(varied)
+    if not kink.at_start.free_symbols & {*varied}:
+        return there
+    if isinstance(there, Switch):
+        return Switch(there.name, there.enter, there.leave, kink.at_start, there.entered, there.left)
+    return Kink(there.name, there.surface, narrow=there.narrow, starts=kink.at_start)
 
 
 LEVELS = ("static", "coulomb")
