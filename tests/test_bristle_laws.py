@@ -136,9 +136,10 @@ def test_an_active_law_gives_energy_back_somewhere(law: str) -> None:
     assert force * 0.05 - 1e5 * 2.99e-5 * rate < 0
 
 
-def test_the_drive_as_built() -> None:
+@pytest.mark.parametrize("friction", [elasto_plastic(), gms(damping=MICRO_DAMPING)])
+def test_the_drive_as_built(friction: str) -> None:
     """A quick drive without imperfections moves the stage as the continuous loop does."""
-    moves = stage(step("100 um", "0.3 s"), friction=elasto_plastic(), controller=gains(**FULL, tau=1e-3))
+    moves = stage(step("100 um", "0.3 s"), friction=friction, controller=gains(**FULL, tau=1e-3))
     built = moves.replace({"drive": {"sample_time": "20 us"}})
     (recorded,) = run(built, own_motion(built), [0], 1e-3)
     assert not failures(recorded)
