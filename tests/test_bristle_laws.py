@@ -17,7 +17,7 @@ from variants import (
     release,
     rolling,
     stage,
-    step,
+    there_and_back,
     van_dijk,
 )
 
@@ -136,7 +136,7 @@ def test_an_active_law_gives_energy_back_somewhere(law: str) -> None:
 @pytest.mark.parametrize("friction", [elasto_plastic(), gms(damping=MICRO_DAMPING)])
 def test_the_drive_as_built(friction: str) -> None:
     """A quick drive without imperfections moves the stage as the continuous loop does."""
-    moves = stage(step("100 um", "0.3 s"), friction=friction, controller=gains(**FULL, tau=1e-3))
+    moves = stage(there_and_back("0.4 s", "0.15 s", "1 m/s^2"), friction=friction, controller=gains(**FULL, tau=1e-3))
     built = moves.replace({"drive": {"sample_time": "20 us"}})
     (recorded,) = run(built, own_motion(built), [0], 1e-3)
     assert not failures(recorded)
