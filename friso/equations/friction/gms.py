@@ -61,7 +61,7 @@ def _as_many(key: str, what: str) -> Rule:
 
 @register_friction
 class GeneralisedMaxwellSlip(StribeckSection):
-    """Elements side by side, each a spring that sticks, F_i' = k_i v, or slips, F_i' = C (alpha_i sgn(v) - F_i/s(v));
+    """Elements side by side, springs that stick or slip: F_i' = k_i v, or F_i' = C (alpha_i sgn(v) - F_i/s(v));
     F = sum of F_i + sigma_i z_i' + sigma_2 v, z_i = F_i/k_i being the deflection of an element."""
 
     model: Literal["gms"]
