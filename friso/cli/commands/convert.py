@@ -68,4 +68,4 @@ def _laws() -> list[tuple[str, str]]:
     return [(name, (friction_law(name).__doc__ or "").split(":")[0].split("\n")[0]) for name in convertible()]
 
 
-COMMAND = Command(convert, 95, Choices("Laws", _laws))
+COMMAND = Command(convert, 96, Choices("Laws", _laws))
