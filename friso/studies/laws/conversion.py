@@ -44,7 +44,7 @@ class MeasuredChange:
 
 
 @dataclass(frozen=True)
-class Conversion:
+class LawConversion:
     """A stage with another friction law: what it was made from, what was compared, the keys that the measurements leave
     open, with their ranges [SI], and the condition of passivity that the law does not meet ("" where it is passive)."""
 
@@ -89,7 +89,7 @@ def measured(flat: Mapping[str, Any]) -> MeasuredFriction:
     return law.shown(flat)
 
 
-def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> Conversion:
+def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
     """The stage with the named law in the place of its own, which shows the same in measurements as nearly as the law
     can; `elements` side by side, of a law that has several. Raises InputError for a law that cannot be made from
     measurements, and for a stage whose own does not stick."""
@@ -105,7 +105,7 @@ def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> Conversion:
     return compared(stage, made, before)
 
 
-def compared(source: Stage, made: Stage, before: MeasuredFriction) -> Conversion:
+def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConversion:
     """A stage `made` from another, whose friction was measured `before`."""
     flat = made.flat()
     after, law = measured(flat), friction_law(flat["friction.model"])
@@ -117,7 +117,7 @@ def compared(source: Stage, made: Stage, before: MeasuredFriction) -> Conversion
         _number("damping at rest", "N*s/m", before.damping, after.damping),
         _number("viscous damping", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
-    return Conversion(made, source, before, after, items, law.left_open(before), law.active(flat))
+    return LawConversion(made, source, before, after, items, law.left_open(before), law.active(flat))
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:

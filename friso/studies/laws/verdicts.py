@@ -13,7 +13,7 @@ from friso.hunting.criteria import ATTRACTED
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import ELEMENTS, Conversion, compared, convert, convertible, measured
+from friso.studies.laws.conversion import ELEMENTS, LawConversion, compared, convert, convertible, measured
 
 NEEDED = ("steady friction over speed", "break-away", "stiffness before sliding", "viscous damping")
 """What a law has to keep to be asked."""
@@ -37,7 +37,7 @@ class Trial:
 class LawVerdict:
     """What becomes of a stage under a law: the conversion, and a trial for each choice of what it leaves open."""
 
-    conversion: Conversion
+    conversion: LawConversion
     trials: tuple[Trial, ...]
 
     @property
@@ -122,7 +122,7 @@ def verdicts_by_law(
     return VerdictsByLaw(stage, tuple(verdicts), left_out)
 
 
-def _conversions(stage: Stage, elements: int) -> tuple[list[Conversion], dict[str, tuple[str, ...]]]:
+def _conversions(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[str, ...]]]:
     """The stage as it is, and under the other laws that keep what is measured of it; and what the others lose."""
     own = stage.flat()["friction.model"]
     kept, left_out = [compared(stage, stage, measured(stage.flat()))], {}
@@ -138,7 +138,7 @@ def _conversions(stage: Stage, elements: int) -> tuple[list[Conversion], dict[st
     return kept, left_out
 
 
-def _drawn(conversion: Conversion) -> Iterator[dict[str, float]]:
+def _drawn(conversion: LawConversion) -> Iterator[dict[str, float]]:
     """What the measurements leave open: as the conversion has it, and at both ends of the ranges; as it is for the
     stage's own law."""
     yield {}

@@ -8,13 +8,13 @@ from friso.views.convert.words import conversion_sentences
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
-    from friso.studies.laws.conversion import Conversion
+    from friso.studies.laws.conversion import LawConversion
 
 SUFFIXES = {"N": "n", "N/m": "n_per_m", "N*s/m": "n_s_per_m"}
 """Suffixes of the units."""
 
 
-def convert_document(conversion: Conversion) -> dict[str, Any]:
+def convert_document(conversion: LawConversion) -> dict[str, Any]:
     """What is kept and what is not, what is left open, and the keys of the law."""
     flat = conversion.stage.flat()
     return plain_json(

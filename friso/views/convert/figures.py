@@ -10,13 +10,13 @@ from friso.frequency.friction import steady_force
 from friso.views.drawing.figure import BLUE, VERMILLION, Axis, Figure, Panel, Series
 
 if TYPE_CHECKING:
-    from friso.studies.laws.conversion import Conversion
+    from friso.studies.laws.conversion import LawConversion
 
 SHOWN = 5.0
 """How far virgin curves are drawn, in units of the deflection that static friction causes at the first stiffness."""
 
 
-def conversion_figure(conversion: Conversion) -> Figure:
+def conversion_figure(conversion: LawConversion) -> Figure:
     """Virgin curves and steady friction over speed, before and after."""
     levels, before = conversion.before.levels, conversion.before
     stages = (

@@ -10,10 +10,10 @@ from friso.views.drawing.matplotlib_renderer import save
 from friso.views.files import Content
 
 if TYPE_CHECKING:
-    from friso.studies.laws.conversion import Conversion
+    from friso.studies.laws.conversion import LawConversion
 
 
-def convert_files(conversion: Conversion, stem: str) -> dict[str, Content]:
+def convert_files(conversion: LawConversion, stem: str) -> dict[str, Content]:
     """The stage file with the law, and the figure."""
     figure = conversion_figure(conversion)
     return {f"{stem}.toml": conversion.stage.to_toml(), f"{stem}.png": partial(save, figure)}

@@ -8,13 +8,13 @@ from friso.stage.stage import declared_keys
 from friso.views.drawing.prefixes import listed, with_unit
 
 if TYPE_CHECKING:
-    from friso.studies.laws.conversion import Conversion, MeasuredChange
+    from friso.studies.laws.conversion import LawConversion, MeasuredChange
 
 COLUMNS = ("before", "after", "off by", "kept")
 """Of the table of what is compared."""
 
 
-def conversion_sentences(conversion: Conversion) -> list[str]:
+def conversion_sentences(conversion: LawConversion) -> list[str]:
     """What could not be kept comes first; then what is left open, and whether the law may give energy back."""
     law, lost = conversion.law, conversion.lost
     name = conversion.stage.name or "the stage"
@@ -32,14 +32,14 @@ def _lost(item: MeasuredChange) -> str:
     return f"{item.what} is not kept ({with_unit(item.before, item.unit)} becomes {with_unit(item.after, item.unit)})"
 
 
-def _open(key: str, ends: tuple[float, float], conversion: Conversion) -> str:
+def _open(key: str, ends: tuple[float, float], conversion: LawConversion) -> str:
     flat = conversion.stage.flat()
     unit = getattr(declared_keys(flat)[key], "unit", "")
     low, high, value = (with_unit(x, unit) if unit else f"{x:.3g}" for x in (*ends, flat[key]))
     return f"The measurements leave {key} open between {low} and {high}; it is {value}."
 
 
-def conversion_rows(conversion: Conversion) -> list[tuple[str, list[str]]]:
+def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
     """The rows of the table: before, after, by how much it is off, whether it is kept."""
     return [
         (
@@ -55,7 +55,7 @@ def conversion_rows(conversion: Conversion) -> list[tuple[str, list[str]]]:
     ]
 
 
-def friction_table(conversion: Conversion) -> str:
+def friction_table(conversion: LawConversion) -> str:
     """The table [friction] of the stage file."""
     text = conversion.stage.to_toml()
     begin = text.index("[friction]")
