@@ -1,61 +1,80 @@
 """friso: friction-induced hunting of positioning stages, and the friction isolator that stops it."""
 
-from importlib import import_module
+import importlib
 from typing import TYPE_CHECKING, Any
 
-import friso.interrupts  # isort: skip  (first: what follows takes a while)
-import friso.equations.controllers  # registers the controllers with the stage file
-import friso.equations.friction  # and the friction laws
-import friso.leaf_springs.joint  # noqa: F401 (and what follows from leaf springs)
-from friso.errors import InputError, LogError, SpecError, StageError, StoreError
-from friso.stage import Stage, load, loads, save
+import friso.interrupts  # noqa: F401 (notes a signal that comes while the rest is imported)
 from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:
+    from friso.answers.bode import bode
+    from friso.answers.boundary import boundary
+    from friso.answers.check import check
+    from friso.answers.compare import compare
+    from friso.answers.convert import convert
+    from friso.answers.design import design
+    from friso.answers.doctor import doctor
+    from friso.answers.export import export
+    from friso.answers.flexure import flexure
+    from friso.answers.guideline import guideline
+    from friso.answers.identify import identify
+    from friso.answers.logs import logs
+    from friso.answers.reproduce import reproduce
+    from friso.answers.rig import rig
+    from friso.answers.simulate import simulate
+    from friso.answers.starting import example, init, schema
+    from friso.answers.sweep import sweep
+    from friso.answers.tune import tune
     from friso.cure.sensitivities import Sensitivities, sensitivity
-    from friso.engine.simulate import simulate
+    from friso.errors import InputError, LogError, SpecError, StageError, StoreError
     from friso.frequency.analysis import linear
-    from friso.frequency.bode import Bode, bode
     from friso.frequency.describing.function import describing
     from friso.frequency.describing.mass_line import mass_line
     from friso.frequency.describing.response import plant_response
     from friso.frequency.members import Members, member
     from friso.frequency.tuning import Tuning, tuning
-    from friso.hunting.check import Case, check
-    from friso.studies.boundary import boundary
-    from friso.studies.guideline.compute import guideline
+    from friso.stage import Stage, load, loads, save
     from friso.studies.harmonic_balance import harmonic_balance
     from friso.studies.samples import Samples
     from friso.studies.store import read_store
-    from friso.studies.sweep import sweep
 
-_LAZY = {
-    "simulate": "friso.engine.simulate",
-    "check": "friso.hunting.check",
-    "Case": "friso.hunting.check",
-    "sweep": "friso.studies.sweep",
-    "bode": "friso.frequency.bode",
-    "Bode": "friso.frequency.bode",
-    "describing": "friso.frequency.describing.function",
-    "guideline": "friso.studies.guideline.compute",
-    "harmonic_balance": "friso.studies.harmonic_balance",
-    "linear": "friso.frequency.analysis",
-    "mass_line": "friso.frequency.describing.mass_line",
-    "member": "friso.frequency.members",
-    "Members": "friso.frequency.members",
-    "plant_response": "friso.frequency.describing.response",
-    "sensitivity": "friso.cure.sensitivities",
-    "Sensitivities": "friso.cure.sensitivities",
-    "tuning": "friso.frequency.tuning",
-    "Tuning": "friso.frequency.tuning",
-    "boundary": "friso.studies.boundary",
-    "Samples": "friso.studies.samples",
-    "read_store": "friso.studies.store",
+_PLACES = {
+    "friso.answers.bode": ("bode",),
+    "friso.answers.boundary": ("boundary",),
+    "friso.answers.check": ("check",),
+    "friso.answers.compare": ("compare",),
+    "friso.answers.convert": ("convert",),
+    "friso.answers.design": ("design",),
+    "friso.answers.doctor": ("doctor",),
+    "friso.answers.export": ("export",),
+    "friso.answers.flexure": ("flexure",),
+    "friso.answers.guideline": ("guideline",),
+    "friso.answers.identify": ("identify",),
+    "friso.answers.logs": ("logs",),
+    "friso.answers.reproduce": ("reproduce",),
+    "friso.answers.rig": ("rig",),
+    "friso.answers.simulate": ("simulate",),
+    "friso.answers.starting": ("example", "init", "schema"),
+    "friso.answers.sweep": ("sweep",),
+    "friso.answers.tune": ("tune",),
+    "friso.cure.sensitivities": ("Sensitivities", "sensitivity"),
+    "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
+    "friso.frequency.analysis": ("linear",),
+    "friso.frequency.describing.function": ("describing",),
+    "friso.frequency.describing.mass_line": ("mass_line",),
+    "friso.frequency.describing.response": ("plant_response",),
+    "friso.frequency.members": ("Members", "member"),
+    "friso.frequency.tuning": ("Tuning", "tuning"),
+    "friso.stage": ("Stage", "load", "loads", "save"),
+    "friso.studies.harmonic_balance": ("harmonic_balance",),
+    "friso.studies.samples": ("Samples",),
+    "friso.studies.store": ("read_store",),
 }
+"""Where everything public stands."""
+
+_LAZY = {name: module for module, names in _PLACES.items() for name in names}
 
 __all__ = [
-    "Bode",
-    "Case",
     "InputError",
     "LogError",
     "Members",
@@ -70,26 +89,45 @@ __all__ = [
     "bode",
     "boundary",
     "check",
+    "compare",
+    "convert",
     "describing",
+    "design",
+    "doctor",
+    "example",
+    "export",
+    "flexure",
     "guideline",
     "harmonic_balance",
+    "identify",
+    "init",
     "linear",
     "load",
     "loads",
+    "logs",
     "mass_line",
     "member",
     "plant_response",
     "read_store",
+    "reproduce",
+    "rig",
     "save",
+    "schema",
     "sensitivity",
     "simulate",
     "sweep",
+    "tune",
     "tuning",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    """The numerical functions are imported when first used: xarray and what runs stages take half a second."""
+    """Everything is imported when it is first used: numbers with units and arrays take half a second."""
     if name not in _LAZY:
         raise AttributeError(f"module 'friso' has no attribute {name!r}")
-    return getattr(import_module(_LAZY[name]), name)
+    return getattr(importlib.import_module(_LAZY[name]), name)
+
+
+def __dir__() -> list[str]:
+    """What is public, for completion."""
+    return __all__

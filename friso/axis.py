@@ -5,7 +5,8 @@ here: of keys (`AxisKind.unit`), and of whatever is shown (`unit_shown`, of the 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
@@ -85,6 +86,16 @@ def speak_of(kind: AxisKind) -> None:
     _SPOKEN_OF.set(kind)
 
 
+@contextmanager
+def speaking_of(kind: AxisKind) -> Iterator[None]:
+    """What is shown within is in the units of an axis of that kind."""
+    token = _SPOKEN_OF.set(kind)
+    try:
+        yield
+    finally:
+        _SPOKEN_OF.reset(token)
+
+
 def axis_shown() -> AxisKind:
     """The kind of the axis that is spoken of."""
     return _SPOKEN_OF.get()
@@ -93,3 +104,33 @@ def axis_shown() -> AxisKind:
 def unit_shown(unit: str) -> str:
     """The unit, on the axis that is spoken of, for one of a linear axis."""
     return axis_shown().unit(unit)
+
+
+def unit_of_key(key: str) -> tuple[str, str]:
+    """A key of a JSON document without the unit with which it ends, and that unit: "velocity_m_per_s" in "m/s"."""
+    for start in (match.start() for match in re.finditer("(?!^)_", key)):
+        above, _, below = key[start + 1 :].partition("_per_")
+        parts = [part.split("_") for part in (above, below) if part]
+        if all(part in _UNITS_IN_KEYS for group in parts for part in group):
+            texts = ["*".join(_UNITS_IN_KEYS[part] for part in group) for group in parts]
+            return key[:start], "/".join(
+                f"({text})" if "*" in text and text is not texts[0] else text for text in texts
+            )
+    return key, ""
+
+
+_UNITS_IN_KEYS: Mapping[str, str] = {
+    **{name: name for name in ("m", "s", "kg", "rad", "deg")},
+    **{
+        "n": "N",
+        "hz": "Hz",
+        "pa": "Pa",
+        "ns": "N*s",
+        "s2": "s^2",
+        "m2": "m^2",
+        "kg_m2": "kg*m^2",
+        "j": "J",
+        "db": "dB",
+    },
+}
+"""Units as they stand at the ends of keys."""

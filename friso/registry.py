@@ -10,7 +10,6 @@ from pkgutil import iter_modules
 from typing import Any, Generic, TypeVar
 
 from friso.errors import InputError
-from friso.quantities import quoted
 
 Declared = TypeVar("Declared")
 
@@ -61,5 +60,7 @@ class Registry(Generic[Declared]):
         names = tuple(self)
         if name in names:
             return name
+        from friso.quantities import quoted  # imports pydantic, which takes longer than the list of commands
+
         nearest = next(iter(get_close_matches(name, names, 1, 0)), "")
         raise InputError(option, quoted(name), f"one of {', '.join(names)}", example.format(nearest))

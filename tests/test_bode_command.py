@@ -16,8 +16,8 @@ from refusals import Refused
 from snapshots import Snapshots
 
 import friso
+from friso.answers.output_folder import MARKER
 from friso.cli.commands.bode import bode as command
-from friso.cli.output import MARKER
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.stage import Stage
 from friso.views.bode.document import bode_document

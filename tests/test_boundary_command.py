@@ -13,7 +13,7 @@ from inside import friso_inside
 from refusals import Refused
 from snapshots import Snapshots
 
-from friso.cli.output import MARKER
+from friso.answers.output_folder import MARKER
 from friso.hunting.boundary import (
     Branch,
     Curve,

@@ -39,6 +39,7 @@ from friso.studies.compare import study
 from friso.studies.compare.study import compare
 from friso.studies.rig.experiments import hunting as rig_hunting
 from friso.studies.rig.moves_on_rails import rails
+from friso.studies.sweep import sweep
 from friso.views.compare.words import sentences as comparison_sentences
 from friso.views.rig.page import sentences
 
@@ -314,7 +315,7 @@ def test_boundary_and_map_agree_on_where_hunting_ends() -> None:
     found = friso.boundary(machine, {INTEGRAL_TIME: "20 ms..200 ms"})
     ends = np.array([found.value(point.point.place) for points in found.special for point in points])
     beside = np.outer(ends, [0.97, 1.03])
-    runs = friso.sweep(machine, {INTEGRAL_TIME: (np.sort(beside.ravel()), "s")}, metrics=["multiplier"])
+    runs = sweep(machine, {INTEGRAL_TIME: (np.sort(beside.ravel()), "s")}, metrics=["multiplier"])
     attracts = np.abs(runs["multiplier"].sel({INTEGRAL_TIME: beside.ravel()}).values.reshape(beside.shape)) < 1
     assert np.any(attracts[:, 0] != attracts[:, 1])
 

@@ -15,7 +15,7 @@ from patched import patched
 from refusals import Refused, Wording
 from snapshots import Snapshots
 
-from friso.cli.output import MARKER
+from friso.answers.output_folder import MARKER
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency import crossover

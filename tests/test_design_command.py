@@ -22,9 +22,9 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
+from friso.answers.output_folder import MARKER
 from friso.cli.app import main
 from friso.cli.commands.design import design as command
-from friso.cli.output import MARKER
 from friso.design_method import choice, controller, edges, front, hunting_map, method, population, verification
 from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry, Sheet
@@ -120,7 +120,7 @@ def folder(written: tuple[Path, str]) -> Path:
 @pytest.fixture
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not drawn again, and nothing is written."""
-    monkeypatch.setattr("friso.cli.output.write", lambda files, progress: [])
+    monkeypatch.setattr("friso.answers.output_folder.write", lambda files, progress: [])
     monkeypatch.setattr("friso.views.design.page.design_figures", lambda design: ())
 
 
@@ -513,13 +513,13 @@ def test_overrides_are_of_the_stage(
     folder: Path,
     quick: None,
     spec: Path,
-    capsys: pytest.CaptureFixture,
+    caplog: pytest.LogCaptureFixture,
     refused: Refused,
     wording: Wording,
 ) -> None:
     command(RIG, spec, overrides=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
-    wording(capsys.readouterr().err)
+    wording("\n".join(f"friso: {message}" for message in caplog.messages))
     with refused():
         command(RIG, spec, overrides=['controller.crosover="8 Hz"'], out=folder)
 

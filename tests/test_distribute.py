@@ -16,13 +16,12 @@ from distributed import LocalCluster
 from distributed.security import Security
 from refusals import Refused
 
-import friso
 from friso.stage import Stage
 from friso.studies import distribute
 from friso.studies.distribute import connected
 from friso.studies.request import Request
 from friso.studies.store import Store
-from friso.studies.sweep import run_in_memory, run_in_store
+from friso.studies.sweep import run_in_memory, run_in_store, sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
@@ -44,7 +43,7 @@ def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster) -> N
     with connected(cluster.scheduler_address) as crew:
         assert crew.size == 2
         (found,) = run_in_memory([Request(rig, AXES).study()], crew)
-    xr.testing.assert_identical(found, friso.sweep(rig, AXES))
+    xr.testing.assert_identical(found, sweep(rig, AXES))
 
 
 def authority(folder: Path) -> dict[str, str]:
@@ -137,7 +136,7 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
         found = store.read().load()
     assert computed == sorted({*computed})  # every block was handed over once
     assert computed[-1] == study.cells
-    whole = friso.sweep(rig, AXES, rtol=1e-9)
+    whole = sweep(rig, AXES, rtol=1e-9)
     for name in ("outcome", "status"):
         found[name] = found[name].astype(object)
     xr.testing.assert_identical(found, whole)

@@ -12,9 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from friso.answers.output_folder import OutputFolder
 from friso.cli.app import main
-from friso.cli.command import COMMANDS, Command
-from friso.cli.output import OutputFolder, print_document
+from friso.cli.command import COMMANDS, HUNTS, Command
+from friso.cli.output import print_document
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.kinds import KINDS, in_order
@@ -125,7 +126,7 @@ def test_a_kind_of_its_own_is_identified_and_shown(
     assert answer["estimates"][0]["low"] == pytest.approx(2, rel=1e-3)
     assert "Hold: held" in (out / "identify.html").read_text(encoding="utf-8")
     assert (out / "identify_hold_1.png").stat().st_size > 0
-    assert run(log, "--stage", stage, "--out", out) == 0  # as kept beside the log
+    assert run(log, "--stage", stage, "--out", out, "--details") == 0  # as kept beside the log
     assert "Hold: held" in capsys.readouterr().out
 
 
@@ -174,10 +175,14 @@ def hold(out: Path) -> None:
 def test_a_command_of_its_own_is_listed_and_runs(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(COMMANDS.added, "hold", (Command(hold, 25), ""))
+    monkeypatch.setitem(COMMANDS.added, "hold", (Command(hold, 25, HUNTS), ""))
     assert run(command="--help") == 0
-    lines = capsys.readouterr().out.partition("Commands:")[2].splitlines()
-    assert [line.split()[0] for line in lines if line.strip()][1:4] == ["check", "hold", "simulate"]
+    lines = capsys.readouterr().out.partition(HUNTS)[2].splitlines()
+    assert [line.split()[0] for line in lines if line[:2] == "  " and line[2:3].isalpha()][:3] == [
+        "check",
+        "hold",
+        "simulate",
+    ]
     assert run(tmp_path / "out", command="hold") == 0
     page = tmp_path / "out" / "hold.html"
     expected = {"conclusion": "held", "files": [str(page)], "plug_ins": foreign()}

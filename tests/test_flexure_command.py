@@ -19,9 +19,9 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 import friso
-from friso.cli.commands.flexure import EXAMPLE
+from friso.answers.flexure import EXAMPLE
+from friso.answers.output_folder import MARKER
 from friso.cli.commands.flexure import flexure as command
-from friso.cli.output import MARKER
 from friso.errors import InputError
 from friso.leaf_springs.beams import BeamFailure
 from friso.leaf_springs.both_models import BEAMS, CLOSED, BothModels, both_models

@@ -16,6 +16,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.materials import materials
 from friso.stage import Stage, load, loads, save, violations
 from friso.studies.cells import allowed, flat_cells
+from friso.studies.sweep import sweep
 
 RIG = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
 NUMBERS = 'young = "210 GPa"\npoisson = 0.3\ndensity = "7850 kg/m^3"\nyield = "1.1 GPa"'
@@ -226,7 +227,7 @@ def test_numbers_that_follow_are_plain_floats(stage: Stage) -> None:
 
 
 def test_swept_by_friso(stage: Stage) -> None:
-    runs = friso.sweep(
+    runs = sweep(
         stage.replace({"joint.locked": True, "motion.duration": "6 s"}),
         {"flexure.thickness": ["0.35 mm", "30 mm", "9 mm"]},
     )

@@ -15,7 +15,7 @@ import xarray as xr
 from inside import friso_inside
 from pages import Page
 
-from friso.cli.drafts import DRAFTS
+from friso.answers.drafts import DRAFTS
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 PRELOAD = Path(__file__).parent / "foreign_host"

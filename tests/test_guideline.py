@@ -17,8 +17,8 @@ from refusals import Refused
 from snapshots import Snapshots
 from variants import VARIANTS
 
+from friso.answers.output_folder import write
 from friso.cli import main
-from friso.cli.output import write
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.hunting import persistence

@@ -49,7 +49,7 @@ def test_a_signal_that_a_library_turns_into_something_else(
                 raise becomes from None
             raise
 
-    monkeypatch.setattr("friso.cli.commands.bode.read_stage", interrupted)
+    monkeypatch.setattr("friso.answers.bode.read_stage", interrupted)
     before = signal.getsignal(number)
     done = friso_inside(tmp_path, "bode", RIG)
     assert done.returncode == 128 + number

@@ -263,7 +263,7 @@ def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(
         assert "('" not in done.stderr
     more = tmp_path / "b.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("friso.cli.map_study.USUAL", (*USUAL, "verdict"))
+        patch.setattr("friso.answers.map_study.USUAL", (*USUAL, "verdict"))
         small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more, "--verify", "0")
         assert friso_inside(tmp_path, "map", RIG, *small).returncode == 0
     done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks")

@@ -13,9 +13,9 @@ from filelock import FileLock
 from inside import friso_inside
 from refusals import Refused
 
+from friso.answers.drafts import DRAFTS, Drafts
+from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, write
 from friso.cli.app import command_line
-from friso.cli.drafts import DRAFTS, Drafts
-from friso.cli.output import MARKER, UNFINISHED, OutputFolder, write
 from friso.errors import InputError
 from friso.views.drawing import matplotlib_renderer
 from friso.views.files import Content
@@ -56,7 +56,7 @@ def tree(folder: Path) -> dict[str, bytes | None]:
 
 
 def test_every_command_that_writes_can_be_told_to_overwrite() -> None:
-    assert commands_with("--overwrite") == {*NEEDS, "map", "init"}
+    assert commands_with("--overwrite") == {*NEEDS, "map", "init", "example"}
     assert commands_with("--out") <= commands_with("--overwrite")
 
 
@@ -99,7 +99,7 @@ def test_a_place_may_be_new_empty_or_its_own(tmp_path: Path) -> None:
 
 
 def test_a_file_that_friso_has_not_written_stays(
-    tmp_path: Path, refused: Refused, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, refused: Refused, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Not even in a folder of its own, unless told."""
     place(tmp_path / "out").write({"page.html": ""})
@@ -108,7 +108,7 @@ def test_a_file_that_friso_has_not_written_stays(
         place(tmp_path / "out").write({"page.html": "", "figure.png": ""})
     assert (tmp_path / "out" / "figure.png").read_text() == "mine"
     place(tmp_path / "out", overwrite=True).write({"figure.png": "friso's"})
-    assert "figure.png" in capsys.readouterr().err
+    assert "figure.png" in caplog.text
     assert (tmp_path / "out" / "figure.png").read_text() == "friso's"
 
 
@@ -285,7 +285,7 @@ def test_a_folder_in_the_way_is_not_moved(folder: Path) -> None:
 def test_a_command_that_fails_while_writing_leaves_nothing(
     command: str, stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("friso.cli.drafts.Drafts.put_in_place", failing(lambda self: None, 1, OSError("disk full")))
+    monkeypatch.setattr("friso.answers.drafts.Drafts.put_in_place", failing(lambda self: None, 1, OSError("disk full")))
     monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
     done = friso_inside(tmp_path, command, stage, "--out", "out")
     assert done.returncode == 1

@@ -14,14 +14,13 @@ import psutil
 import pytest
 import xarray as xr
 
-import friso
 from friso.stage import Stage
 from friso.studies import execute
 from friso.studies.processes import processes
 from friso.studies.request import Request
 from friso.studies.store import Store
 from friso.studies.study import cells_of
-from friso.studies.sweep import run_in_memory, run_in_store
+from friso.studies.sweep import run_in_memory, run_in_store, sweep
 
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
@@ -38,7 +37,7 @@ def test_processes_of_its_own_verify_too_and_open_no_port(rig: Stage) -> None:
 
     with processes(2) as crew:
         (found,) = run_in_memory([Request(rig, AXES).study()], crew, 0.05, look)
-    xr.testing.assert_identical(found, friso.sweep(rig, AXES, verify=0.05))
+    xr.testing.assert_identical(found, sweep(rig, AXES, verify=0.05))
     assert seen
     assert not [process for process in seen if process.is_running() and "spawn_main" in str(process.cmdline())]
 

@@ -20,8 +20,8 @@ from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
 
 import friso
+from friso.answers.output_folder import write
 from friso.cli import main
-from friso.cli.output import write
 from friso.hunting.margin import margin
 from friso.studies.thesis import (
     STUDIES,

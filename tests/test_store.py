@@ -18,7 +18,6 @@ import xarray as xr
 from filelock import FileLock
 from refusals import Refused
 
-import friso
 from friso.errors import StoreError
 from friso.stage import Stage
 from friso.studies import refine
@@ -28,7 +27,7 @@ from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store, check_store, read_store
 from friso.studies.store_folder import LOCK, make
-from friso.studies.sweep import run_in_store
+from friso.studies.sweep import run_in_store, sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
@@ -39,7 +38,7 @@ pytestmark = pytest.mark.xdist_group("rig")
 @pytest.fixture(scope="module")
 def whole(rig: Stage) -> xr.Dataset:
     """The study in memory."""
-    return friso.sweep(rig, AXES)
+    return sweep(rig, AXES)
 
 
 def same(stored: xr.Dataset, whole: xr.Dataset) -> None:
@@ -51,12 +50,12 @@ def same(stored: xr.Dataset, whole: xr.Dataset) -> None:
 
 
 def test_a_store_holds_what_the_sweep_in_memory_gives(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
-    same(friso.sweep(rig, AXES, store=tmp_path / "a.zarr"), whole)
+    same(sweep(rig, AXES, store=tmp_path / "a.zarr"), whole)
     same(xr.open_zarr(tmp_path / "a.zarr"), whole)
 
 
 def test_a_finished_store_is_not_run_again(rig: Stage, tmp_path: Path) -> None:
-    friso.sweep(rig, AXES, store=tmp_path / "a.zarr")
+    sweep(rig, AXES, store=tmp_path / "a.zarr")
     with Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()) as store:
         assert list(store.missing()) == []
 
@@ -64,7 +63,7 @@ def test_a_finished_store_is_not_run_again(rig: Stage, tmp_path: Path) -> None:
 RUN = """
 import sys
 import friso
-friso.sweep(friso.load(sys.argv[1]), {AXES!r}, store=sys.argv[2], refine=len(sys.argv) > 3, threads=1, rtol=1e-9)
+sweep(friso.load(sys.argv[1]), {AXES!r}, store=sys.argv[2], refine=len(sys.argv) > 3, threads=1, rtol=1e-9)
 """
 
 
@@ -90,13 +89,13 @@ def killed_and_resumed(folder: Path, *options: str) -> tuple[xr.Dataset, int]:
 def test_a_study_killed_several_times_is_as_if_it_never_was(rig: Stage, tmp_path: Path) -> None:
     found, kills = killed_and_resumed(tmp_path)
     assert kills >= 2
-    same(found, friso.sweep(rig, AXES, rtol=1e-9))
+    same(found, sweep(rig, AXES, rtol=1e-9))
 
 
 def test_a_refined_study_too(rig: Stage, tmp_path: Path) -> None:
     found, kills = killed_and_resumed(tmp_path, "--refine")
     assert kills >= 2
-    same(found, friso.sweep(rig, AXES, rtol=1e-9, refine=True))
+    same(found, sweep(rig, AXES, rtol=1e-9, refine=True))
     assert not (tmp_path / "killed.zarr" / ".answers").exists()
 
 
@@ -120,7 +119,7 @@ def test_ctrl_c_keeps_what_is_done_and_repeats_the_rest(
     with Store.opened(path, study) as store:
         blocks = len(list(study.blocks(store.blocks)))
         assert len(list(store.missing())) == blocks - 3
-    same(friso.sweep(rig, AXES, store=path), whole)
+    same(sweep(rig, AXES, store=path), whole)
 
 
 def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
@@ -145,7 +144,7 @@ def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
     monkeypatch.undo()
     with Store.opened(path, study) as store:
         assert 0 < len(list(store.missing())) < len(list(study.blocks(store.blocks)))
-    same(friso.sweep(rig, AXES, store=path), whole)
+    same(sweep(rig, AXES, store=path), whole)
 
 
 @pytest.mark.parametrize(
@@ -167,7 +166,7 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change:
     before = sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
     stage = rig.replace(change.pop("stage", {}))
     with refused() as error:
-        friso.sweep(stage, change.pop("axes", AXES), store=path, **change)
+        sweep(stage, change.pop("axes", AXES), store=path, **change)
     assert "nothing was overwritten" in str(error.value)
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
 
@@ -194,18 +193,18 @@ def test_a_store_of_nearly_the_same_study_is_refused(
     with Store.opened(tmp_path / "a.zarr", Request(rig, **{"axes": {}, **first}).study()):
         pass
     with refused():
-        friso.sweep(rig, **{"axes": {}, **second}, store=tmp_path / "a.zarr")
+        sweep(rig, **{"axes": {}, **second}, store=tmp_path / "a.zarr")
 
 
 def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "a.zarr"
-    friso.sweep(rig, AXES, store=path)
+    sweep(rig, AXES, store=path)
     chunks = [sorted((path / name).glob("[0-9]*")) for name in ("peaks", "outcome")]
     chunks[0][1].unlink()
     chunks[1][3].write_bytes(b"")
     with Store.opened(path, Request(rig, AXES).study()) as store:
         assert len(list(store.missing())) == 2
-    same(friso.sweep(rig, AXES, store=path), whole)
+    same(sweep(rig, AXES, store=path), whole)
 
 
 def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -223,7 +222,7 @@ def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, mo
         run_in_store(study, path, crew, 0.0, stop)
     monkeypatch.undo()
     assert (path / ".answers" / "0.npz").exists()
-    same(friso.sweep(rig, AXES, refine=True, store=path), friso.sweep(rig, AXES, refine=True))
+    same(sweep(rig, AXES, refine=True, store=path), sweep(rig, AXES, refine=True))
 
 
 def test_a_store_of_other_equations_is_refused(
@@ -234,7 +233,7 @@ def test_a_store_of_other_equations_is_refused(
         pass
     monkeypatch.undo()
     with refused():
-        friso.sweep(rig, AXES, store=tmp_path / "a.zarr")
+        sweep(rig, AXES, store=tmp_path / "a.zarr")
 
 
 def test_anything_else_is_refused(rig: Stage, tmp_path: Path, refused: Refused) -> None:
@@ -245,10 +244,10 @@ def test_anything_else_is_refused(rig: Stage, tmp_path: Path, refused: Refused) 
     xr.Dataset({"verdict": ("x", np.zeros(3))}).to_zarr(tmp_path / "foreign.zarr", zarr_format=2)
     for path in (folder, file, tmp_path / "foreign.zarr"):
         with refused():
-            friso.sweep(rig, AXES, store=path)
+            sweep(rig, AXES, store=path)
     assert (folder / "thesis.txt").read_text() == file.read_text() == "precious"
     with refused("--out"):
-        friso.sweep(rig, AXES, store=file / "below.zarr")
+        sweep(rig, AXES, store=file / "below.zarr")
     with refused():
         read_store(tmp_path / "absent.zarr")
 
@@ -275,7 +274,7 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path, refu
         assert process.stdout is not None
         process.stdout.readline()
         with refused():
-            friso.sweep(rig, AXES, store=path)
+            sweep(rig, AXES, store=path)
         process.send_signal(signal.SIGKILL)
     with Store.opened(path, Request(rig, AXES).study()):  # the lock went with its process
         pass
@@ -338,7 +337,7 @@ def test_a_store_without_checksums_is_refused(tmp_path: Path) -> None:
 def finished(rig: Stage, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A store of the study, which is done."""
     path = tmp_path_factory.mktemp("finished") / "a.zarr"
-    friso.sweep(rig, AXES, store=path, verify=0.3)
+    sweep(rig, AXES, store=path, verify=0.3)
     return path
 
 
@@ -376,7 +375,7 @@ def test_a_damaged_block_is_run_again(
         return
     assert len(missing) == 1
     assert "block 1.0 is damaged and is run again" in caplog.text
-    friso.sweep(rig, AXES, store=stored, verify=0.3)
+    sweep(rig, AXES, store=stored, verify=0.3)
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
 
@@ -462,7 +461,7 @@ def test_exchanged_chunks_are_run_again(
     for name in names or [*read_store(stored).data_vars, ".blocks"]:
         exchange(stored / str(name) / "0.0", stored / str(name) / "1.0")
     assert check_store(stored).damaged == ["0.0", "1.0"]
-    friso.sweep(rig, AXES, store=stored, verify=0.3)
+    sweep(rig, AXES, store=stored, verify=0.3)
     assert "block 0.0 is damaged and is run again" in caplog.text
     xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
 
@@ -478,7 +477,7 @@ def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path, refused: Refused
 
 def test_blocks_of_another_study_are_run_again(stored: Path, finished: Path, rig: Stage, tmp_path: Path) -> None:
     """Of the same form, at another tolerance."""
-    other = friso.sweep(rig, AXES, store=tmp_path / "b.zarr", rtol=1e-4)
+    other = sweep(rig, AXES, store=tmp_path / "b.zarr", rtol=1e-4)
     for name in [*other.data_vars, ".blocks"]:
         exchange(tmp_path / "b.zarr" / str(name) / "1.0", stored / str(name) / "1.0")
     assert check_store(stored).damaged == ["1.0"]
@@ -507,7 +506,7 @@ def test_every_file_of_metadata_is_checked_and_written_anew(stored: Path, finish
 def test_a_store_is_open_to_whom_the_user_lets_read_files(rig: Stage, tmp_path: Path) -> None:
     before = os.umask(0o027)
     try:
-        friso.sweep(rig, {"controller.crossover": "2 Hz, 3 Hz"}, store=tmp_path / "a.zarr", verify=0.5)
+        sweep(rig, {"controller.crossover": "2 Hz, 3 Hz"}, store=tmp_path / "a.zarr", verify=0.5)
     finally:
         os.umask(before)
     modes = {file.stat().st_mode & 0o777 for file in (tmp_path / "a.zarr").rglob("*") if file.name != LOCK}

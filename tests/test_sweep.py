@@ -23,6 +23,7 @@ from friso.studies.cells import USUAL
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import study_of
+from friso.studies.sweep import sweep
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
@@ -41,7 +42,7 @@ def judged(stage: Stage, found: Measures) -> str:
 @pytest.mark.usefixtures("own_bandwidth")
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, run alone as a stage of its own, gives the same numbers bit for bit, and the verdict of a check."""
-    runs = friso.sweep(
+    runs = sweep(
         rig,
         {"joint.locked": [True, False], "controller.crossover": (np.array([4.0, 8.0, 20.0]), "Hz")},
         metrics=[*USUAL, "verdict"],
@@ -66,7 +67,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
 @pytest.mark.usefixtures("own_bandwidth")
 def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
     light = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
-    swept = friso.sweep(light, {"masses.cart": ["1.2 kg", "2.4 kg"]})
+    swept = sweep(light, {"masses.cart": ["1.2 kg", "2.4 kg"]})
     alone = friso.check(light.replace({"masses.cart": "2.4 kg"}), rtol=study_of(swept).rtol)["given"]
     assert swept.largest_force.values[1] == alone.largest_force
     assert swept.largest_force.values[1] > 1.5 * swept.largest_force.values[0]
@@ -74,14 +75,14 @@ def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
 
 def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     locked = rig.replace({"joint.locked": True})
-    runs = friso.sweep(locked, {"friction.static": "0 N..4 N:3", "controller.crossover": ["8 Hz", "-1 Hz"]})
+    runs = sweep(locked, {"friction.static": "0 N..4 N:3", "controller.crossover": ["8 Hz", "-1 Hz"]})
     assert (runs.outcome.values == "invalid").tolist() == [[True, True], [False, True], [False, True]]
     reasons = runs.status.values
     assert "friction.static must be greater than 0" in reasons[0, 0]
     assert "controller.crossover must be greater than 0" in reasons[1, 1]
     assert np.isnan(runs.peaks.values[0, 0])
     assert reasons[1, 0] == "done"
-    below = friso.sweep(locked, {"friction.coulomb": ["1 N", "3.5 N"]})
+    below = sweep(locked, {"friction.coulomb": ["1 N", "3.5 N"]})
     assert "friction.coulomb" in below.status.values[1]
     assert below.outcome.values.tolist() == ["swings", "invalid"]
 
@@ -90,7 +91,7 @@ def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
 def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     """Total mass at a fixed ratio, and F_s = max(F_s, F_c), which leaves no cell invalid."""
     free = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
-    runs = friso.sweep(free, {"mass": (np.array([1.0, 3.0]), "kg")}, links=MASS)
+    runs = sweep(free, {"mass": (np.array([1.0, 3.0]), "kg")}, links=MASS)
     assert runs["mass"].attrs["units"] == "kg"
     alone = friso.check(study_of(runs).cell_stage((1,)), rtol=study_of(runs).rtol)["given"]
     assert alone.stage.masses.cart == pytest.approx(2.1)
@@ -98,7 +99,7 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     assert alone.largest_force == runs.largest_force.values[1]
     links = {"friction.static": "max(friction.static, friction.coulomb)"}
     axes = {"friction.static": "1 N..3 N:2", "friction.coulomb": "0.5 N..3 N:2"}
-    runs = friso.sweep(rig, axes, links=links)
+    runs = sweep(rig, axes, links=links)
     assert "invalid" not in runs.outcome.values
     assert study_of(runs).cell_stage((0, 1)).friction.static == 3.0
 
@@ -106,7 +107,7 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
 @pytest.mark.usefixtures("own_bandwidth")
 def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     ranges = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "10 um..1 mm:log"}
-    runs = friso.sweep(rig, {"joint.locked": [True, False]}, Samples(ranges, 16))
+    runs = sweep(rig, {"joint.locked": [True, False]}, Samples(ranges, 16))
     assert runs.outcome.dims == ("joint.locked", "sample")
     assert runs["joint.stroke"].dims == ("sample",)
     assert (runs["joint.stroke"] < 1e-4).sum() == 8  # even in the logarithm
@@ -143,7 +144,7 @@ def test_ranges_and_lists_as_texts(rig: Stage) -> None:
 
 
 def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
-    runs = friso.sweep(rig, {"controller.crossover": ["4 Hz", "8 Hz"]}, metrics=["peaks"])
+    runs = sweep(rig, {"controller.crossover": ["4 Hz", "8 Hz"]}, metrics=["peaks"])
     assert set(runs.data_vars) == {"peaks", "outcome", "status"}
 
 
@@ -171,7 +172,7 @@ def test_blocks_cover_every_cell_once(shape: list[int], target: int) -> None:
 
 def test_a_dataset_holds_its_study(rig: Stage) -> None:
     axes = {"controller.crossover": "4 Hz..8 Hz:2", "joint.locked": [True, False]}
-    runs = friso.sweep(rig, axes, samples=Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
+    runs = sweep(rig, axes, samples=Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
     study = study_of(runs)
     made = Request(rig, axes, Samples({"joint.stroke": "0.1 mm..1 mm"}, 2)).study(metrics=["peaks"])
     assert not made.differences(study, runs.attrs["equations"])
@@ -180,7 +181,7 @@ def test_a_dataset_holds_its_study(rig: Stage) -> None:
 
 def test_results_do_not_depend_on_threads(rig: Stage) -> None:
     axes = {"controller.crossover": "2 Hz..16 Hz:15", "joint.stroke": "0 m..1 mm:9"}
-    xr.testing.assert_identical(friso.sweep(rig, axes, threads=1), friso.sweep(rig, axes, threads=3))
+    xr.testing.assert_identical(sweep(rig, axes, threads=1), sweep(rig, axes, threads=3))
 
 
 @pytest.mark.parametrize(
@@ -213,7 +214,7 @@ def test_results_do_not_depend_on_threads(rig: Stage) -> None:
 )
 def test_wrong_axes_are_refused(rig: Stage, axes: dict, refused: Refused) -> None:
     with refused():
-        friso.sweep(rig, axes)
+        sweep(rig, axes)
 
 
 @pytest.mark.parametrize(
@@ -231,7 +232,7 @@ def test_wrong_axes_are_refused(rig: Stage, axes: dict, refused: Refused) -> Non
 )
 def test_wrong_links_are_refused(rig: Stage, links: dict, refused: Refused) -> None:
     with refused():
-        friso.sweep(rig, {"mass": ["1 kg", "2 kg"], "controller.crossover": ["8 Hz"]}, links=links)
+        sweep(rig, {"mass": ["1 kg", "2 kg"], "controller.crossover": ["8 Hz"]}, links=links)
 
 
 @pytest.mark.parametrize(
@@ -246,12 +247,12 @@ def test_wrong_links_are_refused(rig: Stage, links: dict, refused: Refused) -> N
 )
 def test_wrong_samples_are_refused(rig: Stage, samples: Samples, refused: Refused) -> None:
     with refused():
-        friso.sweep(rig, {}, samples)
+        sweep(rig, {}, samples)
 
 
 def test_an_unknown_metric_is_refused(rig: Stage, refused: Refused) -> None:
     with refused("metrics"):
-        friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
+        sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 
 
 @pytest.mark.usefixtures("own_bandwidth")
@@ -259,7 +260,7 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
     """Asked for by name; the motion plays no part, and a cell that nothing attracts has no number."""
     locked = rig.replace({"joint.locked": True})
     axes = {"controller.crossover": ["4 Hz", "8 Hz", "30 Hz"], "motion.acceleration": ["1 m/s^2", "100 m/s^2"]}
-    runs = friso.sweep(locked, axes, metrics=["multiplier", "amplitude", "cycle_period", "peaks"])
+    runs = sweep(locked, axes, metrics=["multiplier", "amplitude", "cycle_period", "peaks"])
     assert set(runs.data_vars) == {"peaks", "multiplier", "amplitude", "cycle_period", "outcome", "attractor", "status"}
     assert runs.attractor.values[:, 0].tolist() == ["cycle", "cycle", "nothing"]
     for name in ("multiplier", "amplitude", "cycle_period"):
@@ -271,14 +272,14 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
     found = [runs[name].values[1, 0] for name in ("multiplier", "amplitude", "cycle_period")]
     assert found == pytest.approx(alone, rel=1e-9)
     assert runs.multiplier.attrs["units"] == "1"
-    assert "multiplier" not in friso.sweep(locked, {"controller.crossover": ["8 Hz"]})
+    assert "multiplier" not in sweep(locked, {"controller.crossover": ["8 Hz"]})
 
 
 def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None:
     """The symmetric cycle repels at both crossovers; the other one is 0.876 mm large at the lower, by simulations at
     1e-7 and 1e-9, and gone at the higher."""
     metrics = ["multiplier", "amplitude", "verdict"]
-    runs = friso.sweep(CREEPING, {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
+    runs = sweep(CREEPING, {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
     assert runs.attractor.values[0] in ("cycle", "swing")
     assert runs.attractor.values[1] == "nothing"
     assert runs.verdict.values[0] in ("hunts", "bistable")

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-import friso
 from friso import system
 from friso.engine import batch
 from friso.stage import Stage
+from friso.studies.sweep import sweep
 
 GROUPS = {
     "none": ("0::/\n", {}, math.inf),
@@ -68,5 +68,5 @@ def test_one_core_runs_no_second_thread(rig: Stage, monkeypatch: pytest.MonkeyPa
             raise AssertionError(f"a pool of {arguments} threads")
 
     monkeypatch.setattr(batch, "ThreadPoolExecutor", Refused)
-    runs = friso.sweep(rig, {"controller.crossover": "2 Hz..16 Hz:24"}, verify=0.0)
+    runs = sweep(rig, {"controller.crossover": "2 Hz..16 Hz:24"}, verify=0.0)
     assert runs.outcome.size == 24

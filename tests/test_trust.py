@@ -18,6 +18,7 @@ from friso.studies.execute import local_crew
 from friso.studies.refine import FINER, SHARE, finer, refine
 from friso.studies.request import Request
 from friso.studies.study import Study
+from friso.studies.sweep import sweep
 from friso.studies.verify import loosest_rtol, sampled
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -29,8 +30,8 @@ pytestmark = pytest.mark.xdist_group("rig")
 def test_verification_tells_what_a_tighter_sweep_would(rig: Stage) -> None:
     """All cells checked: the share that survives is that of two sweeps compared."""
     axes = {"controller.crossover": "2 Hz..8 Hz:12", "joint.stroke": "0.1 mm..1 mm:12"}
-    runs = friso.sweep(rig, axes, rtol=1e-2, verify=1.0)
-    tighter = friso.sweep(rig, axes, rtol=1e-4)
+    runs = sweep(rig, axes, rtol=1e-2, verify=1.0)
+    tighter = sweep(rig, axes, rtol=1e-4)
     same = int((runs.outcome == tighter.outcome).sum())
     assert runs.attrs["verified_cells"] == 144
     assert runs.attrs["verified_rtol"] == pytest.approx(1e-4)
@@ -39,9 +40,9 @@ def test_verification_tells_what_a_tighter_sweep_would(rig: Stage) -> None:
 
 def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
     axes = {"friction.static": "0 N..4 N:6", "friction.coulomb": "0 N..4 N:6"}
-    runs = friso.sweep(rig, axes, rtol=1e-4, verify=1.0)
+    runs = sweep(rig, axes, rtol=1e-4, verify=1.0)
     assert runs.attrs["verified_cells"] == int((runs.outcome != "invalid").sum()) == 15
-    nothing = friso.sweep(rig, {"friction.coulomb": "4 N..5 N:3"}, verify=1.0)
+    nothing = sweep(rig, {"friction.coulomb": "4 N..5 N:3"}, verify=1.0)
     assert "verified_cells" not in nothing.attrs
 
 
@@ -102,12 +103,12 @@ def test_the_tolerance_is_chosen_on_cells_that_a_stage_may_have(rig: Stage, monk
 
 def test_inferred_outcomes_are_checked_apart(rig: Stage) -> None:
     axes = {"controller.crossover": "2 Hz..12 Hz:9", "joint.stroke": "0.1 mm..1 mm:9"}
-    runs = friso.sweep(rig, axes, rtol=1e-4, refine=True, verify=1.0)
+    runs = sweep(rig, axes, rtol=1e-4, refine=True, verify=1.0)
     guessed = np.char.startswith(runs.status.values.astype(str), "inferred")
     assert runs.attrs["inferred_checked"] == guessed.sum() > 0
     assert runs.attrs["verified_cells"] == (~guessed).sum()
     fine = {"controller.crossover": "2 Hz..12 Hz:33", "joint.stroke": "0.1 mm..1 mm:33"}
-    full = friso.sweep(rig, fine, rtol=1e-6)
+    full = sweep(rig, fine, rtol=1e-6)
     assert runs.attrs["inferred_confirmed"] == (full.outcome == runs.outcome).values[guessed].sum() < guessed.sum()
     assert (~guessed).sum() >= 81  # of a small grid no fewer runs than it has
 
@@ -115,7 +116,7 @@ def test_inferred_outcomes_are_checked_apart(rig: Stage) -> None:
 @pytest.mark.parametrize("share", [-0.1, 1.1])
 def test_a_share_that_is_none_is_refused(rig: Stage, share: float, refused: Refused) -> None:
     with refused("verify"):
-        friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, verify=share)
+        sweep(rig, {"controller.crossover": ["8 Hz"]}, verify=share)
 
 
 def boundary(hunts: np.ndarray) -> np.ndarray:
@@ -172,9 +173,9 @@ def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
     """
     locked = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
     axes = {"controller.crossover": "1 Hz..40 Hz:41", "mass": "0.1 kg..5.1 kg:41"}
-    refined = friso.sweep(locked, axes, links=MASS, refine=True)
+    refined = sweep(locked, axes, links=MASS, refine=True)
     fine = {"controller.crossover": "1 Hz..40 Hz:161", "mass": "0.1 kg..5.1 kg:161"}
-    full = friso.sweep(locked, fine, links=MASS)
+    full = sweep(locked, fine, links=MASS)
     assert np.array_equal(refined["mass"], full["mass"])
     ran = np.isfinite(refined.peaks.values)
     assert ran.sum() <= full.peaks.size / 5
@@ -202,5 +203,5 @@ def test_what_cannot_be_refined_is_refused(rig: Stage, refused: Refused) -> None
     for axes in ({"joint.locked": [True, False]}, {}):
         samples = None if axes else friso.Samples({"joint.stroke": "0 m..1 mm"}, 8)
         with refused("--refine"):
-            friso.sweep(rig, axes, samples, refine=True)
+            sweep(rig, axes, samples, refine=True)
     assert replace(Request(rig, {"joint.stroke": "0 m..1 mm:3"}).study(), refined=True).refined

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from refusals import Refused
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
-from friso.cli.common import read_stage
+from friso.answers.inputs import read_stage
 from friso.intervals import COVERAGE, UncertainValue
 from friso.stage import Stage, load, numeric_keys, parse_set, save
 from friso.stage.correlations import Correlations, beside, correlations_text, draw, laid_over, read_correlations
@@ -132,17 +132,18 @@ def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
 
 
 def test_single_valued_commands_say_that_centres_are_used(
-    rig: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    rig: Stage, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     path = tmp_path / "a.toml"
     save(uncertain(rig, coulomb="1 N +/- 5 %", static="3 N +/- 5 %", viscous="0 N*s/m .. 1 N*s/m"), path)
     read_stage(path, ["masses.cart=1 kg .. 2 kg"])
-    (line,) = capsys.readouterr().err.splitlines()
+    (line,) = caplog.messages
+    caplog.clear()
     assert "4 keys are uncertain (masses.cart, friction.static, friction.coulomb, ...)" in line
     assert "their centres are used" in line
     assert "friso check --draws 1000" in line
     read_stage(path, None, uncertain_too=True)
-    assert capsys.readouterr().err == ""
+    assert caplog.messages == []
 
 
 # correlations

@@ -40,6 +40,8 @@ MISTAKES = {
     "reproduce": ("masses", "--out", "out"),
     "guideline": ("--samples", "63"),
     "doctor": ("--full-path",),
+    "example": ("thesis",),
+    "schema": ("--of", "design"),
 }
 
 RUNS = {

@@ -18,8 +18,8 @@ from tempfile import mkdtemp
 
 import psutil
 
-from friso.cli.drafts import DRAFTS
-from friso.cli.output import MARKER, UNFINISHED, write
+from friso.answers.drafts import DRAFTS
+from friso.answers.output_folder import MARKER, UNFINISHED, write
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))

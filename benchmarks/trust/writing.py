@@ -18,12 +18,13 @@ import numpy as np
 import friso
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.faults import struck
-from friso.cli.output import MARKER, OutputFolder
+from friso.answers.output_folder import MARKER, OutputFolder
 from friso.errors import InputError
 from friso.studies import metadata
 from friso.studies.request import Request
 from friso.studies.store import Store, check_store, read_store
 from friso.studies.study import Study
+from friso.studies.sweep import sweep
 
 RIG = Path(__file__).parents[2] / "examples" / "thesis_rig.toml"
 AXES = {"controller.crossover": "2 Hz..16 Hz:8", "joint.stroke": "0.1 mm..1 mm:8"}
@@ -157,7 +158,7 @@ def _study() -> Study:
 def _undisturbed() -> Path:
     """The store that nothing happened to."""
     path = Path(tempfile.mkdtemp(prefix="friso-trust-store-")) / "a.zarr"
-    friso.sweep(friso.load(RIG), AXES, metrics=["peaks"], store=path)
+    sweep(friso.load(RIG), AXES, metrics=["peaks"], store=path)
     return path
 
 

@@ -9,16 +9,16 @@ import io
 import logging
 import sys
 from contextvars import copy_context
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperGroup
 
 from friso import interrupts
-from friso.cli.command import COMMANDS
+from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import escaping
 from friso.errors import InputError
-from friso.stage.foreign import installed
 from friso.version import VERSION
 
 
@@ -39,10 +39,35 @@ def friso(
     """
 
 
+TOUR = """friso: does a positioning stage on contact bearings hunt, why, and what stops it?
+
+  friso example thesis_rig                  a stage file to try: thesis_rig.toml
+  friso check thesis_rig.toml               does it hunt: as given, joint locked, joint free
+  friso boundary thesis_rig.toml --set joint.locked=true --x controller.crossover="1 Hz..40 Hz"
+                                            where hunting ends
+  friso bode thesis_rig.toml                why: the loop in every state, stuck and sliding
+  friso init my_stage.toml                  a commented stage file for your own machine
+
+friso --help lists all commands by question; friso COMMAND --help has an example of each."""
+"""What `friso` alone prints."""
+
+
+class ByQuestion(TyperGroup):
+    """The list of commands, by the question that they answer."""
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        for question in QUESTIONS:
+            commands = [(name, COMMANDS[name]) for name in self.list_commands(ctx) if name in COMMANDS]
+            if rows := [(name, command.summary) for name, command in commands if command.question == question]:
+                formatter.write(f"\n{question}\n")
+                with formatter.indentation():
+                    formatter.write_dl(rows)
+
+
 def command_line() -> typer.Typer:
     """The commands of friso, in the order of their places."""
     app = typer.Typer(
-        add_completion=False,
+        cls=ByQuestion,
         rich_markup_mode=None,
         pretty_exceptions_enable=False,
         context_settings={"help_option_names": ["-h", "--help"]},
@@ -59,7 +84,8 @@ def main() -> NoReturn:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
     if len(sys.argv) == 1:
-        sys.argv.append("--help")
+        print(TOUR)
+        sys.exit(0)
     with escaping():
         sys.exit(_status())
 
@@ -117,5 +143,11 @@ def _failed(error: BaseException) -> int:
 
 def _plug_ins() -> str:
     """What installed packages add, for the help. Raises InputError for a name that is taken."""
+    from importlib.metadata import entry_points
+
+    if not any(entry_points(group=group) for group in ("friso.controllers", "friso.friction")):
+        return ""
+    from friso.stage.foreign import installed
+
     names = installed()
     return f"From other packages: {', '.join(names)}." if names else ""

@@ -10,6 +10,17 @@ from typer.core import TyperCommand
 
 from friso.registry import Registry
 
+HUNTS, WHERE, WHY, STOPS, MACHINE, HELP = (
+    "Does it hunt?",
+    "Where does it hunt?",
+    "Why does it hunt?",
+    "What stops it?",
+    "What is my machine?",
+    "Help",
+)
+QUESTIONS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
+"""The questions by which `friso --help` lists the commands."""
+
 
 @dataclass(frozen=True)
 class Choices:
@@ -21,12 +32,18 @@ class Choices:
 
 @dataclass(frozen=True)
 class Command:
-    """A command of friso: the function that typer calls, whose docstring is the help, and its `place` in the list of
-    commands, which goes by increasing numbers."""
+    """A command of friso: the function that typer calls, whose docstring is the help; its `place` in the list of
+    commands, which goes by increasing numbers, under the `question` that it answers."""
 
     function: Callable[..., None]
     place: int
+    question: str = HELP
     choices: Choices | None = None
+
+    @property
+    def summary(self) -> str:
+        """The command in one line."""
+        return (self.function.__doc__ or "").partition("\n")[0].strip().rstrip(".")
 
     @property
     def help_class(self) -> type[TyperCommand]:

@@ -102,6 +102,12 @@ def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | 
     The cycle's are exact: from variational equations along the keys, with saltation at kinks. The edge's follow from
     the multipliers, exact derivatives of the flow, whose own change is taken by central differences; they are those of
     a flip. The margin's are central differences of the loop at one frequency. Raises InputError for an unknown key.
+
+    Examples
+    --------
+    >>> import friso
+    >>> locked = friso.load(friso.example("thesis_rig")).replace({"joint.locked": True})
+    >>> friso.sensitivity(locked, ["friction.static"])  # doctest: +SKIP
     """
     flat = {**stage.flat(), **as_tuned(stage.flat())}
     names = _keys(flat) if keys is None else tuple(keys)

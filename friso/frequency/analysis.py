@@ -38,6 +38,13 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
     the formula that Table 1 of the thesis prints, instead of in parallel with the joint. Where the cart is stuck, its
     bristles follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor,
     which has none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
+
+    Examples
+    --------
+    >>> import friso
+    >>> stage = friso.load(friso.example("thesis_rig"))
+    >>> friso.linear(stage, "stuck").output_labels
+    ['stage', 'cart', 'joint deflection']
     """
     flat: Mapping[str, Any] = stage.flat()
     cases = limit_cases(flat)

@@ -65,7 +65,14 @@ class Members:
 
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
     """A single state: sliding at a speed [m/s], `forward` or back, or, at 0, stuck under a bias force [N]; with its
-    limiter `touched` or not. Raises InputError for a speed that is negative and for a bias of a cart that slides."""
+    limiter `touched` or not. Raises InputError for a speed that is negative and for a bias of a cart that slides.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.member(speed=1e-3).stuck
+    array([False])
+    """
     if not 0 <= speed < np.inf:
         raise InputError("speed", f"{speed} m/s", "0 or greater; forward=False for the other direction", "speed=1e-3")
     if bias and speed:

@@ -30,7 +30,14 @@ class Tuning:
 
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules with `alpha` and `beta`, and how it does
-    on that mass. Raises InputError for numbers that no stage file may have."""
+    on that mass. Raises InputError for numbers that no stage file may have.
+
+    Examples
+    --------
+    >>> import friso
+    >>> round(friso.tuning(8.0, 0.1, 2.0, 1.7).true_crossover, 2)
+    8.08
+    """
     flat = {"friction.model": "none", "masses.stage": mass, **tuned(crossover, alpha, beta, mass)}
     for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
         if key in flat and not item.bound.holds(flat[key]):

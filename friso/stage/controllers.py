@@ -11,6 +11,7 @@ from friso.errors import StageError
 from friso.quantities import Quantity, Value, positive
 from friso.stage.filters import FILTER_ARRAY
 from friso.stage.lists import Rows
+from friso.stage.plug_ins import load_own
 from friso.stage.section import Section, SectionClass, Variants
 from friso.stage.standstill import AgainstFriction
 
@@ -120,14 +121,20 @@ class Controllers(Variants):
 
     def __init__(self) -> None:
         super().__init__("kind", "friso.controllers")
-        self.forms: dict[str, list[type[ControllerSection]]] = {}
+        self._forms: dict[str, list[type[ControllerSection]]] = {}
+
+    @property
+    def forms(self) -> dict[str, list[type[ControllerSection]]]:
+        """The forms of each kind."""
+        load_own(self.group)
+        return self._forms
 
     def register(self, cls: SectionClass) -> SectionClass:
         """Class decorator: add a form of a controller. Raises InputError for a kind that another class declares."""
         form = cast(type[ControllerSection], cls)
         owner = next(base for base in form.__mro__ if self.tag in get_annotations(base))
         super().register(owner)
-        self.forms.setdefault(self.name_of(form), []).append(form)
+        self._forms.setdefault(self.name_of(form), []).append(form)
         return cls
 
     def pick(self, table: dict[str, Any]) -> type[Section]:

@@ -18,7 +18,14 @@ _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 
 def load(path: str | os.PathLike[str]) -> Stage:
-    """The stage of the TOML file at `path`. Raises StageError."""
+    """The stage of the TOML file at `path`. Raises StageError.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.load(friso.example("thesis_rig")).joint.stiffness.text
+    '2.4 N/mm'
+    """
     try:
         return loads(text_of(Path(path), _EXPECTED), origin=str(path))
     except InputError as error:
@@ -26,7 +33,15 @@ def load(path: str | os.PathLike[str]) -> Stage:
 
 
 def loads(text: str, origin: str = "stage file") -> Stage:
-    """The stage of a TOML text; `origin` names it in errors. Raises StageError."""
+    """The stage of a TOML text; `origin` names it in errors. Raises StageError.
+
+    Examples
+    --------
+    >>> import friso
+    >>> stage = friso.load(friso.example("thesis_rig"))
+    >>> friso.loads(stage.to_toml()) == stage
+    True
+    """
     try:
         tables = parsed(text, _EXPECTED)
         if "masses" not in tables or "controller" not in tables:
@@ -46,6 +61,12 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     """Write a stage file to `path`, all of it or nothing.
 
     Raises InputError where there is a file already (unless `overwrite`) or the place cannot be written to.
+
+    Examples
+    --------
+    >>> import friso
+    >>> stage = friso.load("rig.toml").replace({"masses.stage": "0.6 kg"})  # doctest: +SKIP
+    >>> friso.save(stage, "heavier.toml")  # doctest: +SKIP
     """
     write_whole(stage.to_toml(), Path(path), overwrite)
 

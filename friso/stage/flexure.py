@@ -10,6 +10,7 @@ from pydantic import create_model, model_validator
 from friso.errors import StageError
 from friso.materials import DENSITY, STRENGTH, YOUNG, materials
 from friso.quantities import Bound, Number, Quantity, Value, any_sign, at_least_1, positive, quoted
+from friso.stage.plug_ins import load_own
 from friso.stage.section import Rule, UncertainSection, nearest
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
@@ -31,6 +32,7 @@ def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
 
 def derived(flat: dict[str, Any]) -> dict[str, Any]:
     """The flat keys with all that follow from their tables."""
+    load_own("friso.derivations")
     tables = {key.split(".")[0] for key in flat}
     for table, derivation in DERIVATIONS.items():
         if table in tables:

@@ -1,6 +1,7 @@
 """Where registered sections come from that are not friso's own, so that another process can register them too.
 
-Installed packages name theirs in entry points, which are read when a name in a stage file is not friso's own.
+Friso's own are named here. Installed packages name theirs in entry points, which are read when a name in a stage file
+is not friso's own.
 
 A kernel is built in a process of its own, which gets the plug-ins with its task: a friction law or a controller from
 another package, from one file, or from the script that runs.
@@ -66,6 +67,21 @@ def plug_in_of(cls: type) -> PlugIn | None:
 def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
     """The plug-ins that these classes come from, each once."""
     return tuple(dict.fromkeys(plug_in for cls in classes if (plug_in := plug_in_of(cls))))
+
+
+FRISO = {
+    "friso.controllers": "friso.equations.controllers",
+    "friso.friction": "friso.equations.friction",
+    "friso.derivations": "friso.leaf_springs.joint",
+}
+"""The modules that register what is friso's own, by group: they stand on floors above, and are imported when a stage
+is first read."""
+
+
+def load_own(group: str) -> None:
+    """Import friso's own modules of a group."""
+    if group in FRISO and FRISO[group] not in sys.modules:
+        importlib.import_module(FRISO[group])
 
 
 @cache

@@ -22,7 +22,7 @@ from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, as_toml, quoted
 from friso.stage.lists import Rows, Several, Values, row_keys
-from friso.stage.plug_ins import load_installed
+from friso.stage.plug_ins import load_installed, load_own
 
 
 @dataclass(frozen=True)
@@ -69,6 +69,13 @@ class Section(BaseModel):
             self.__pydantic_validator__.validate_python(dict(data), self_instance=self, context=kind)
         except ValidationError as error:
             raise self.refusal.of(_problems(type(self), error, kind)) from None
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Raises AttributeError for a key: tables do not change."""
+        if name in type(self).model_fields:
+            changes = '{"table.key": value}' if type(self).__name__ != "Stage" else f'{{"{name}": ...}}'
+            raise AttributeError(f"a stage does not change; make another one: stage.replace({changes})")
+        super().__setattr__(name, value)
 
     def as_written(self) -> dict[str, Any]:
         """The keys that the user gave, with the values as written."""
@@ -146,7 +153,13 @@ class Variants:
 
     def __init__(self, tag: str, group: str = "") -> None:
         self.tag, self.group = tag, group
-        self.classes: dict[str, type[Section]] = {}
+        self._classes: dict[str, type[Section]] = {}
+
+    @property
+    def classes(self) -> dict[str, type[Section]]:
+        """The variants by name."""
+        load_own(self.group)
+        return self._classes
 
     def name_of(self, cls: type[Section]) -> str:
         """The name that a variant declares as `kind: Literal["step"]`."""
@@ -155,12 +168,12 @@ class Variants:
     def register(self, cls: SectionClass) -> SectionClass:
         """Class decorator: add a variant. Raises InputError where its name is taken."""
         name = self.name_of(cls)
-        holder = self.classes.get(name, cls)
+        holder = self._classes.get(name, cls)
         if (holder.__module__, holder.__qualname__) != (cls.__module__, cls.__qualname__):
             actual = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"
             expected = f"a name that is not taken: {holder.__module__}.{holder.__qualname__} has it"
             raise InputError(self.tag, actual, expected, f'{self.tag}: Literal["my_{name}"]')
-        self.classes[name] = cls
+        self._classes[name] = cls
         return cls
 
     def named(self, name: Any) -> type[Section] | None:

@@ -47,6 +47,12 @@ def harmonic_balance(
     `amplitude_error`, relative, NaN where it does not close on a motion; and `status`. Raises InputError for a
     stage without friction, one whose controller has no crossover, and one that has no cycle that is its own mirror
     image.
+
+    Examples
+    --------
+    >>> import friso
+    >>> locked = friso.load(friso.example("thesis_rig")).replace({"joint.locked": True})
+    >>> friso.harmonic_balance(locked, [6.0, 8.0])  # doctest: +SKIP
     """
     import xarray as xr
 

@@ -183,6 +183,11 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 
     Raises StoreError if there is none, or its metadata or axes are damaged; RuntimeError where a damaged value is
     looked at.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.read_store("rig.zarr")["outcome"]  # doctest: +SKIP
     """
     import xarray as xr
 

@@ -6,10 +6,10 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.command import Choices, Command
-from friso.cli.common import AsJson, Overrides, StageFile, print_table, print_wrapped, read_stage
-from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
-from friso.errors import InputError
+from friso.cli.asking import ask
+from friso.cli.command import WHY, Choices, Command
+from friso.cli.common import AsJson, Overrides, StageFile
+from friso.cli.output import OutFolder, Overwrite
 
 Law = Annotated[str, typer.Option("--friction", metavar="LAW", help="The friction law to convert to.")]
 Elements = Annotated[
@@ -30,35 +30,11 @@ def convert(
 
     Example: friso convert examples/thesis_rig.toml --friction gms --elements 6 --out gms
     """
-    stage = read_stage(stage_file, overrides)
-    if not 1 <= elements <= MOST:
-        raise InputError("--elements", str(elements), f"a whole number from 1 to {MOST}", "--elements 6")
-    target = output_folder("convert", out, overwrite, [stage_file])
-    from friso.studies.laws.conversion import convert as convert_stage
+    from friso.answers.convert import convert as question
 
-    conversion = convert_stage(stage, law, elements)
-    files = []
-    if target is not None:
-        from friso.views.convert.page import convert_files
-
-        files = target.write(convert_files(conversion, f"{stage_file.stem}_{law}"))
-    from friso.views.convert.words import COLUMNS, conversion_rows, conversion_sentences, friction_table
-
-    if as_json:
-        from friso.views.convert.document import convert_document
-
-        print_document(convert_document(conversion), files)
-        return
-    for sentence in conversion_sentences(conversion):
-        print_wrapped(sentence)
-    print_table(stage.name, COLUMNS, conversion_rows(conversion))
-    if target is None:
-        print(f"\n{friction_table(conversion)}")
-    print_written(files)
-
-
-MOST = 12
-"""Elements at most."""
+    options = {"friction": law, "elements": elements, "set": overrides}
+    shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
+    ask("convert", question, stage_file, **options, **shown)
 
 
 def _laws() -> list[tuple[str, str]]:
@@ -68,4 +44,4 @@ def _laws() -> list[tuple[str, str]]:
     return [(name, (friction_law(name).__doc__ or "").split(":")[0].split("\n")[0]) for name in convertible()]
 
 
-COMMAND = Command(convert, 96, Choices("Laws", _laws))
+COMMAND = Command(convert, 55, WHY, Choices("Laws", _laws))

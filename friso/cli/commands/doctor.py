@@ -6,9 +6,9 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.command import Command
-from friso.cli.common import AsJson, print_wrapped
-from friso.cli.output import print_document
+from friso.cli.asking import ask
+from friso.cli.command import HELP, Command
+from friso.cli.common import AsJson
 
 
 def doctor(
@@ -21,20 +21,9 @@ def doctor(
 
     Example: friso doctor
     """
-    from friso.studies.doctor import checks
-    from friso.views.doctor.document import conclusion, doctor_document
+    from friso.answers.doctor import doctor as question
 
-    looked_at = [*checks(full_paths)]
-    if as_json:
-        print_document(doctor_document(looked_at))
-    else:
-        print_wrapped(conclusion(looked_at))
-        for check in looked_at:
-            print(f"{check.subject}: {check.text}")
-            if check.remedy and not check.works:
-                print(f"  remedy: {check.remedy}")
-    if not all(check.works for check in looked_at):
-        raise typer.Exit(1)
+    ask("doctor", question, full_paths=full_paths, as_json=as_json)
 
 
-COMMAND = Command(doctor, 150)
+COMMAND = Command(doctor, 150, HELP)

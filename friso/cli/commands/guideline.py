@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.command import Command
-from friso.cli.common import AsJson, print_wrapped, say
-from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
-from friso.cli.progress import ProgressBar
+from friso.cli.asking import ask
+from friso.cli.command import WHERE, Command
+from friso.cli.common import AsJson, say
+from friso.cli.output import DefaultFolder, Overwrite
 
 
 def guideline(
@@ -24,36 +24,25 @@ def guideline(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """The design guideline: guideline.md, its charts, guideline_edges.csv.
+    """Two formulas for the crossover at which hunting ends: guideline.md, its charts, guideline_edges.csv.
 
     Example: friso guideline --out guideline
     A quick try: friso guideline --samples 64 --out /tmp/guideline
     """
-    from friso.studies.guideline import guideline as compute
+    from friso.answers.guideline import guideline as question
+    from friso.answers.output_folder import UNFINISHED
     from friso.studies.guideline.compute import checked_samples
+    from friso.studies.guideline.sweeps import Keep
 
     checked_samples(samples)
-    target = OutputFolder("guideline", out, overwrite)
-    from friso.studies.guideline.sweeps import Keep
-    from friso.views.guideline.document import guideline_document
-    from friso.views.guideline.page import guideline_files
-    from friso.views.guideline.words import accuracy
-
-    keep = Keep(target.unfinished)
+    keep = Keep(out / UNFINISHED)
+    shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
     try:
-        with ProgressBar() as progress:
-            result = compute(samples, keep.folder, progress)
-            files = target.write(guideline_files(result), progress)
+        ask("guideline", question, samples=samples, folder=keep.folder, **shown)
     except KeyboardInterrupt:
         say(f"{keep.count} parts of the sweeps are kept in {keep.folder}; the same command resumes from there")
         raise
     keep.clear()
-    if as_json:
-        print_document(guideline_document(result), files)
-        return
-    for sentence in accuracy(result):
-        print_wrapped(sentence)
-    print_written(files)
 
 
-COMMAND = Command(guideline, 140)
+COMMAND = Command(guideline, 140, WHERE)

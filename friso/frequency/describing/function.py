@@ -67,6 +67,11 @@ def describing(
 
     Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
     usable, ValueError for an `rtol` that is not. A pair that fails has NaN and a reason in `status`.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.describing(friso.load("rig.toml"), [1e-5, 1e-4], [10.0])["stiffness"]  # doctest: +SKIP
     """
     import xarray as xr
 

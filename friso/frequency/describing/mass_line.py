@@ -31,6 +31,12 @@ def mass_line(
     the response over -180 degrees. The `spread_magnitude` and `spread_phase` over ("force", "frequency") are
     standard deviations over the places. Raises InputError for places that no stage may have, and as
     `plant_response`.
+
+    Examples
+    --------
+    >>> import friso
+    >>> places = [{"friction.static": "2 N"}, {"friction.static": "3 N"}]
+    >>> friso.mass_line(friso.load("rig.toml"), places, [2.0], [5.0, 10.0])  # doctest: +SKIP
     """
     import xarray as xr
 

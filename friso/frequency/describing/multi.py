@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke, receptance
-from friso.frequency.describing.waveform import Answer, OneStateLaw, friction_answer
+from friso.frequency.describing.waveform import FrictionAnswer, OneStateLaw, friction_answer
 
 OVERSAMPLED = 32
 """Time intervals per period and harmonic at least."""
@@ -154,7 +154,7 @@ class _Problem:
         real, imaginary = np.split(state[:-1] * self.length, 2)
         return real + 1j * imaginary, float(self.omega * np.exp(state[-1]))
 
-    def answer(self, state: np.ndarray) -> Answer:
+    def answer(self, state: np.ndarray) -> FrictionAnswer:
         speed = self.omega * np.exp(state[-1])
         velocity = speed * self.length * (self.basis.slopes @ state[:-1])
         interval = 2 * np.pi / speed * self.basis.share / len(velocity)

@@ -44,6 +44,11 @@ def plant_response(
 
     Raises InputError for forces or frequencies that are not usable and for a stage without friction, ValueError for an
     `rtol` that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.plant_response(friso.load("rig.toml"), [2.0], [5.0, 10.0])["up"]  # doctest: +SKIP
     """
     import xarray as xr
 

@@ -75,7 +75,7 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
 
 
 @dataclass(frozen=True)
-class Answer:
+class FrictionAnswer:
     """Friction force [N] at the middles of the intervals (M,), and what its derivative by the velocities there is made
     of: see `along`."""
 
@@ -117,7 +117,7 @@ def _middles(z: np.ndarray) -> np.ndarray:
     return (z[:-1] + z[1:]) / 2
 
 
-def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> Answer:
+def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> FrictionAnswer:
     """The friction on a motion with these velocities [m/s] at the middles (M,) of intervals [s], after which it comes
     back (sign 1) or comes to its mirror image (-1)."""
     z = np.zeros(len(velocity) + 1)
@@ -131,4 +131,4 @@ def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sig
         if np.max(np.abs(step)) <= CLOSE * np.max(np.abs(z)):
             break
     _, _, _, force, by_state, by_velocity = law.at(velocity, _middles(z))
-    return Answer(force, by_velocity, by_state, chain, pushed)
+    return FrictionAnswer(force, by_velocity, by_state, chain, pushed)

@@ -58,16 +58,31 @@ def response_figure(trace: xr.Dataset) -> Figure:
     reference = Series(time, samples(trace, "reference"), "reference", GREY, "dashed")
     position = Series(time, samples(trace, "position"), "position", BLUE)
     panels = [Panel("Position", _TIME, Axis("Position", "m"), (reference, position))]
+    end = time >= _late(trace)
     for name, title in (
         ("error", "Error"),
         ("force", "Actuator force"),
         ("joint_deflection", "Joint deflection"),
     ):
         if name in trace:
-            line = Series(time, samples(trace, name), title.lower(), BLUE)
-            panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"])), (line,)))
-    caption = "The whole run; the error is the reference minus the position."
+            values = samples(trace, name)
+            line = Series(time, values, title.lower(), BLUE)
+            view = common_range([values[end]]) if name == "error" else None
+            panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"]), view), (line,)))
+    caption = (
+        "The whole run; the error is the reference minus the position, at the scale of what follows the move: the move "
+        "itself is cut off."
+    )
     return Figure("response", "time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
+
+
+def _late(trace: xr.Dataset) -> float:
+    """The time [s] from which on a run shows what it does at its end: half of what follows the last change of its
+    reference."""
+    time, reference = samples(trace, "time"), samples(trace, "reference")
+    changes = np.flatnonzero(np.diff(reference))
+    begin = time[changes[-1]] if len(changes) and changes[-1] < 0.9 * len(time) else time[0]
+    return float(begin + (time[-1] - begin) / 2)
 
 
 _TIME = Axis("Time", "s")

@@ -7,7 +7,7 @@ Texts are drawn as they stand: a dollar sign in a stage's name starts no formula
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from matplotlib.ticker import (
     ScalarFormatter,
 )
 
+from friso.errors import InputError
 from friso.views.drawing.drawable import drawable, word_ticks
 from friso.views.drawing.figure import GREY, INK, Figure, Panel
 from friso.views.drawing.matplotlib_maps import add_colour_bars, add_footer, draw_coloured, footer_height
@@ -102,6 +103,27 @@ def render(figure: Figure) -> Canvas:
         add_colour_bars(canvas, list(canvas.axes), prepared.panels)
         add_footer(canvas, prepared, _SYMBOLS, _DASHES, WIDTH)
         return canvas
+
+
+def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
+    """Draw the panels on the axes of somebody's figure, one each, or on a figure of pyplot that is made for them; their
+    axes. Raises InputError for other than one axes per panel."""
+    prepared = drawable(figure)
+    if axes is None:
+        from matplotlib import pyplot
+
+        size = (WIDTH, _row_height(prepared) * prepared.rows)
+        canvas = pyplot.figure(figsize=size, layout="constrained")
+        places = [canvas.add_subplot(prepared.rows, prepared.columns, k + 1) for k in range(len(prepared.panels))]
+    else:
+        places = [axes] if isinstance(axes, Axes) else [*axes]
+    if len(places) != len(prepared.panels):
+        expected = f"{len(prepared.panels)}, one per panel of the figure"
+        raise InputError("axes", f"{len(places)} axes", expected, f"plt.subplots({len(prepared.panels)})[1]")
+    with _style():
+        for place, panel in zip(places, prepared.panels, strict=True):
+            _draw(place, panel, WIDTH / prepared.columns)
+    return places
 
 
 def image(figure: Figure, form: str) -> bytes:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import base64
 import html
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -46,9 +47,12 @@ def script() -> str:
 
 
 def fragment(figure: Figure) -> str:
-    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it."""
+    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it; for panels side by
+    side also the layout on a narrow screen, one below the other."""
     drawn = render(figure)
     parts = {**_single(drawn.to_plotly_json()), "config": _CONFIG}
+    if figure.columns > 1 and not any(panel.coloured for panel in figure.panels):
+        parts["narrow"] = _single(render(replace(figure, columns=1)).to_plotly_json())["layout"]
     return (
         f'<div id="figure-{figure.name}" style="height: {drawn.layout.height}px"></div>\n'
         f'<script type="application/gzip" class="figure">{packed_json(parts)}</script>'

@@ -218,12 +218,22 @@ def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tupl
 
 
 def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
-    """The lines of the terminal: the answer, the estimates, the experiments behind them, and what was read."""
+    """All lines: the answer, the estimates, the experiments behind them, and what was read."""
     rows = estimate_rows(identification)
+    estimates = ["", *_aligned(rows)] if rows else []
+    return [*sentences(identification, predictions), *estimates, *details(identification, files)]
+
+
+def sentences(identification: Identification, predictions: Sequence[Prediction]) -> list[str]:
+    """The answer, how well other logs are predicted, and notes."""
     lines = [sentence for _, sentence in headline(identification)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
-    lines += [f"note: {warning}" for warning in identification.warnings]
-    lines += ["", *_aligned(rows)] if rows else []
+    return lines + [f"note: {warning}" for warning in identification.warnings]
+
+
+def details(identification: Identification, files: Sequence[LogFile]) -> list[str]:
+    """The experiments behind the estimates, and what was read."""
+    lines = []
     for part in summaries(identification):
         lines += ["", part.title, *(f"  {sentence}" for sentence in part.sentences)]
         lines += [f"  {name}: {text}" for name, text in part.facts]

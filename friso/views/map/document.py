@@ -15,14 +15,14 @@ if TYPE_CHECKING:
     from friso.studies.study import Study
 
 
-def map_document(runs: xr.Dataset, study: Study, store: Path, metric: str) -> dict[str, Any]:
+def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str) -> dict[str, Any]:
     """The axes, what came out, and how much of it survives a tighter tolerance."""
     criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
     names = ("cells", "surviving", "rtol")
     verified = {name: runs.attrs[f"verified_{name}"] for name in names if "verified_cells" in runs.attrs}
     document = {
         "stage": study.stage.name,
-        "store": str(store),
+        "store": str(store) if store else None,
         "axes": {
             axis.name: {
                 "points": len(axis.values),

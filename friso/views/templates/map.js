@@ -228,6 +228,7 @@
   }
 
   function clicked(event) {
+    plot.focus({ preventScroll: true }); // so that arrow keys go on from here
     const hit = event.points[0];
     if (points && hit.customdata === undefined) return;
     if (points) at[0] = hit.customdata;

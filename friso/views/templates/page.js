@@ -12,8 +12,11 @@ const plotly = (async () => {
 (async () => {
   await plotly;
   for (const packed of document.querySelectorAll("script.figure")) {
-    const { data, layout, config } = JSON.parse(await unpacked(packed));
-    await Plotly.newPlot(packed.previousElementSibling, data, layout, config);
+    const { data, layout, narrow, config } = JSON.parse(await unpacked(packed));
+    const place = packed.previousElementSibling;
+    const chosen = narrow && place.parentElement.clientWidth < 640 ? narrow : layout;
+    place.style.height = `${chosen.height}px`;
+    await Plotly.newPlot(place, data, chosen, config);
   }
 })().catch((error) => {
   document.documentElement.classList.add("still");

@@ -1,20 +1,21 @@
-"""What `friso map` is asked for and answers: the study, what it would cost, files."""
+"""What a sweep is asked for and writes: the study, what it would cost, the files beside its store."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.cli.common import key_values
-from friso.cli.output import refuse_device
+from friso.answers.inputs import Changes, pairs_of
+from friso.answers.output_folder import refuse_device
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
+from friso.studies.axes import Values
 from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 
     from friso.views.files import Content
 
-AXIS_EXAMPLE = '--x controller.crossover="1 Hz..40 Hz:41"'
+AXIS_EXAMPLE = 'controller.crossover="1 Hz..40 Hz:41"'
 
 BYTES = 8
 """Bytes of a number in a store, before they are compressed."""
@@ -37,38 +38,47 @@ BYTES = 8
 class Varied:
     """The options that say what is varied, as they were given."""
 
-    x: str | None = None
-    y: str | None = None
-    more: tuple[str, ...] = ()
-    links: tuple[str, ...] = ()
-    samples: int | None = None
+    axes: Mapping[str, Values] = field(default_factory=dict)
+    links: Mapping[str, str] = field(default_factory=dict)
+    samples: int | Samples | None = None
     latin: bool = False
     log: bool = False
 
-    @property
-    def axes(self) -> dict[str, str]:
-        """Name to range of every axis. Raises InputError."""
-        named = {"--x": self.x, "--y": self.y} | {f"--axis {k + 1}": text for k, text in enumerate(self.more)}
-        return key_values([(option, text) for option, text in named.items() if text is not None], AXIS_EXAMPLE)
-
-    @property
-    def linked(self) -> dict[str, str]:
-        """Key to expression of every link. Raises InputError."""
-        return key_values([("--link", text) for text in self.links], '--link masses.cart="0.7 * mass"')
+    @classmethod
+    def of_texts(
+        cls,
+        axes: Mapping[str, Values],
+        x: str | None,
+        y: str | None,
+        more: Iterable[str],
+        link: Changes,
+        samples: int | Samples | None,
+        latin: bool,
+        log: bool,
+    ) -> Varied:
+        """The axes of a dictionary and those of texts KEY=RANGE, each once. Raises InputError."""
+        named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
+        every = dict(axes)
+        for name, text in named.items():
+            ranges = {} if text is None else pairs_of([text], name, AXIS_EXAMPLE)
+            for key in ranges:
+                if key in every:
+                    raise InputError(name, f"{key} given twice", "each key once", f"{name}={AXIS_EXAMPLE}")
+            every |= ranges
+        return cls(every, pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log)
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
     """The study asked for. Raises InputError, also if it has more than `most` cells: then with what it would cost."""
-    axes, links = varied.axes, varied.linked
-    if not axes:
-        raise InputError("--x", "no axis", "one axis or more", AXIS_EXAMPLE)
-    samples = None
-    if varied.samples is not None and len(axes) == 1:
-        raise InputError("--samples", "samples of one key", "two keys or more; for one, a range with its points")
-    if varied.samples is not None:
-        axes, samples = {}, Samples(axes, varied.samples, "latin" if varied.latin else "sobol")
+    axes, links, samples = varied.axes, varied.links, varied.samples
+    if not axes and not isinstance(samples, Samples):
+        raise InputError("x", "no axis", "one axis or more", f"x={AXIS_EXAMPLE}")
+    if isinstance(samples, int):
+        if len(axes) == 1:
+            raise InputError("samples", "samples of one key", "two keys or more; for one, a range with its points")
+        axes, samples = {}, Samples(axes, samples, "latin" if varied.latin else "sobol")
     elif varied.latin:
-        raise InputError("--latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
+        raise InputError("latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
     _check_metric(metric, METRICS)
     request = Request(stage, axes, samples, links, varied.log)
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
@@ -92,7 +102,7 @@ def stored_study(store: Path, metric: str | None) -> tuple[Study, str]:
     if metric in METRICS and metric not in study.metrics:
         actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a map of its own"
         example = f"friso map STAGE.toml ... --metric {metric} --out {store.stem}-{metric}.zarr"
-        raise InputError("--metric", actual, expected, example)
+        raise InputError("metric", actual, expected, example)
     _check_metric(metric, study.metrics)
     return study, metric
 
@@ -122,7 +132,7 @@ def _check_metric(metric: str, possible: Sequence[str]) -> None:
     """Raises InputError for a metric that there is not."""
     names = [name for name in possible if name != "status"]
     if metric not in names:
-        raise InputError("--metric", metric, f"one of {', '.join(names)}", "--metric peak_to_peak")
+        raise InputError("metric", metric, f"one of {', '.join(names)}", "metric=peak_to_peak")
 
 
 def coloured_by(study: Study, metric: str) -> str:
@@ -140,7 +150,7 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     hours = (time.perf_counter() - start) / trial.cells * runs / 3600
     gigabytes = BYTES * len(trial.metrics) * runs / 1e9
     size = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
-    return InputError("--yes", size, "--yes, or fewer points; nothing was run", "--yes")
+    return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
 
 
 def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content]:

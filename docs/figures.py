@@ -1,0 +1,118 @@
+"""The figures of README and docs: `python docs/figures.py [NAME...]` makes them anew, all of them or those named.
+
+`docs/figures.json` keeps of what each was made; a test says when that has changed since.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import sys
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+
+import friso
+from friso.answers.answer import Answer
+from friso.stage import Stage
+from friso.views.drawing.matplotlib_renderer import image
+from friso.views.flexure.svg import arrow, box, circle, leader, path, sheet, words
+
+DOCS = Path(__file__).parent
+MADE = DOCS / "figures.json"
+
+
+@cache
+def rig() -> Stage:
+    """The thesis rig."""
+    return friso.load(friso.example("thesis_rig"))
+
+
+def machine() -> bytes:
+    """The machine: rail, cart on its bearing, joint, stage with actuator and sensor, controller."""
+    spring = [(62 + k * 2.5, 34 + (3 if k % 2 else -3)) for k in range(1, 8)]
+    parts = [
+        box((5, 52), (135, 56), fill="url(#leaf-hatch)"),
+        box((20, 28), (54, 48), fill="#dbe9f4"),
+        *(circle((x, 50), 2.0, "#ffffff") for x in (26, 37, 48)),
+        words((37, 39), "cart", "middle"),
+        path([(54, 34), (62, 34), *spring, (82, 34), (88, 34)]),
+        path([(54, 44), (70, 44)]),
+        path([(76, 41), (76, 47)]),
+        path([(70, 40), (70, 48)], "outline"),
+        path([(76, 44), (88, 44)]),
+        box((88, 24), (118, 48), fill="#f6e3d3"),
+        words((103, 37), "stage", "middle"),
+        path([(103, 18), (122, 18)], "push"),
+        arrow((122, 18), (1, 0), "#D55E00"),
+        words((100, 14), "force of the actuator"),
+        *leader((37, 50), (30, 64), ["friction: sticks, then falls with speed"]),
+        *leader((72, 31), (60, 20), ["joint (the friction isolator)"]),
+        *leader((73, 47), (90, 64), ["limiter: end of the stroke"]),
+        *leader((118, 40), (122, 34), ["sensor"]),
+    ]
+    return sheet(150, 72, "A cart on a bearing carries a stage on a compliant joint", parts).encode()
+
+
+def hunting() -> bytes:
+    """The rig with its joint locked: it swings on and on."""
+    response = friso.simulate(rig().replace({"joint.locked": True}), sample_time="5 ms")
+    return _first(response)
+
+
+def thesis_rig() -> bytes:
+    """The verdict: joint locked beside joint free."""
+    return _first(friso.check(rig()))
+
+
+def thesis_cycles() -> bytes:
+    """All hunting cycles of the locked rig over the crossover."""
+    ranges = {"controller" + ".crossover": "1 Hz..40 Hz"}
+    return _first(friso.boundary(rig(), ranges, set={"joint.locked": True}))
+
+
+def thesis_loops() -> bytes:
+    """The open loop at prescribed speeds of the cart."""
+    drive = {"drive.sample_time": "50 us", "drive.delay": "100 us"}
+    figures = friso.bode(rig(), set=drive).figures()
+    return image(next(figure for figure in figures if "loop" in figure.name), "png")
+
+
+def thesis_map() -> bytes:
+    """What runs do over crossover and stroke."""
+    return _first(friso.sweep(rig(), {"controller" + ".crossover": "1 Hz..16 Hz:41", "joint.stroke": "0 m..1 mm:41"}))
+
+
+def _first(answer: Answer) -> bytes:
+    return image(answer.figures()[0], "png")
+
+
+FIGURES: Mapping[str, Callable[[], bytes]] = {
+    "machine.svg": machine,
+    "hunting.png": hunting,
+    "thesis_rig.png": thesis_rig,
+    "thesis_cycles.png": thesis_cycles,
+    "thesis_loops.png": thesis_loops,
+    "thesis_map.png": thesis_map,
+}
+
+
+def source_of(name: str) -> str:
+    """A digest of what makes a figure: its function, and the stage that it shows."""
+    text = inspect.getsource(FIGURES[name]) + friso.example("thesis_rig").read_text(encoding="utf-8")
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def main(names: list[str]) -> None:
+    """Make the figures of these names; all without any."""
+    made = json.loads(MADE.read_text(encoding="utf-8")) if MADE.exists() else {}
+    for name in names or FIGURES:
+        (DOCS / name).write_bytes(FIGURES[name]())
+        made[name] = source_of(name)
+        print(f"wrote {DOCS / name}")
+    MADE.write_text(json.dumps(made, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

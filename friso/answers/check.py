@@ -1,0 +1,183 @@
+"""Does the stage hunt: as given, and with its joint locked and free."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from friso.answers.answer import Answer, AnswerTable, question
+from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, tolerance_of, whole_number
+from friso.engine.simulate import simulate
+from friso.errors import InputError
+from friso.hunting.check import LONG, RTOL, Case
+from friso.progress import Progress, silent
+from friso.stage import Stage
+from friso.stage.correlations import draw
+from friso.studies.draws import MOST, Draws
+
+if TYPE_CHECKING:
+    from friso.cure.suggestion import Suggestion
+    from friso.studies.laws.verdicts import VerdictsByLaw
+    from friso.views.drawing.figure import Figure
+    from friso.views.files import Files
+
+MOST_SEED = 2**32 - 1
+
+
+class CheckAnswer(Answer):
+    """The verdict on a stage: `result` holds a `Case` each for "given" and, with a joint, "locked" and "free";
+    `draws`, what becomes of stages drawn from its uncertain keys, and `laws`, the verdicts across friction laws, or
+    None."""
+
+    command = "check"
+
+    def __init__(self, stage: Stage, cases: dict[str, Case], draws: Draws | None, laws: VerdictsByLaw | None) -> None:
+        self.stage, self.result, self.draws, self.laws = stage, cases, draws, laws
+        self.axis_kind = stage.axis_kind
+
+    @cached_property
+    def isolator(self) -> Suggestion | None:
+        """What an isolator would do for a stage without a joint that hunts; None for any other."""
+        case = self.result["given"]
+        if case.stage.joint or case.verdict not in ("hunts", "bistable"):
+            return None
+        from friso.cure.suggestion import suggestion
+
+        return suggestion(case.stage)
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on the stage as it is given: "hunts", "bistable", "transient", "settles" or "failed"."""
+        return self.result["given"].verdict
+
+    @property
+    def failure(self) -> str:
+        """Whether the run of a case was not completed."""
+        done = all(case.solver.done for case in self.result.values())
+        return "" if done else "the computation could not be completed; see the status above"
+
+    def sentences(self) -> Sequence[str]:
+        """The verdicts, and the chances where keys are uncertain."""
+        from friso.views.check.draws import draws_sentences
+        from friso.views.check.isolator_words import isolator_sentence
+        from friso.views.check.laws import laws_sentences
+        from friso.views.check.words import answer
+
+        suggested = [isolator_sentence(self.isolator)] if self.isolator else []
+        drawn = draws_sentences(self.draws) if self.draws else []
+        return [*answer(self.result), *suggested, *drawn, *(laws_sentences(self.laws) if self.laws else [])]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The numbers of each case, and of the stages drawn."""
+        from friso.views.check.cases import case_labels, shown_cases
+        from friso.views.check.draws import draws_rows
+        from friso.views.check.laws import laws_columns, laws_rows
+        from friso.views.check.table import rows
+
+        cases = shown_cases(self.result)
+        tables = [AnswerTable(self.stage.name, [item.label for item in cases], rows(cases))]
+        if self.draws:
+            title = f"{self.draws.sample.count} stages drawn from the uncertain keys, seed {self.draws.seed}"
+            tables.append(AnswerTable(title, [*case_labels(self.draws.stage).values()], draws_rows(self.draws)))
+        if self.laws:
+            tables.append(AnswerTable("Across friction laws", laws_columns(self.laws), laws_rows(self.laws)))
+        return tables
+
+    @cached_property
+    def traced(self) -> Mapping[str, Case]:
+        """The cases with their time responses, which figures show."""
+        return {name: replace(case, trace=simulate(case.stage, case.solver.rtol)) for name, case in self.result.items()}
+
+    def figures(self) -> Sequence[Figure]:
+        """The motion and the hunting cycles of each case."""
+        from friso.views.check.figures import check_figures
+
+        return check_figures(self.traced)
+
+    def document(self) -> dict[str, Any]:
+        """The cases with their verdicts."""
+        from friso.views.check.document import check_document
+
+        return check_document(self.result, self.draws, self.isolator, self.laws)
+
+    def files(self) -> Files:
+        """The report."""
+        from friso.views.check.page import check_files
+
+        return check_files(self.traced, self.draws, self.isolator, self.laws)
+
+
+@question
+def check(
+    stage: StageLike,
+    rtol: float | str = RTOL,
+    *,
+    set: Changes = None,
+    draws: int | None = None,
+    seed: int = 0,
+    laws: bool = False,
+    progress: Progress = silent,
+) -> CheckAnswer:
+    """Does the stage hunt: as given, and with its joint locked and free.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one.
+    rtol : float
+        Relative tolerance of the solver, 1e-12 to 1e-2.
+    set : dict, optional
+        Keys to override, ``{"joint.locked": True}``.
+    draws : int, optional
+        How many stages to draw from the uncertain keys, to report how many of them hunt.
+    seed : int
+        Seed of the draws: the same one gives the same stages.
+    laws : bool
+        Whether the verdict is wanted under every friction law, too, that shows the same in measurements.
+    progress : Progress
+        Called as work is done.
+
+    Returns
+    -------
+    CheckAnswer
+        The cases by name: ``answer["locked"].verdict``, ``answer["locked"].judgement.cycle.amplitude`` [m].
+
+    Raises
+    ------
+    InputError
+        For a stage or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> answer = friso.check(friso.example("lugre_stick_slip"))
+    >>> answer.verdict
+    'hunts'
+    >>> print(answer.data["peak_to_peak"].attrs["units"])
+    m
+    """
+    chosen, tolerance = read_stage(stage, set, uncertain_too=draws is not None), tolerance_of(rtol)
+    sample = None
+    if draws is not None:
+        whole_number(draws, "draws", 1, MOST, "1000")
+        whole_number(seed, "seed", 0, MOST_SEED, "1000")
+        try:
+            sample = draw(chosen, correlations_of(stage, chosen), draws, seed)
+        except InputError as error:
+            raise error if error.origin else error.found_in("draws") from None
+    from friso.hunting.check import check as judged
+
+    cases = judged(chosen, tolerance, progress=progress)
+    drawn = across = None
+    loose = max(tolerance, LONG)
+    if sample is not None:
+        from friso.studies.draws import fates
+
+        drawn = Draws(chosen, sample, seed, fates(chosen, sample, loose, progress))
+    if laws:
+        from friso.studies.laws.verdicts import verdicts_by_law
+
+        across = verdicts_by_law(chosen, loose, progress=progress)
+    return CheckAnswer(chosen, cases, drawn, across)

@@ -1,0 +1,103 @@
+"""The same stage under another friction law, and what could not be kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from friso.answers.answer import Answer, AnswerTable, question
+from friso.answers.inputs import Changes, StageLike, read_stage, stem_of, whole_number
+from friso.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from friso.studies.laws.conversion import LawConversion
+    from friso.views.files import Files
+
+MOST = 12
+"""Elements at most."""
+
+
+class ConvertAnswer(Answer):
+    """A stage under another friction law: `result` is the `LawConversion`, ``answer.stage`` the stage."""
+
+    command = "convert"
+
+    def __init__(self, result: LawConversion, title: str, name: str) -> None:
+        self.result, self.title, self.name = result, title, name
+        self.axis_kind = result.stage.axis_kind
+
+    def sentences(self) -> Sequence[str]:
+        """What is kept, and what is not."""
+        from friso.views.convert.words import conversion_sentences
+
+        return conversion_sentences(self.result)
+
+    def blocks(self) -> Sequence[str]:
+        """The [friction] table."""
+        from friso.views.convert.words import friction_table
+
+        return [friction_table(self.result)]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """What measurements show of both laws."""
+        from friso.views.convert.words import COLUMNS, conversion_rows
+
+        return [AnswerTable(self.title, COLUMNS, conversion_rows(self.result))]
+
+    def document(self) -> dict[str, Any]:
+        """The keys, and what is kept."""
+        from friso.views.convert.document import convert_document
+
+        return convert_document(self.result)
+
+    def files(self) -> Files:
+        """The stage file and the page."""
+        from friso.views.convert.page import convert_files
+
+        return convert_files(self.result, self.name)
+
+
+@question
+def convert(
+    stage: StageLike,
+    friction: str,
+    *,
+    elements: int = 6,
+    set: Changes = None,
+    progress: Progress = silent,
+) -> ConvertAnswer:
+    """To another friction law that shows the same in measurements, and what could not be kept.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one.
+    friction : str
+        The friction law to convert to; a wrong one is answered with all of them.
+    elements : int
+        Elements of a law that has several, side by side, 1 to 12.
+    set : dict, optional
+        Keys to override.
+    progress : Progress
+        Not called: this is quick.
+
+    Returns
+    -------
+    ConvertAnswer
+        The converted stage, ``answer.stage``, and what is kept.
+
+    Raises
+    ------
+    InputError
+        For a stage, a law or a number that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.convert(friso.example("thesis_rig"), "gms")  # doctest: +SKIP
+    """
+    chosen = read_stage(stage, set)
+    whole_number(elements, "elements", 1, MOST, "6")
+    from friso.studies.laws.conversion import convert as converted
+
+    return ConvertAnswer(converted(chosen, friction, elements), chosen.name, f"{stem_of(stage)}_{friction}")

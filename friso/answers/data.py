@@ -1,0 +1,71 @@
+"""The numbers of a JSON document as an xarray.Dataset: units from the ends of keys, dimensions from tables alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.axis import unit_of_key
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_LEAF = (bool, int, float, str, type(None))
+
+
+def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
+    """What a document holds: its first table of alike tables, "cases" or "models" by name or one after the other, gives
+    a dimension of that name; each of its numbers is a variable along it, and the document's own numbers and texts are
+    variables and attributes."""
+    import xarray as xr
+
+    name = next((key for key, value in document.items() if _records(value)), None)
+    records = _records(document[name]) if name else {}
+    flat = {label: dict(_leaves(record)) for label, record in records.items()}
+    keys = list(dict.fromkeys(key for leaves in flat.values() for key in leaves))
+    variables = {
+        _named(key)[0]: (name, _column([leaves.get(key) for leaves in flat.values()]), _named(key)[1]) for key in keys
+    }
+    single = {key: value for key, value in document.items() if isinstance(value, _LEAF) and value is not None}
+    variables |= {
+        _named(key)[0]: ((), value, _named(key)[1]) for key, value in single.items() if not isinstance(value, str)
+    }
+    coords = {name: list(flat)} if name else {}
+    return xr.Dataset(variables, coords, {key: value for key, value in single.items() if isinstance(value, str)})
+
+
+def _records(value: Any) -> Mapping[str, Mapping[str, Any]]:
+    """Tables by name, or by number where they are a list; none for anything else."""
+    if isinstance(value, list) and value and all(isinstance(item, dict) for item in value):
+        return {_label(item, number): item for number, item in enumerate(value)}
+    if isinstance(value, dict) and len(value) and all(isinstance(item, dict) for item in value.values()):
+        return value
+    return {}
+
+
+def _label(record: Mapping[str, Any], number: int) -> str:
+    return str(next((record[key] for key in ("name", "key", "id", "letter", "label") if key in record), number))
+
+
+def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
+    """Numbers and texts of a table and those below it, by their keys, one after the other."""
+    for key, value in record.items():
+        if isinstance(value, dict):
+            yield from _leaves(value, f"{before}{key}_")
+        elif isinstance(value, _LEAF):
+            yield f"{before}{key}", value
+
+
+def _named(key: str) -> tuple[str, dict[str, str]]:
+    """A key without its unit, and the unit as an attribute."""
+    name, unit = unit_of_key(key)
+    return name, {"units": unit} if unit else {}
+
+
+def _column(values: list[Any]) -> np.ndarray:
+    """Numbers with NaN where there is none; texts and yes or no as they are."""
+    if all(value is None or (isinstance(value, int | float) and not isinstance(value, bool)) for value in values):
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+    return np.array(values, dtype=object)

@@ -1,0 +1,199 @@
+"""What is my machine: a stage file with uncertainties from measured logs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.answers.answer import Answer, AnswerTable, question
+from friso.answers.inputs import Changes, StageLike, stage_of
+from friso.answers.logs import LogFiles, options_of, paths_of
+from friso.axis import speak_of
+from friso.errors import InputError
+from friso.identification.kind import AnalysisSettings
+from friso.identification.logs.log import Log
+from friso.identification.logs.mapping import Mapping
+from friso.identification.method import Identification, Prediction, check_predictions
+from friso.identification.sources import LogFile, read_all
+from friso.intervals import Span
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
+
+if TYPE_CHECKING:
+    from friso.views.drawing.figure import Figure
+    from friso.views.files import Files
+
+_HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
+
+Keeper = Callable[[dict[Path, Mapping]], object]
+"""What keeps for the next time what was said of logs."""
+
+
+class IdentifyAnswer(Answer):
+    """What logs show of a machine: `result` is an `Identification` with the estimates and, where the logs describe a
+    whole machine, the `stage`; `inputs` are the files read, `predictions` those of other logs."""
+
+    command = "identify"
+
+    def __init__(self, result: Identification, inputs: Sequence[LogFile], predictions: Sequence[Prediction]) -> None:
+        self.result, self.inputs, self.predictions = result, tuple(inputs), tuple(predictions)
+        if result.stage is not None:
+            self.axis_kind = result.stage.axis_kind
+
+    @property
+    def failure(self) -> str:
+        """Whether a model does not describe its log."""
+        return "a model does not describe its log" if self.result.failed else ""
+
+    def sentences(self) -> Sequence[str]:
+        """What was identified, how well other logs are predicted, and notes."""
+        from friso.views.identify.words import sentences
+
+        return sentences(self.result, self.predictions)
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The estimates with their intervals."""
+        from friso.views.identify.words import COLUMNS, estimate_rows
+
+        rows = [(first, rest) for first, *rest in (row.texts for row in estimate_rows(self.result))]
+        return [AnswerTable("", COLUMNS[1:], rows)] if rows else []
+
+    def details(self) -> Sequence[str]:
+        """The experiments behind the estimates, and what was read."""
+        from friso.views.identify.words import details
+
+        return details(self.result, self.inputs)
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """The check of the stage that was identified."""
+        if self.result.stage is None or not files:
+            return []
+        return [f"friso check {files[0]}{' --draws 1000' if self.result.stage.uncertain() else ''}"]
+
+    def figures(self) -> Sequence[Figure]:
+        """Logs beside what the models say of them."""
+        from friso.views.identify.figures import identify_figures
+
+        return identify_figures(self.result, self.predictions)
+
+    def document(self) -> dict[str, Any]:
+        """Estimates, experiments, logs."""
+        from friso.views.identify.document import identify_document
+
+        return identify_document(self.result, self.inputs, self.predictions)
+
+    def files(self) -> Files:
+        """The stage file, correlations, the page, the figures."""
+        from friso.views.identify.page import identify_files
+
+        return identify_files(self.result, self.inputs, self.predictions)
+
+
+@question
+def identify(
+    logs: LogFiles,
+    *,
+    stage: StageLike | None = None,
+    set: Changes = None,
+    as_: str | None = None,
+    map: Changes = None,
+    unit: Changes = None,
+    scale: Changes = None,
+    dt: str | float | None = None,
+    predict: LogFiles = (),
+    bandwidth: str | float | None = None,
+    band: str | None = None,
+    period: str | float | None = None,
+    folder: Path = Path(),
+    keep: Keeper = lambda _: None,
+    progress: Progress = silent,
+) -> IdentifyAnswer:
+    """A stage with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.
+
+    Parameters
+    ----------
+    logs : path or list of paths
+        CSV, TwinCAT, MAT, TDMS, UFF58 or LVM files.
+    stage : Stage, path or dict, optional
+        What is known beforehand: structure, controller, drive.
+    set : dict, optional
+        Keys of that stage to override.
+    as_ : str, optional
+        Kind of experiment; moves and frequency responses are recognised.
+    map, unit, scale : dict, optional
+        Roles and their channels, channels and their units, roles and their scales, as in `friso.logs`.
+    dt : str or float, optional
+        Sample time, "1 ms" or a number [s], if a file does not contain it.
+    predict : path or list of paths, optional
+        Other logs, simulated with the identified stage.
+    bandwidth : str or float, optional
+        Bandwidth of the moves, "20 Hz" or a number [Hz], for the filters.
+    band : str, optional
+        Band of the response: "3 Hz .. 20 Hz".
+    period : str or float, optional
+        Period of a periodic excitation, "5 s" or a number [s].
+    folder : Path
+        Where what was said of channels is looked for, if not beside the logs.
+    keep : callable, optional
+        Called with what was said of the channels of each file, to keep it.
+    progress : Progress
+        Called as experiments are analysed.
+
+    Returns
+    -------
+    IdentifyAnswer
+        The estimates with 95 % intervals, ``answer.stage`` and ``answer.estimates``.
+
+    Raises
+    ------
+    InputError
+        For a log that cannot be read or leaves something open, and for options that are not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.identify("log.csv", stage="my_stage.toml", scale={"force": "35.15 N/V"})  # doctest: +SKIP
+    """
+    if stage is None and set:
+        first = next(iter(f"{key}={value}" for key, value in set.items()) if hasattr(set, "items") else iter(set))
+        raise InputError("set", str(first), "a stage whose keys to override", "stage=stage.toml")
+    assumed = None if stage is None else stage_of(stage, set)
+    if assumed is not None:
+        speak_of(assumed.axis_kind)
+    settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_)
+    paths, other_paths = paths_of(logs), paths_of(predict)
+    inputs = read_all([*paths, *other_paths], options, folder)
+    keep({file.path: file.mapping for file in inputs})
+    sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
+    others = _others(inputs[len(paths) :])
+    check_predictions(sources, others, assumed)
+    from friso.identification.method import identify as identification
+    from friso.identification.method import predict as predicted
+
+    result = identification(sources, assumed, settings, progress)
+    return IdentifyAnswer(result, inputs, [predicted(result, log, settings, assumed) for log in others])
+
+
+def _settings(bandwidth: str | float | None, band: str | None, period: str | float | None) -> AnalysisSettings:
+    """What the user chose for the analyses. Raises InputError."""
+    values = []
+    for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
+        text = value if value is None or isinstance(value, str) else f"{value!r} {quantity.unit}"
+        try:
+            values.append(None if text is None else float(quantity.read(text)))
+        except InputError as error:
+            raise error.found_in(f"--{name}") from None
+    try:
+        limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
+    except InputError as error:
+        raise error.found_in("--band") from None
+    return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
+
+
+def _others(inputs: Sequence[LogFile]) -> list[Log]:
+    """The logs to be predicted. Raises InputError."""
+    logs = [item.source for item in inputs if isinstance(item.source, Log)]
+    if len(logs) < len(inputs):
+        raise InputError("predict", "a measured frequency response", "a log over time", "predict=other.mat")
+    return logs

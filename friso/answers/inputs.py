@@ -1,0 +1,137 @@
+"""What the questions are asked about, read in all the forms in which people give it: stages, numbers with units."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from friso.errors import InputError
+from friso.quantities import Quantity, positive
+from friso.stage import Stage, load, parse_set
+from friso.stage.correlations import Correlations, beside, read_correlations
+from friso.stage.plausible import doubts
+
+StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
+"""A stage, the path of a stage file, or its tables as a dictionary."""
+
+Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
+"""Keys to be overridden: a dictionary, or texts KEY=VALUE."""
+
+AS_BUILT = ("drive", "rail", "cable", "floor")
+"""The tables of the machine as built, which the analyses of the ideal one leave out."""
+
+_NAMED = 3
+"""Uncertain keys that are named, at most, where there are more."""
+
+LOGGER = logging.getLogger("friso")
+
+
+def stage_of(source: StageLike, changes: Changes = None) -> Stage:
+    """The stage that is meant, with keys overridden. Raises InputError."""
+    if isinstance(source, Stage):
+        stage = source
+    elif isinstance(source, Mapping):
+        stage = Stage(**source)
+    else:
+        stage = load(source)
+    wanted = changes_of(changes)
+    return stage.replace(wanted) if wanted else stage
+
+
+def changes_of(changes: Changes) -> dict[str, Any]:
+    """Keys to their new values, from a dictionary or texts KEY=VALUE. Raises InputError."""
+    return dict(changes) if isinstance(changes, Mapping) else dict(parse_set(text) for text in changes or ())
+
+
+def read_stage(
+    source: StageLike, changes: Changes = None, leaves_out: Sequence[str] = AS_BUILT, uncertain_too: bool = False
+) -> Stage:
+    """The stage that is meant, with keys overridden. It is mentioned (to the logger "friso") what is doubtful about it,
+    that the centres of uncertain keys are used, unless these are wanted too (`uncertain_too`), and which of its tables
+    the analysis leaves out. Raises InputError."""
+    stage = stage_of(source, changes)
+    for doubt in doubts(stage):
+        LOGGER.warning(doubt)
+    keys = [] if uncertain_too else [*stage.uncertain()]
+    if keys:
+        several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
+        named = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
+        centres = "their centres are" if len(keys) > 1 else "its centre is"
+        LOGGER.warning(
+            f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range"
+        )
+    left = [name for name in leaves_out if getattr(stage, name)]
+    if left:
+        tables = ", ".join(f"[{name}]" for name in left)
+        bode = "; friso bode takes sampling and delay into account" if "drive" in left else ""
+        verb = "are" if len(left) > 1 else "is"
+        LOGGER.warning(f"{tables} {verb} left out: friso rig simulates the machine as built{bode}")
+    return stage
+
+
+def correlations_of(source: StageLike, stage: Stage) -> Correlations:
+    """How the uncertain keys of a stage hang together, as a file beside its stage file says. Raises InputError."""
+    correlations = Correlations()
+    if not isinstance(source, Stage | Mapping) and beside(Path(source)).exists():
+        correlations = read_correlations(beside(Path(source)), load(source))
+    return correlations.among(stage.uncertain())
+
+
+def stem_of(source: StageLike, usual: str = "stage") -> str:
+    """What files about a stage are called: the name of its file without the suffix."""
+    return usual if isinstance(source, Stage | Mapping) else Path(source).stem
+
+
+def tolerance_of(value: str | float) -> float:
+    """A relative tolerance of the solver. Raises InputError."""
+    from friso.engine.tolerance import checked_rtol
+
+    try:
+        return checked_rtol(float(value))
+    except ValueError:
+        raise wrong("rtol", str(value), "a number from 1e-12 to 1e-2", "1e-6") from None
+
+
+def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
+    """The SI value of a text with a unit, or of a number, which is in SI already. Raises InputError."""
+    text = f"{value!r} {quantity.unit}" if isinstance(value, int | float) else value
+    try:
+        return float(quantity.read(text))
+    except InputError as error:
+        raise InputError(name, error.actual, error.expected, f"{name}={example or error.example}") from None
+
+
+def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
+    """A time [s]. Raises InputError."""
+    return quantity_of(value, name, Quantity("s", positive, example))
+
+
+def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:
+    """A whole number within limits. Raises InputError."""
+    if not least <= value <= most:
+        raise wrong(name, str(value), f"a whole number from {least} to {most}", example)
+    return value
+
+
+def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
+    """Keys to texts from a dictionary, or from texts KEY=VALUE. Raises InputError."""
+    if isinstance(values, Mapping):
+        return dict(values)
+    pairs: dict[str, str] = {}
+    for text in values or ():
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not (equals and key and value.strip()):
+            raise wrong(name, text, "KEY=VALUE", example)
+        if key in pairs:
+            raise wrong(name, f"{key} given twice", "each key once", example)
+        pairs[key] = value.strip()
+    return pairs
+
+
+def wrong(name: str, actual: str, expected: str, example: str) -> InputError:
+    """The error for an option, by the name of its keyword: the command line says "--name" for it."""
+    return InputError(name, actual, expected, f"{name}={example}")

@@ -1,0 +1,154 @@
+"""Files that a command writes: all of them or none, into a folder that is new, empty, or its own from an earlier run,
+which a small file in it marks; else it refuses and names --overwrite. Never does it replace a file that it reads."""
+
+from __future__ import annotations
+
+import logging
+import os
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from friso.answers.drafts import DRAFTS, Drafts, made
+from friso.errors import InputError
+from friso.progress import Progress, silent
+from friso.quantities import as_toml
+from friso.system import device_in
+from friso.version import VERSION
+
+if TYPE_CHECKING:
+    from friso.views.files import Content, Files
+
+LOGGER = logging.getLogger("friso")
+
+MARKER = ".friso-output"
+"""The file that records which command made a folder, and which files there are friso's."""
+
+UNFINISHED = ".friso-unfinished"
+"""The folder in which a long command keeps what is done until all is."""
+
+
+class OutputFolder:
+    """The folder that a command writes into; `inputs` are the files that it reads."""
+
+    def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
+        """Raises InputError where the command must not write there, or cannot."""
+        self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
+        refuse_device("--out", folder)
+        _check_writable(folder)
+        maker, self.files = marked(folder)
+        self.is_own = maker == command or not _entries(folder)
+        if not (self.is_own or overwrite):
+            holds = f"made by friso {maker}" if maker else f"with {_listed(_entries(folder))} in it"
+            replaced = "which replaces files of the same name"
+            expected = f"a new or empty folder, one that friso {command} made, or --overwrite, {replaced}"
+            raise InputError("--out", f"{folder}, {holds}", expected, f"--out {folder}-2")
+        self.check(name for name in self.files if self.is_own)
+
+    @property
+    def unfinished(self) -> Path:
+        """A folder for what is done of long work, from which the next run goes on."""
+        return self.folder / UNFINISHED
+
+    def check(self, names: Iterable[str]) -> None:
+        """Raises InputError where a file of such a name may not be written."""
+        existing = [name for name in names if (self.folder / name).exists()]
+        for name in existing:
+            if any(file.exists() and (self.folder / name).samefile(file) for file in self.inputs):
+                actual = f"{self.folder}, where {name} is read"
+                raise InputError("--out", actual, "another folder", f"--out {self.folder}-2")
+        others = [name for name in existing if name not in self.files]
+        if others and not self.overwrite:
+            actual = f"{self.folder}, with {_listed(others)}, which friso {self.command} has not written"
+            raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
+
+    def write(
+        self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
+    ) -> list[Path]:
+        """Write the files, and some `beside` the inputs, all of them or none; the paths of those in the folder.
+
+        Raises InputError where one may not be written, OSError where one cannot.
+        """
+        self.check(files)
+        others = [name for name in files if name not in self.files and (self.folder / name).exists()]
+        contents = {self.folder / name: content for name, content in files.items()}
+        marker = {self.folder / MARKER: self._marker(files)} if self.is_own else {}
+        write({**contents, **(beside or {}), **marker}, progress)
+        if others:
+            LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
+        return [path for path, content in contents.items() if content is not None]
+
+    def _marker(self, files: Files) -> str:
+        gone = {name for name, content in files.items() if content is None}
+        names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
+        return marker(self.command, names)
+
+
+def refuse_device(option: str, path: Path) -> None:
+    """Raises InputError where Windows takes a part of a path for a device: nothing would be there afterwards."""
+    if device := device_in(path):
+        expected = f"another name: for Windows, {device} is a device whatever folder and suffix it has"
+        raise InputError(option, str(path), expected, f"{option} report" if option.startswith("--") else "")
+
+
+def output_folder(
+    command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
+) -> OutputFolder | None:
+    """The folder that a command writes into, if it is to write. Raises InputError as `OutputFolder`."""
+    return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
+
+
+def write(files: Mapping[Path, Content], progress: Progress = silent) -> list[Path]:
+    """Write files, all of them or none, at any moment; their paths. Raises OSError where one cannot be written."""
+    with Drafts() as drafts:
+        for number, (path, content) in enumerate(files.items()):
+            progress(number, len(files), "files")
+            drafts.add(path, content)
+        drafts.put_in_place()
+    return [path for path, content in files.items() if content is not None]
+
+
+def marker(command: str, names: Iterable[str]) -> str:
+    """What the marker says of a command and the files that are its own."""
+    lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
+    return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
+
+
+def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
+    """The command that made a folder and the files that it wrote there; empty where no command of friso did."""
+    try:
+        document = tomllib.loads((folder / MARKER).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return "", ()
+    command, files = document.get("command"), document.get("files")
+    if not (isinstance(command, str) and isinstance(files, list)):
+        return "", ()
+    return command, tuple(str(name) for name in files)
+
+
+def _entries(folder: Path) -> list[str]:
+    """What is in a folder, but for what friso keeps there of runs that have not ended."""
+    names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
+    return [name for name in names if name != UNFINISHED and not name.startswith(DRAFTS)]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first of some names, and how many there are more."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+_LISTED = 8
+
+
+def _check_writable(folder: Path) -> None:
+    """Raises InputError where no file can be written into the folder, or it cannot be made."""
+    try:
+        for path in reversed(made(folder)):
+            path.rmdir()  # for now: it appears with what is written
+    except OSError as error:
+        expected = f"a folder that can be written ({error.strerror})"
+        raise InputError("--out", str(folder), expected, "--out report") from None
+    if folder.exists() and not os.access(folder, os.W_OK):
+        raise InputError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")

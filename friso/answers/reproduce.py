@@ -1,0 +1,106 @@
+"""The thesis's figures and claims, computed again and judged."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from friso.answers.answer import Answer, question
+from friso.answers.inputs import tolerance_of
+from friso.progress import Progress, silent
+from friso.studies.thesis.reproduce import POINTS, Reproduction
+
+if TYPE_CHECKING:
+    from friso.views.drawing.figure import Figure
+    from friso.views.files import Files
+
+
+class ReproduceAnswer(Answer):
+    """The thesis recomputed: `result` is a `Reproduction` with maps, responses and a verdict per claim."""
+
+    command = "reproduce"
+
+    def __init__(self, result: Reproduction) -> None:
+        self.result = result
+
+    @cached_property
+    def _document(self) -> dict[str, Any]:
+        from friso.views.reproduce.document import reproduce_document
+
+        return reproduce_document(self.result)
+
+    def sentences(self) -> Sequence[str]:
+        """How many of the claims hold."""
+        return [self._document["conclusion"]]
+
+    def details(self) -> Sequence[str]:
+        """Every claim with its judgement, and the cycles behind the maps."""
+        claims = [
+            f"{claim['id']:5} {claim['judgement']:14} {claim['number']}"
+            for claim in self._document["claims"]
+            if claim["judgement"] != "not yet covered"
+        ]
+        cycles = [
+            f"{name}: in {cells['counted_only']} of {cells['cells']} cells peaks are counted although no cycle "
+            f"attracts; in {cells['attracted_only']} none are counted although one does"
+            for name, cells in self._document["cycles"].items()
+        ]
+        return [*claims, *cycles]
+
+    def figures(self) -> Sequence[Figure]:
+        """The figures of the thesis."""
+        from friso.views.reproduce.figures import reproduction_figures
+
+        return [*reproduction_figures(self.result).values()]
+
+    def document(self) -> dict[str, Any]:
+        """The claims with their judgements."""
+        return self._document
+
+    def files(self) -> Files:
+        """The page, the claims, the figures."""
+        from friso.views.reproduce.page import reproduce_files
+
+        return reproduce_files(self.result)
+
+
+@question
+def reproduce(
+    names: Iterable[str] | None = None,
+    points: int = POINTS,
+    rtol: float | str = 1e-6,
+    *,
+    progress: Progress = silent,
+) -> ReproduceAnswer:
+    """Every figure and claim of the thesis that computation decides, judged.
+
+    Parameters
+    ----------
+    names : list of str, optional
+        Studies of Table 3; default: all of them.
+    points : int
+        Values per axis of every map.
+    rtol : float
+        Relative tolerance of the solver.
+    progress : Progress
+        Called as studies are done.
+
+    Returns
+    -------
+    ReproduceAnswer
+        Maps and responses by name, and ``answer.verdicts`` on the claims.
+
+    Raises
+    ------
+    InputError
+        For an unknown study or too few points.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.reproduce(["isolator-crossover"], points=21)  # doctest: +SKIP
+    """
+    from friso.studies.thesis.reproduce import reproduce as reproduced
+
+    return ReproduceAnswer(reproduced(names, points, tolerance_of(rtol), progress))

@@ -1,0 +1,165 @@
+"""JSON Schemas of the stage file and of the specification of a design, from what their tables declare: editors complete
+and check files by them, and the reference pages are made of them."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Iterable, Mapping
+from functools import cache
+from importlib.resources import files
+from itertools import pairwise
+from types import NoneType
+from typing import Any, get_args
+
+from friso.design_method.spec import OneOrMany, Spec
+from friso.intervals import Span
+from friso.quantities import Number, Quantity
+from friso.stage import Stage
+from friso.stage.controllers import Controllers
+from friso.stage.lists import Several
+from friso.stage.section import Section, Table, TableArray, Variants
+from friso.version import VERSION
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+
+Node = dict[str, Any]
+"""A piece of a schema."""
+
+
+def stage_schema() -> Node:
+    """The schema of the stage file."""
+    return _document(Stage, "A stage file of friso", _template())
+
+
+def specification_schema() -> Node:
+    """The schema of the specification of a design."""
+    return _document(Spec, "A specification of friso design", {})
+
+
+SCHEMAS: Mapping[str, Callable[[], Node]] = {"stage": stage_schema, "specification": specification_schema}
+"""The schemas by what they are of."""
+
+
+def _document(cls: type[Section], title: str, told: Mapping[str, str]) -> Node:
+    return {"$schema": DIALECT, "title": title, "$comment": f"friso {VERSION}", **_table(cls, "", told)}
+
+
+def _table(cls: type[Section], place: str, told: Mapping[str, str]) -> Node:
+    """The schema of a table; `told` are comments on keys by their names with dots."""
+    documented = _attributes(cls)
+    properties = {}
+    for key, field in cls.model_fields.items():
+        path = f"{place}.{key}".lstrip(".")
+        node = _key(field.annotation, field.metadata, path, told)
+        text = documented.get(key) or told.get(path, "")
+        expected = node.pop("description", "")
+        node["description"] = " ".join(dict.fromkeys(part for part in (_sentence(text), _sentence(expected)) if part))
+        properties[key] = {name: value for name, value in node.items() if value not in ("", None)}
+    required = [key for key, field in cls.model_fields.items() if field.is_required()]
+    text = " ".join((cls.__doc__ or "").split())
+    head: Node = {"type": "object", "description": text} if text else {"type": "object"}
+    return {**head, "properties": properties, "required": required, "additionalProperties": False}
+
+
+def _key(annotation: Any, metadata: Iterable[Any], path: str, told: Mapping[str, str]) -> Node:
+    """The schema of what a key takes."""
+    for item in metadata:
+        if isinstance(item, Table):
+            return _one_of(item.pick, path, told)
+        if isinstance(item, TableArray):
+            return {"type": "array", "maxItems": item.most, "items": _one_of(item.variants.pick, path, told)}
+        if isinstance(item, Quantity | Number | Several | Span | OneOrMany):
+            return _numeric(item)
+    types = [part for part in get_args(annotation) or (annotation,) if part is not NoneType]
+    words = [word for part in types for word in (get_args(part) or (part,)) if isinstance(word, str)]
+    if words:
+        return {"enum": [word for word in words if word]}
+    return {"type": "boolean"} if bool in types else {"type": "string"}
+
+
+def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
+    """The schema of numbers: texts with a unit, bare numbers, arrays of them."""
+    if isinstance(item, Several):
+        return {
+            "type": "array",
+            "items": _numeric(item.of),
+            "minItems": item.least,
+            "maxItems": item.most,
+            "description": item.expected,
+            "examples": [[*item.examples]],
+        }
+    if isinstance(item, OneOrMany):
+        single = _numeric(item.of) if item.of else {"type": "string"}
+        return {"anyOf": [single, {"type": "array", "items": single}], "description": item.expected}
+    if isinstance(item, Number):
+        return {
+            "anyOf": [{"type": "number"}, {"type": "string", "pattern": r"\.\.|\+/-"}],
+            "description": item.expected,
+            "examples": [float(item.example)],
+        }
+    unit = item.unit if isinstance(item, Quantity) else item.of.unit
+    return {"type": "string", "description": item.expected, "examples": [item.example], "x-unit": unit}
+
+
+def _one_of(pick: Any, path: str, told: Mapping[str, str]) -> Node:
+    """The schema of a table of one of several classes."""
+    tables = [_table(cls, path, told) for cls in _classes(pick)]
+    if len(tables) == 1:
+        return {**tables[0], "description": _sentence(told.get(path, "")) or tables[0].get("description", "")}
+    return {"type": "object", "anyOf": tables, "description": _sentence(told.get(path, ""))}
+
+
+def _classes(pick: Any) -> list[type[Section]]:
+    """The classes that a table may be of."""
+    variants = getattr(pick, "__self__", None)
+    if isinstance(variants, Controllers):
+        return [form for forms in variants.forms.values() for form in forms]
+    return [*variants.classes.values()] if isinstance(variants, Variants) else [pick({})]
+
+
+@cache
+def _attributes(cls: type[Section]) -> dict[str, str]:
+    """The texts below the keys of a class in its source, its bases' too."""
+    texts: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        if not issubclass(base, Section):
+            continue
+        try:
+            body = ast.parse(textwrap.dedent(inspect.getsource(base))).body[0].body  # type: ignore[attr-defined]
+        except (OSError, TypeError):  # a class that was made by a function
+            continue
+        for node, below in pairwise(body):
+            if (
+                isinstance(node, ast.AnnAssign)
+                and isinstance(below, ast.Expr)
+                and isinstance(below.value, ast.Constant)
+            ):
+                texts[ast.unparse(node.target)] = " ".join(str(below.value.value).split())
+    return texts
+
+
+_ENTRY = re.compile(r"^(?:# )?(?:\[(?P<table>\w+)\]|(?P<key>\w+) = .*?)(?:\s{2,}# (?P<text>.*))?$")
+
+
+@cache
+def _template() -> dict[str, str]:
+    """What the comments of the file that `friso init` writes say of tables and keys."""
+    texts, table = {}, ""
+    for line in files("friso").joinpath("templates/stage.toml").read_text(encoding="utf-8").splitlines():
+        match = _ENTRY.match(line)
+        if match is None:
+            continue
+        table = match["table"] or table
+        path = match["table"] or f"{table}.{match['key']}".lstrip(".")
+        if match["text"]:
+            texts.setdefault(path, match["text"].strip())
+    return texts
+
+
+def _sentence(text: str) -> str:
+    """A text that begins with a capital and ends in a full stop."""
+    text = text.strip().rstrip(":.;")
+    return f"{text[0].upper()}{text[1:]}." if text else ""

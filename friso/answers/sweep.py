@@ -1,0 +1,308 @@
+"""Where does it hunt: keys swept over ranges, in memory or in a store that an interrupted study resumes from."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.answers.answer import Answer, question
+from friso.answers.inputs import LOGGER, Changes, StageLike, read_stage, tolerance_of, wrong
+from friso.answers.map_study import (
+    Varied,
+    as_stored,
+    coloured_by,
+    export_files,
+    own_views,
+    refuse_overwriting,
+    stored_study,
+    study_for,
+    view_files,
+)
+from friso.axis import speak_of
+from friso.errors import InputError
+from friso.progress import Progress, silent
+from friso.stage import Stage
+from friso.studies.axes import Values
+from friso.studies.execute import Crew, local_crew
+from friso.studies.samples import Samples
+from friso.studies.store import Store, check_store, in_memory
+from friso.studies.study import Study
+from friso.studies.sweep import fill, run_in_memory
+from friso.studies.verify import WANTED, checked_share, loosest_rtol
+from friso.system import usable_cores
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.views.drawing.figure import Figure
+    from friso.views.files import Content, Files
+
+LARGE = 10_000_000
+"""Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
+
+
+class SweepAnswer(Answer):
+    """What the runs of a sweep do: `result` is an xarray.Dataset with a dimension per axis; `metric` colours its map,
+    `store` is the folder that it is in, or None."""
+
+    command = "map"
+
+    def __init__(
+        self, study: Study, runs: xr.Dataset, metric: str, store: Path | None, exports: Sequence[Path]
+    ) -> None:
+        self.study, self.result, self.metric, self.store, self.exports = study, runs, metric, store, tuple(exports)
+        self.axis_kind = study.stage.axis_kind
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Outcome, peaks, amplitude, status, ... over the axes, whose coordinates are in SI."""
+        return self.result
+
+    @property
+    def drawable(self) -> bool:
+        """Whether there are few enough cells for a figure and a page."""
+        return self.study.cells <= LARGE
+
+    def cell(self, *numbers: int | str) -> Stage:
+        """The stage of a cell, by its numbers along the axes: ``answer.cell(3, 4)`` or ``answer.cell("3 4")``."""
+        parts = [int(part) for number in numbers for part in str(number).split()]
+        return self.study.cell_stage(parts)
+
+    def sentences(self) -> Sequence[str]:
+        """Which share of the runs swings at its end, and where."""
+        from friso.views.map.findings import sentences
+
+        told = sentences(self.result, self.study, self.metric)
+        return told if self.store is None else [*told, f"store: {self.store}"]
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """How a cell is run by itself."""
+        return [f"friso simulate --cell {self.store} {' '.join('0' * len(self.study.shape))}"] if self.store else []
+
+    def figures(self) -> Sequence[Figure]:
+        """The map."""
+        from friso.views.map.figures import map_figure
+
+        return [map_figure(self.result, self.metric)] if self.drawable else []
+
+    def document(self) -> dict[str, Any]:
+        """The axes, what came out, and how much of it survives a tighter tolerance."""
+        from friso.views.map.document import map_document
+
+        return map_document(self.result, self.study, self.store, self.metric)
+
+    def files(self) -> Files:
+        """The figure in all formats and the page."""
+        from friso.views.map.page import map_files
+
+        repeated = 'friso.simulate(runs.cell("{indices}"))'
+        files = map_files(self.result, self.metric, repeated) if self.drawable else {}
+        return {f"map.{form}": content for form, content in files.items()}
+
+    def files_beside(self) -> Mapping[Path, Content]:
+        """The figure and the page beside the store, unless there are too many cells for them, and the exports."""
+        views: dict[Path, Content] = {}
+        if self.store is not None and self.drawable:
+            views = view_files(self.result, self.store, self.metric)
+        return {**views, **export_files(self.result, [*self.exports])}
+
+
+@question
+def sweep(
+    stage: StageLike,
+    axes: Mapping[str, Values] | None = None,
+    samples: int | Samples | None = None,
+    *,
+    x: str | None = None,
+    y: str | None = None,
+    axis: Iterable[str] = (),
+    link: Changes = None,
+    latin: bool = False,
+    log: bool = False,
+    set: Changes = None,
+    metric: str | None = None,
+    rtol: float | str | None = None,
+    verify: float = 0.0,
+    refine: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    export: Iterable[str | os.PathLike[str]] = (),
+    out: str | os.PathLike[str] | None = None,
+    overwrite: bool = False,
+    yes: bool = False,
+    progress: Progress = silent,
+) -> SweepAnswer:
+    """Run every combination of the values of some keys: what `friso map` does.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one; or the folder of a study that is to go on.
+    axes : dict, optional
+        Keys with their values: ``(np.linspace(1, 40, 41), "Hz")``, a range ``"1 Hz..40 Hz:41"`` (behind ":log",
+        logarithmic), or a list of texts with units, bare numbers, words or booleans, where the key takes these.
+    samples : int or Samples, optional
+        Number of Sobol points over the ranges, instead of a grid; or several keys that vary at once.
+    x, y, axis : str, optional
+        Axes as texts, as on the command line: ``x="controller.crossover=1 Hz..40 Hz:41"``.
+    link : dict, optional
+        SI expressions for keys that follow: ``{"masses.cart": "0.7 * mass"}``.
+    latin : bool
+        Whether samples are a Latin hypercube.
+    log : bool
+        Whether all ranges are logarithmic.
+    set : dict, optional
+        Keys to override.
+    metric : str, optional
+        What the map shows in colour: "outcome" (default) or another of each run; of the stage, "verdict",
+        "multiplier", "amplitude", "period".
+    rtol : float or "auto", optional
+        Relative tolerance, default 1e-6; "auto": the loosest safe one.
+    verify : float
+        Share of the cells that is run again at rtol/100; `verified_surviving` among the attributes counts the outcomes
+        that survived.
+    refine : bool
+        Whether the grid is made 4 times finer, and run only along its boundaries.
+    workers : int, optional
+        Number of processes to run in; default: the threads of this one.
+    scheduler : str, optional
+        Address of a Dask scheduler to run on.
+    export : list of paths, optional
+        Files ending in .nc or .csv that are written as well.
+    out : path, optional
+        Folder of a Zarr store, filled as results come, and resumed if it exists; default: results are kept in memory.
+    overwrite : bool
+        Whether the store of another study may be replaced, and figures and exports.
+    yes : bool
+        Whether a study of more than ten million cells is meant.
+    progress : Progress
+        Called as cells are done.
+
+    Returns
+    -------
+    SweepAnswer
+        An xarray.Dataset with a dimension per axis, ``answer.data``: outcome, peaks, peak_to_peak [m], period [s],
+        settling_time [s], largest_force [N], status, ...; ``(answer.outcome == "swings").mean()``.
+
+    Raises
+    ------
+    InputError
+        For a stage, an axis, a link, a store or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> runs = friso.sweep(friso.example("thesis_rig"), {"joint.stroke": "0.2 mm..1 mm:3"})
+    >>> runs.sizes["joint.stroke"]
+    3
+    """
+    exports, share = _checked_exports(export), checked_share(verify)
+    varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
+    store = None if out is None else Path(out)
+    with _crew(workers, scheduler) as crew:
+        if isinstance(stage, str | os.PathLike) and Path(stage).is_dir():
+            if varied != Varied() or set or rtol or refine or out:
+                raise _another_study(Path(stage))
+            store = Path(stage)
+            study, metric = stored_study(store, metric)
+        else:
+            metric = metric or "outcome"
+            chosen = read_stage(stage, set)
+            study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
+            study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
+            study = study if store is None else as_stored(study, store, metric, overwrite)
+        speak_of(study.stage.axis_kind)
+        if store is None:
+            runs = run_in_memory([study], crew, share, progress)[0]
+        else:
+            refuse_overwriting(store, exports, overwrite)
+            runs = _filled(study, store, crew, share, overwrite, metric, progress)
+    held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
+    return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
+
+
+def whole(store: str | os.PathLike[str]) -> dict[str, Any]:
+    """Whether a store is whole: blocks, how many are done, which are damaged. Raises StoreError where it cannot be read
+    at all."""
+    state = check_store(Path(store))
+    counts = {"blocks": state.blocks, "done": state.done}
+    return {"store": str(store), **counts, "damaged": state.damaged, "damaged_files": state.files}
+
+
+def _another_study(store: Path) -> InputError:
+    problem = "a store together with options that would make it another study"
+    return InputError(str(store), problem, "the store alone: it contains its study", f"friso map {store}")
+
+
+def _chosen_rtol(given: str | float, study: Study, crew: Crew) -> float:
+    """The tolerance asked for; "auto" is chosen on a sample of the cells, and said."""
+    if given != "auto":
+        return tolerance_of(given)
+    rtol, shares, cells = loosest_rtol(study, crew)
+    surviving = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {rtol_:g}" for rtol_, share in shares.items())
+    if shares.get(rtol, 0.0) >= WANTED:
+        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the outcomes survive ({surviving})")
+    else:
+        LOGGER.warning(f"at no tolerance do {WANTED:.0%} of the outcomes survive ({surviving}); rtol {rtol:g} is used")
+    return rtol
+
+
+@contextmanager
+def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
+    if workers is not None and scheduler is not None:
+        raise InputError("workers", "--workers and --scheduler", "one of the two", "workers=4")
+    most = usable_cores()
+    if workers is not None and not 1 <= workers <= most:
+        expected = f"1 worker or more, up to the {most} cores that may be used"
+        raise wrong("workers", str(workers), expected, "1")
+    if scheduler is not None:
+        from friso.studies.distribute import connected
+
+        with connected(scheduler) as crew:
+            yield crew
+    elif workers is not None:
+        from friso.studies.processes import processes
+
+        with processes(workers) as crew:
+            yield crew
+    else:
+        with local_crew() as crew:
+            yield crew
+
+
+def _filled(
+    study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, progress: Progress
+) -> xr.Dataset:
+    """Run what the store lacks, and note there what is drawn of it. Whatever ends it early, the message says where the
+    rest is."""
+    stored = 0
+
+    def counted(done: int, total: int, what: str, /) -> None:
+        nonlocal stored
+        stored = done
+        progress(done, total, store.name)
+
+    try:
+        with Store.opened(store, study, overwrite) as opened:
+            opened.note(metric=opened.notes.get("metric", metric))
+            runs = fill(opened, crew, share, counted)
+            opened.note(views=own_views(store))
+            return runs
+    except (KeyboardInterrupt, OSError, RuntimeError):
+        if store.exists():
+            LOGGER.warning(f"{stored} of {study.cells} cells are stored; to resume: friso map {store}")
+        raise
+
+
+def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
+    paths = [Path(path) for path in export]
+    for path in paths:
+        if path.suffix not in (".nc", ".csv"):
+            raise wrong("export", str(path), "a file that ends in .nc or .csv", "map.nc")
+        if not path.parent.is_dir():
+            raise wrong("export", str(path), "a file in an existing folder", "map.nc")
+    return paths

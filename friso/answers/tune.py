@@ -1,0 +1,172 @@
+"""What stops it: the least change of controller or joint that settles machines like this one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from friso.answers.answer import Answer, AnswerTable, question
+from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, whole_number, wrong
+from friso.cure.goal import Goal
+from friso.errors import InputError
+from friso.progress import Progress, silent
+from friso.quantities import Quantity, positive
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.cure.method import Advice
+    from friso.views.drawing.figure import Figure
+    from friso.views.files import Files
+
+MOST_SEED = 2**31 - 1
+
+Part = Literal["controller", "joint"]
+
+
+class TuneAnswer(Answer):
+    """The ways that stop the hunting, the least change first: `result` is the `Advice`."""
+
+    command, status = "tune", 2
+
+    def __init__(self, result: Advice) -> None:
+        self.result, self.axis_kind = result, result.stage.axis_kind
+
+    @property
+    def failure(self) -> str:
+        """Whether a change is needed and none works."""
+        return "no change that was tried works" if self.result.needed and not self.result.working else ""
+
+    def sentences(self) -> Sequence[str]:
+        """What to change, what it brings and costs, and why other ways do not work."""
+        from friso.views.tune.words import answer, failing
+
+        return [*answer(self.result), *failing(self.result)]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The ways beside each other."""
+        from friso.views.tune.words import COLUMNS, rows
+
+        return [AnswerTable(self.result.stage.name, COLUMNS, rows(self.result))]
+
+    def details(self) -> Sequence[str]:
+        """How far the numbers may be off, and what is assumed."""
+        from friso.views.tune.sensitivity_words import sensitivity_sentences
+        from friso.views.tune.words import assumptions, window_lines
+
+        return [*window_lines(self.result), *sensitivity_sentences(self.result), *assumptions(self.result)]
+
+    def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
+        """The design of leaf springs for an isolator."""
+        isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffix == ".toml"]
+        return [f"friso design {file}" for file in isolators]
+
+    def figures(self) -> Sequence[Figure]:
+        """Responses, settling times, sensitivities."""
+        from friso.views.tune.figures import figures
+
+        return figures(self.result)
+
+    def document(self) -> dict[str, Any]:
+        """The ways with their numbers."""
+        from friso.views.tune.document import tune_document
+
+        return tune_document(self.result)
+
+    def files(self) -> Files:
+        """A stage file for every way, the page, the figures."""
+        from friso.views.tune.page import tune_files
+
+        return tune_files(self.result)
+
+
+@question
+def tune(
+    stage: StageLike,
+    *,
+    within: float | str | None = None,
+    settle: float | str | None = None,
+    force_limit: float | str | None = None,
+    bandwidth_limit: float | str | None = None,
+    only: Part | None = None,
+    keep: Part | None = None,
+    seed: int = 1,
+    set: Changes = None,
+    progress: Progress = silent,
+) -> TuneAnswer:
+    """What stops the hunting: the least change of controller or joint that settles 95 % of machines like this one.
+
+    Parameters
+    ----------
+    stage : Stage, path or dict
+        The stage, its file, or the tables of one.
+    within : str or float, optional
+        Deviation that counts as in position, "1 um" or a number [m].
+    settle : str or float, optional
+        Time after the move in which 95 % of the machines are in position, "0.3 s" or a number [s].
+    force_limit : str or float, optional
+        Largest force of the actuator during the moves, "50 N" or a number [N].
+    bandwidth_limit : str or float, optional
+        Bandwidth that modes not in the stage file allow at most, "25 Hz" or a number [Hz].
+    only, keep : str, optional
+        What alone may be changed, and what may not: "controller" or "joint".
+    seed : int
+        Seed of the draws: the same one gives the same machines.
+    set : dict, optional
+        Keys to override.
+    progress : Progress
+        Called as ways are tried.
+
+    Returns
+    -------
+    TuneAnswer
+        The ways, ``answer.working``, each with its `stage`.
+
+    Raises
+    ------
+    InputError
+        For a stage or an option that is not usable.
+
+    Examples
+    --------
+    >>> import friso
+    >>> friso.tune(friso.example("thesis_rig"), only="controller", within="2 um")  # doctest: +SKIP
+    """
+    chosen = read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
+    goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, only, keep)
+    whole_number(seed, "seed", 0, MOST_SEED, "1")
+    correlations = correlations_of(stage, chosen)
+    from friso.cure.method import tune as tuned
+
+    return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress))
+
+
+def _goal(
+    stage: Stage,
+    within: float | str | None,
+    settle: float | str | None,
+    force_limit: float | str | None,
+    bandwidth_limit: float | str | None,
+    only: Part | None,
+    keep: Part | None,
+) -> Goal:
+    """The goal of the options. Raises InputError."""
+    if only is not None and only == keep:
+        raise InputError("keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
+
+    def read(name: str, value: float | str | None, unit: str, example: str) -> float | None:
+        quantity = Quantity(unit, positive, example).on(stage.axis_kind)
+        text = value if value is None or isinstance(value, str) else f"{value!r} {quantity.unit}"
+        try:
+            return None if text is None else float(quantity.read(text))
+        except InputError as error:
+            raise wrong(name, error.actual, error.expected, error.example) from None
+
+    return Goal(
+        within=read("within", within, "m", "1 um") or Goal.within,
+        settle=read("settle", settle, "s", "0.3 s"),
+        force_limit=read("force_limit", force_limit, "N", "50 N"),
+        bandwidth_limit=read("bandwidth_limit", bandwidth_limit, "Hz", "25 Hz"),
+        controller=only != "joint" and keep != "controller",
+        joint=only != "controller" and keep != "joint",
+    )

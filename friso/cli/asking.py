@@ -1,0 +1,113 @@
+"""How every command answers: it asks the function of friso of the same name, and shows the answer: the conclusion
+first, small tables, what to do next, and details if they are wanted."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from friso.axis import speak_of
+from friso.cli.common import print_table, print_wrapped, say
+from friso.cli.output import print_document, print_written
+from friso.cli.progress import ProgressBar
+from friso.errors import InputError
+
+if TYPE_CHECKING:
+    from friso.answers.answer import Answer
+
+Details = Annotated[bool, typer.Option("--details", help="Also print what the answer rests on.")]
+
+
+def ask(
+    command: str,
+    question: Callable[..., Answer],
+    *about: Any,
+    out: Path | None = None,
+    overwrite: bool = False,
+    as_json: bool = False,
+    details: bool = False,
+    what: str = "",
+    lines: float = math.inf,
+    writes: Iterable[str] = (),
+    **options: Any,
+) -> None:
+    """Ask a question `about` files, with the options of its command, write its files into `out`, and show the answer.
+
+    `what` stands beside the progress bar, `lines` are the seconds between lines of progress where there is no terminal;
+    files of the names `writes` may not be in the way. Raises InputError, typer.Exit with the status of a failure.
+    """
+    target = None
+    if out is not None:
+        from friso.answers.output_folder import OutputFolder
+
+        target = OutputFolder(command, out, overwrite, [*_paths(about)])
+        target.check(writes)
+    files: list[Path] = []
+    with ProgressBar(what, lines) as progress:
+        with named_as_options(options):
+            answer = question(*about, **options, progress=progress)
+        speak_of(answer.axis_kind)
+        if target is not None:
+            files = target.write(answer.files(), progress)
+    show(answer, files, as_json, details)
+
+
+def show(answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False) -> None:
+    """Print the answer with the `files` written. Raises typer.Exit with the status of a failure."""
+    written = [*files]
+    if as_json:
+        print_document(answer.document(), written)
+    else:
+        for sentence in answer.sentences():
+            print_wrapped(sentence)
+        for block in answer.blocks():
+            print(f"\n{block}\n")
+        for table in answer.tables():
+            print_table(table.title, table.columns, [(label, [*cells]) for label, cells in table.rows])
+        more = answer.details()
+        for paragraph in more if details else ():
+            print_wrapped(paragraph)
+        print_written(written)
+        for command in answer.next_steps(written):
+            print(f"next: {command}")
+        if more and not details:
+            print("more: --details")
+    if answer.failure:
+        say(answer.failure)
+        raise typer.Exit(answer.status)
+
+
+@contextmanager
+def named_as_options(names: Mapping[str, Any]) -> Iterator[None]:
+    """An InputError about a keyword speaks of the option of the same name."""
+    try:
+        yield
+    except InputError as error:
+        key, origin = error.key, error.origin
+        if key not in names and origin not in names:
+            raise
+        option = option_of(key) if key in names else key
+        example = (
+            error.example.replace(f"{key}=", f"{option} ", 1) if error.example.startswith(f"{key}=") else error.example
+        )
+        place = option_of(origin) if origin in names else origin
+        raise type(error)(option, error.actual, error.expected, example, place, error.also) from None
+
+
+def option_of(keyword: str) -> str:
+    """The option on the command line for a keyword of Python: "--sample-time" for "sample_time"."""
+    return f"--{keyword.strip('_').replace('_', '-')}"
+
+
+def _paths(about: Iterable[Any]) -> Iterator[Path]:
+    """The files among what is asked about."""
+    for item in about:
+        if isinstance(item, list | tuple):
+            yield from _paths(item)
+        elif isinstance(item, Path):
+            yield item

@@ -1,0 +1,46 @@
+"""`friso example`: the stage files that come with friso."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from friso.cli.command import HELP, Choices, Command
+from friso.cli.output import Overwrite
+
+
+def example(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="See the list below.")],
+    path: Annotated[
+        Path | None, typer.Argument(metavar="[FILE]", help="The file to write; default: NAME.toml, here.")
+    ] = None,
+    overwrite: Overwrite = False,
+) -> None:
+    """Copy an example that comes with friso, a stage file with its sources.
+
+    Example: friso example thesis_rig && friso check thesis_rig.toml
+    """
+    from friso.answers.starting import example as example_path
+    from friso.stage.files import write_whole
+
+    source = example_path(name)
+    target = path or Path(source.name)
+    write_whole(source.read_text(encoding="utf-8"), target, overwrite)
+    print(f"wrote {target}")
+
+
+def listed_examples() -> list[tuple[str, str]]:
+    """The examples, each by the name of its stage."""
+    import tomllib
+
+    from friso.answers.starting import example as example_path
+    from friso.answers.starting import example_names
+
+    return [
+        (name, str(tomllib.loads(example_path(name).read_text("utf-8")).get("name", ""))) for name in example_names()
+    ]
+
+
+COMMAND = Command(example, 145, HELP, Choices("Examples", listed_examples))

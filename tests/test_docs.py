@@ -1,0 +1,156 @@
+"""README, docs and package: what they link to is there, what is generated is complete, what is made is not stale."""
+
+import importlib.util
+import json
+import re
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from importlib.metadata import version
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+
+import friso
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *DOCS.rglob("*.md")]
+
+SET_UP = ("pip install . && friso check examples/thesis_rig.toml", 'pip install ".[test]" && pytest')
+
+NEEDED = 77
+"""The setuptools that build the package (pyproject.toml)."""
+
+WORDS = (
+    "LuGre",
+    "crossover",
+    "Stribeck",
+    "bristle",
+    "limiter",
+    "multiplier",
+    "flip",
+    "fold",
+    "hunting",
+    "cart",
+    "joint",
+)
+"""Words that README and pages use and that the glossary explains."""
+
+
+def module(name: str) -> ModuleType:
+    """A script of the docs."""
+    spec = importlib.util.spec_from_file_location(name, DOCS / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    loaded = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(loaded)
+    return loaded
+
+
+def test_the_readme_is_short_and_has_the_two_lines() -> None:
+    lines = (ROOT / "README.md").read_text(encoding="utf-8").splitlines()
+    assert len(lines) <= 120
+    assert set(SET_UP) <= set(lines)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    places = re.findall(r"\]\((?!https?:|#)([^)#\s]+)", text)
+    assert [place for place in places if not (page.parent / place).exists()] == []
+
+
+def test_figures_are_of_what_makes_them_and_small() -> None:
+    figures = module("figures")
+    made = json.loads((DOCS / "figures.json").read_text(encoding="utf-8"))
+    stale = [name for name in figures.FIGURES if made.get(name) != figures.source_of(name)]
+    assert stale == [], "run python docs/figures.py with these names"
+    assert [path.name for path in DOCS.glob("*.[ps][nv]g") if path.stat().st_size > 300_000] == []
+
+
+def keys_of(node: Mapping[str, Any]) -> Iterator[str]:
+    """All keys of a schema."""
+    for key, value in node.get("properties", {}).items():
+        yield key
+        yield from keys_of(value)
+    for inner in (*node.get("anyOf", ()), *([node["items"]] if "items" in node else ())):
+        yield from keys_of(inner)
+
+
+@pytest.mark.parametrize("of", ["stage", "specification"])
+def test_every_key_has_an_entry_in_the_reference(of: str) -> None:
+    page, schema = module("generate").schema_page(of), friso.schema(of)
+    keys = {*keys_of(schema)}
+    assert len(keys) > 20
+    assert {key for key in keys if f"`{key}`" not in page and f"{key}]" not in page} == set()
+
+
+def test_every_command_is_on_its_page() -> None:
+    from friso.cli.command import COMMANDS
+
+    page = module("generate").commands_page()
+    assert [name for name in COMMANDS if f"### friso {name}\n" not in page] == []
+
+
+def test_every_public_function_is_on_its_page() -> None:
+    page = (DOCS / "reference" / "python.md").read_text(encoding="utf-8")
+    functions = [name for name in friso.__all__ if callable(getattr(friso, name)) and name.islower()]
+    assert [name for name in functions if f"autofunction:: friso.{name}\n" not in page] == []
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_the_glossary_explains(word: str) -> None:
+    terms = re.findall(r"^\| ([^|]+) \|", (DOCS / "glossary.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
+    assert any(word.lower() in term.lower() for term in terms)
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of a wheel and an sdist, built from a copy of what they are made of."""
+    if int(version("setuptools").split(".")[0]) < NEEDED:
+        pytest.skip(f"setuptools {NEEDED} or later, of the test extra, is not installed")
+    tree, out = tmp_path_factory.mktemp("tree"), tmp_path_factory.mktemp("built")
+    for name in ("friso", "examples"):
+        shutil.copytree(ROOT / name, tree / name, ignore=shutil.ignore_patterns("__pycache__"))
+    for path in (
+        *ROOT.glob("*.md"),
+        *ROOT.glob("*.cff"),
+        *(ROOT / n for n in ("LICENSE", "MANIFEST.in", "setup.py", "pyproject.toml")),
+    ):
+        shutil.copy(path, tree)
+    code = f"import setuptools.build_meta as b; b.build_sdist({str(out)!r}); b.build_wheel({str(out)!r})"
+    subprocess.run([sys.executable, "-W", "ignore", "-c", code], cwd=tree, check=True, capture_output=True, text=True)
+    return out
+
+
+def test_the_wheel_works_outside_the_repository(built: Path, tmp_path: Path) -> None:
+    """With all that is no Python: templates, materials, examples."""
+    (wheel,) = built.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(tmp_path / "installed")
+    data = {path.relative_to(ROOT).as_posix() for path in (ROOT / "friso").rglob("*") if path.is_file()}
+    data = {name for name in data if not name.endswith((".py", ".pyc"))}
+    data |= {f"friso/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / "examples").rglob("*.toml")}
+    there = {path.relative_to(tmp_path / "installed").as_posix() for path in (tmp_path / "installed").rglob("*")}
+    assert data - there == set()
+    code = (
+        "import friso; print(friso.__file__, friso.load(friso.example('thesis_rig')).name, friso.example('thesis_rig'))"
+    )
+    where = {"PYTHONPATH": str(tmp_path / "installed"), "PATH": ""}
+    done = subprocess.run(
+        [sys.executable, "-P", "-c", code], cwd=tmp_path, env=where, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.count(str(tmp_path / "installed")) == 2
+    assert "Thesis rig" in done.stdout
+
+
+def test_the_sdist_holds_what_the_wheel_is_built_from(built: Path) -> None:
+    (archive,) = built.glob("*.tar.gz")
+    listed = subprocess.run(["tar", "tzf", str(archive)], capture_output=True, text=True, check=True).stdout
+    for name in ("CITATION.cff", "LICENSE", "CHANGELOG.md", "examples/specs/thesis.toml", "friso/py.typed", "setup.py"):
+        assert f"/{name}\n" in listed
