@@ -87,10 +87,10 @@ class Machine:
         """The log of this stage on a reference [m] given `FINE` times per sample, with noise and digits unless
         `bare`."""
         step, flat = self.sample_time / FINE, self.flat
-        given = record(name, step, reference=reference, position=0 * reference, force=0 * reference)
-        problem = closed_loop(flat, given, given.segments[0], ())
-        found = problem.record(np.zeros(0))
-        signals = {"reference": reference, "position": found.position, "force": found.force}
+        inputs = record(name, step, reference=reference, position=0 * reference, force=0 * reference)
+        problem = closed_loop(flat, inputs, inputs.segments[0], ())
+        result = problem.record(np.zeros(0))
+        signals = {"reference": reference, "position": result.position, "force": result.force}
         if self.jointed:
             starts = np.zeros((1, len(problem.kernel.full_state)))
             (runs,) = follow(problem.kernel, flat, 1, problem.inputs, starts, RTOL)
@@ -211,8 +211,8 @@ def ramps(machine: Machine, stage: friso.Stage, speeds: Iterable[float], way: fl
 
 def joined(logs: Sequence[Log]) -> Log:
     """Several logs as one, each of their segments apart."""
-    lengths = [part.stop - part.start for each in logs for part in each.segments]
-    signals = {role: np.concatenate([each[role] for each in logs]) for role in logs[0].signals}
+    lengths = [part.stop - part.start for log in logs for part in log.segments]
+    signals = {role: np.concatenate([log[role] for log in logs]) for role in logs[0].signals}
     parts = tuple(slice(int(a), int(b)) for a, b in pairwise(np.cumsum([0, *lengths])))
     return replace(record(logs[0].name, logs[0].sample_time, **signals), segments=parts)
 

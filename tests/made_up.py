@@ -60,7 +60,7 @@ def fake_hunting(*cycles: Cycle, reason: str = "", certain: bool = True) -> Hunt
 
 def hunts(**changes: Any) -> Judgement:
     """What is known of the thesis rig, locked."""
-    found = Judgement(
+    result = Judgement(
         "hunts",
         fake_hunting(fake_cycle()),
         Kick(((1.72e-3, 10.8e-3), (22.7e-3, 43.3e-3), (59.3e-3, 0.156)), (1.73e-5, 0.156)),
@@ -68,14 +68,14 @@ def hunts(**changes: Any) -> Judgement:
         MoveShare(128, 111, (10.0, 200.0), (0.003, 0.06)),
         Margin(1.2187, 9.7496, True, 1.2248),
     )
-    return replace(found, **changes)
+    return replace(result, **changes)
 
 
 def settles(**changes: Any) -> Judgement:
     """What is known of it, free."""
     edge = Margin(0.6998, 5.598, True, 0.7068)
-    found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=edge, settled_after=0.5123)
-    return replace(found, **changes)
+    result = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=edge, settled_after=0.5123)
+    return replace(result, **changes)
 
 
 def cannot_hunt(verdict: Any = "settles") -> Judgement:

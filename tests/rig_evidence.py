@@ -68,7 +68,9 @@ def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, te
 def loop(tuned: float, *crossings: float) -> MeasuredLoop:
     line, none = np.array([tuned, 20 * tuned]), np.zeros(2)
     response = FrequencyResponse(line, np.array([1.0, 0.1]) + 0j, none, none, none, none + 2, "multisine")
-    return MeasuredLoop(tuned, response, tuple(Estimate.normal("crossover", "Hz", each, 0.1, "") for each in crossings))
+    return MeasuredLoop(
+        tuned, response, tuple(Estimate.normal("crossover", "Hz", crossing, 0.1, "") for crossing in crossings)
+    )
 
 
 def loops(
@@ -79,5 +81,5 @@ def loops(
     75 Hz are stable; masses that a weaker motor shows locked and free [kg]."""
     apparent = np.array([[1.7, weak[0], 1.2], [0.5, weak[1], 0.3]])
     settings = np.array([20.0, 35.0, 50.0, 75.0])
-    held = tuple(loop(tuned, *each) for tuned, each in zip((8.0, 48.0), locked, strict=True))
+    held = tuple(loop(tuned, *item) for tuned, item in zip((8.0, 48.0), locked, strict=True))
     return RigLoops(held, loop(8.0, *free), settings, np.arange(4) < stable, apparent)

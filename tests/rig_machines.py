@@ -75,7 +75,7 @@ def through_files(logs: Iterable[RigLog], folder: Path) -> list[LogFile]:
 
 def sources(given: Iterable[LogFile]) -> list[tuple[Source, str]]:
     """What `identify` takes."""
-    return [(each.source, each.kind) for each in given]
+    return [(item.source, item.kind) for item in given]
 
 
 def mean_level(logs: Iterable[RigLog], key: str) -> float:

@@ -53,10 +53,10 @@ def masked(text: str) -> str:
 
 def words(text: str) -> list[str]:
     """Words and numbers of a text."""
-    found: list[str] = []
+    result: list[str] = []
     for k, part in enumerate(NUMBER.split(text)):
-        found += [part] if k % 2 else re.sub("─+", "─", part.translate(RULES)).split()
-    return found
+        result += [part] if k % 2 else re.sub("─+", "─", part.translate(RULES)).split()
+    return result
 
 
 def alike(one: str, other: str) -> bool:
@@ -95,7 +95,7 @@ class Snapshots:
             raise AssertionError(_difference(kept, now) + f"\n{path.name}, {name}: as kept, or --refresh-snapshots")
         with FileLock(Path(gettempdir()) / "friso-snapshots.lock"):
             texts = {**read(path), name: now}
-            rows = (f"==== {each} ====\n{texts[each]}" for each in sorted(texts))
+            rows = (f"==== {item} ====\n{texts[item]}" for item in sorted(texts))
             path.write_text("\n".join(rows), encoding="utf-8")
 
 
@@ -103,6 +103,6 @@ def _difference(kept: str, now: str) -> str:
     """The first words that differ, with those before."""
     one, other = words(kept), words(now)
     place = next(k for k, (a, b) in enumerate(zip_longest(one, other)) if not alike(a or "", b or ""))
-    some = slice(max(0, place - 8), place + 12)
-    was, is_ = (" ".join(each[some]) for each in (one, other))
+    part = slice(max(0, place - 8), place + 12)
+    was, is_ = (" ".join(item[part]) for item in (one, other))
     return f"was: {was}\nnow: {is_}"

@@ -92,9 +92,9 @@ def test_many_stages_at_once_tell_the_same(name: str) -> None:
     """The survey of many stages, which begins from fewer states, tells what attracts as well."""
     chosen, _, amplitude, _ = HUNTING[name]
     stages = held(chosen)
-    found = attractors(stages.take(np.zeros(2, np.int64)))
-    assert found.attracts.tolist() == [True, True]
-    assert found.target.amplitude == pytest.approx([amplitude, amplitude], rel=0.02)
+    attracted = attractors(stages.take(np.zeros(2, np.int64)))
+    assert attracted.attracts.tolist() == [True, True]
+    assert attracted.target.amplitude == pytest.approx([amplitude, amplitude], rel=0.02)
 
 
 @pytest.mark.parametrize(("crossover", "hunts"), [("13.35 Hz", True), ("13.6 Hz", False)])
@@ -118,9 +118,9 @@ def test_a_stage_that_settles_from_everywhere() -> None:
 
 def test_the_period_of_a_doubled_orbit_is_told_by_its_swings() -> None:
     """At 12.66 Hz the creeping stage goes to and fro every 2.07 s, and repeats itself after twice that."""
-    found = attractors(held(CREEPING.replace({"controller.crossover": "12.6553 Hz"})))
-    assert {motion.swings for motion in found.motions} == {4}
-    for motion in found.motions:
+    attracted = attractors(held(CREEPING.replace({"controller.crossover": "12.6553 Hz"})))
+    assert {motion.swings for motion in attracted.motions} == {4}
+    for motion in attracted.motions:
         assert motion.period == pytest.approx(4.144, rel=0.01)
 
 
@@ -215,10 +215,10 @@ def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.Mon
     what the others do, by beginning at rest."""
     monkeypatch.setattr(starts, "DISTANCES", (np.array([1e-6, 2e-6]),))
     monkeypatch.setattr(friso.hunting.attractors, "BESIDE", np.array([1e-6]))
-    found = attractors(held(CREEPING), thorough=True)
-    assert found.flips.tolist() == [True]
-    assert found.decided.tolist() == [False]
-    assert not found.motions
+    attracted = attractors(held(CREEPING), thorough=True)
+    assert attracted.flips.tolist() == [True]
+    assert attracted.decided.tolist() == [False]
+    assert not attracted.motions
 
 
 def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -297,17 +297,17 @@ def test_swings_of_half_a_percent_of_the_deflection(name: str, thorough: bool) -
             "controller.crossover": crossover,
         }
     )
-    found = attractors(held(stage), thorough=thorough)
-    assert found.decided.all()
-    assert [1e3 * motion.amplitude for motion in found.motions] == pytest.approx([amplitude], rel=0.01)
+    attracted = attractors(held(stage), thorough=thorough)
+    assert attracted.decided.all()
+    assert [1e3 * motion.amplitude for motion in attracted.motions] == pytest.approx([amplitude], rel=0.01)
 
 
 def test_swings_that_repeat_themselves() -> None:
     """A symmetric swing repeats after one turn, mirrored; a leaning one after two; a long-short one after four."""
     rows = [[1.0, -1.0] * 16, [1.2, -0.9] * 16, [1.0, -0.5, 0.6, -0.4] * 8]
     times = np.tile(np.cumsum([1.0] * 32), (3, 1))
-    found = recurrence(np.array(rows), times, np.ones(3, bool))
-    assert found.swings.tolist() == [1, 2, 4]
-    assert found.time.tolist() == [1.0, 2.0, 4.0]
+    repeats = recurrence(np.array(rows), times, np.ones(3, bool))
+    assert repeats.swings.tolist() == [1, 2, 4]
+    assert repeats.time.tolist() == [1.0, 2.0, 4.0]
     noisy = recurrence(np.random.default_rng(1).normal(size=(1, 32)), times[:1], np.ones(1, bool))
     assert noisy.swings.tolist() == [0]

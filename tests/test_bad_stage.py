@@ -330,15 +330,15 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
     ids=lambda item: item if isinstance(item, str) else "",
 )
 def test_keys(old: str, new: str, lines: tuple[str, str, str, str]) -> None:
-    head, given, expected, example, *also = message(edited(old, new)).split("\n")
+    head, inputs, expected, example, *also = message(edited(old, new)).split("\n")
     key, *fragments = lines
     assert all(line.startswith("  also:     ") for line in also)
     assert head.startswith("rig.toml: ")
     assert key in head
-    assert given.startswith("  given:    ")
+    assert inputs.startswith("  given:    ")
     assert expected.startswith("  expected: ")
     assert example.startswith("  example:  ")
-    assert all(fragment in line for fragment, line in zip(fragments, (given, expected, example), strict=True))
+    assert all(fragment in line for fragment, line in zip(fragments, (inputs, expected, example), strict=True))
 
 
 @pytest.mark.parametrize(

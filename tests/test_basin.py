@@ -35,16 +35,16 @@ def rigid(crossover: float) -> Stage:
 @cache
 def cycle() -> Cycle:
     """Its cycle at 8 Hz, 0.52 mm and 1.63 s, which attracts."""
-    (found,) = hunting(rigid(8)).attracting
-    return found
+    (result,) = hunting(rigid(8)).attracting
+    return result
 
 
 @cache
 def target() -> Target:
     """What motions end in there: this cycle."""
-    found = hunting(rigid(8)).target
-    assert found is not None
-    return found
+    result = hunting(rigid(8)).target
+    assert result is not None
+    return result
 
 
 @cache
@@ -74,13 +74,13 @@ def test_displacements_that_start_hunting() -> None:
 
     The stage lands near enough to its reference to rest after a first swing, or a second, from the gaps between them.
     """
-    found = windows()
-    ends = [1e3 * end for window in found.windows for end in window]
+    bands = windows()
+    ends = [1e3 * end for window in bands.windows for end in window]
     assert ends[:5] == pytest.approx([1.7, 11.1, 23.2, 43.7, 60.5], rel=0.02)
     assert len(ends) == 6
-    assert found.windows[-1][1] == found.searched[1] == pytest.approx(300 * cycle().amplitude)
-    assert found.searched[0] == pytest.approx(cycle().amplitude / 30)
-    assert found.smallest == found.windows[0][0]
+    assert bands.windows[-1][1] == bands.searched[1] == pytest.approx(300 * cycle().amplitude)
+    assert bands.searched[0] == pytest.approx(cycle().amplitude / 30)
+    assert bands.smallest == bands.windows[0][0]
 
 
 @RIGID
@@ -109,8 +109,8 @@ def test_mirrored_releases_start_hunting_as_well() -> None:
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
     chosen = rigid(8)
-    found = pushes(chosen, target())
-    low, high = found.windows[0]
+    result = pushes(chosen, target())
+    low, high = result.windows[0]
     velocities = np.array([low * 1.02, high / 1.02, low / 1.02, high * 1.02])
     stages = Ensemble.held(chosen.flat(), 4)
     starts = np.zeros((4, 5))
@@ -147,28 +147,28 @@ def test_share_of_moves_is_reproducible() -> None:
 @RIGID
 def test_moves_by_single_runs() -> None:
     """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
-    found = moves(MOVING, target())
-    assert found is not None
-    drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(found.accelerations, found.times, strict=True))
+    result = moves(MOVING, target())
+    assert result is not None
+    drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(result.accelerations, result.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    each, completed = ends_in(own, MOVES, target())
+    item, completed = ends_in(own, MOVES, target())
     assert completed.all()
-    assert each.sum() == found.hunting
-    assert 0 < found.hunting < MOVES
-    for k in (*np.flatnonzero(each)[:4], *np.flatnonzero(~each)[:4]):
+    assert item.sum() == result.hunting
+    assert 0 < result.hunting < MOVES
+    for k in (*np.flatnonzero(item)[:4], *np.flatnonzero(~item)[:4]):
         acceleration, time = map(float, drawn[k])
         move = there_and_back(f"{5.2 + LONG * cycle().period!r} s").replace("30 ms", f"{time!r} s")
         move = move.replace("100 m/s^2", f"{acceleration!r} m/s^2")
-        assert hunts(stage(move, friction=lugre(2), controller=van_dijk("8 Hz"))) == each[k]
+        assert hunts(stage(move, friction=lugre(2), controller=van_dijk("8 Hz"))) == item[k]
 
 
 @RIGID
 def test_moves_that_overlap_are_not_drawn() -> None:
     """A move takes twice the acceleration time, and the stage returns after it has arrived."""
     soon = MOVING.replace({"motion.return_at": "0.08 s"})
-    found = moves(soon, target())
-    assert found is not None
-    assert found.times == pytest.approx([SHARES[0] * 0.03, 0.04])
+    result = moves(soon, target())
+    assert result is not None
+    assert result.times == pytest.approx([SHARES[0] * 0.03, 0.04])
 
 
 @RIGID
@@ -182,12 +182,14 @@ def test_motions_without_acceleration_have_no_share() -> None:
 def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
     """Wilson 1927, doi:10.1080/01621459.1927.10502953: at its ends the share p is 1.96 sqrt(p (1-p)/n) off."""
     hunting = data.draw(st.integers(0, drawn))
-    found = MoveShare(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
-    low, high = found.interval
-    assert 0 <= low <= found.fraction <= high <= 1
+    result = MoveShare(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
+    low, high = result.interval
+    assert 0 <= low <= result.fraction <= high <= 1
     for p in (low, high):
         if 0 < p < 1:
-            assert abs(p - found.fraction) == pytest.approx(1.959964 * np.sqrt(p * (1 - p) / drawn), rel=1e-5, abs=1e-9)
+            assert abs(p - result.fraction) == pytest.approx(
+                1.959964 * np.sqrt(p * (1 - p) / drawn), rel=1e-5, abs=1e-9
+            )
 
 
 def equal_gains(crossover: float) -> Stage:
@@ -199,11 +201,11 @@ def equal_gains(crossover: float) -> Stage:
 def test_gains_hunt_like_the_tuned_controller_they_equal() -> None:
     """The states of the controller differ, what it does not: the same cycle, the same margin."""
     chosen = equal_gains(8)
-    (found,) = hunting(chosen).cycles
-    assert found.period == pytest.approx(cycle().period, rel=1e-7)
-    assert found.amplitude == pytest.approx(cycle().amplitude, rel=1e-7)
-    assert found.multiplier == pytest.approx(cycle().multiplier, rel=1e-4)
-    assert found.growth == pytest.approx(cycle().growth, rel=1e-4)
+    (result,) = hunting(chosen).cycles
+    assert result.period == pytest.approx(cycle().period, rel=1e-7)
+    assert result.amplitude == pytest.approx(cycle().amplitude, rel=1e-7)
+    assert result.multiplier == pytest.approx(cycle().multiplier, rel=1e-4)
+    assert result.growth == pytest.approx(cycle().growth, rel=1e-4)
     edge, tuned = margin(chosen, attracting=True), margin(rigid(8), attracting=True)
     assert edge is not None
     assert tuned is not None

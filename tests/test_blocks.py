@@ -39,17 +39,17 @@ def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
     _, held = blocks.finished(Demand({}, signal, signal, signal), None, Rest())
     now = {each.symbol: each.settled for each in held}
     later = {POSITION: POSITION + VELOCITY * SAMPLE_TIME}
-    for each in held:
-        assert sp.simplify(each.update.xreplace(now) - each.settled.xreplace(later)) == 0
+    for item in held:
+        assert sp.simplify(item.update.xreplace(now) - item.settled.xreplace(later)) == 0
     assert sp.simplify(signal.value.xreplace(now) - signal.settled) == 0
 
 
 def test_a_steady_motion_lasts_in_continuous_time() -> None:
     blocks = Continuous(sp.S.One)
     signal = BLOCKS["biquad"](blocks, measured(GOING, sp.S.One, sp.S.One).position)
-    now = {each.symbol: each.settled for each in blocks.states}
-    for each in blocks.states:
-        assert sp.simplify(each.derivative.xreplace(now) - sp.diff(each.settled, POSITION) * VELOCITY) == 0
+    now = {item.symbol: item.settled for item in blocks.states}
+    for state in blocks.states:
+        assert sp.simplify(state.derivative.xreplace(now) - sp.diff(state.settled, POSITION) * VELOCITY) == 0
     assert sp.simplify(signal.value.xreplace(now) - signal.settled) == 0
 
 
@@ -60,7 +60,7 @@ def test_an_integrator_rests_at_each_limit_and_at_both(beyond: tuple[str, ...]) 
     signal = blocks.integral(measured(GOING, sp.S.One, sp.S.One).error, sp.S(2), limit=sp.S(3))
     bound = ForceLimit.of(signal, "clamp")
     states, resting = blocks.finished(Demand({}, signal, signal, signal), bound)
-    (integral,) = (each for each in states if each.role == Role.INTEGRAL)
+    (integral,) = (state for state in states if state.role == Role.INTEGRAL)
     modes = {kink.beyond: 0 for kink in (*bound.kinks, *resting)} | {Kink("winding_up", ERROR).beyond: 1}
     for name in beyond:
         modes |= {sp.Symbol(f"beyond_{mode}_upper", real=True): 1 for mode in (name, f"rest_{name}")}

@@ -34,15 +34,15 @@ def special(found: Diagram, symmetric: bool) -> dict[str, list[tuple[float, Loca
     points: dict[str, list[tuple[float, LocatedPoint]]] = {"flip": [], "fold": [], "torus": []}
     for branch, own in zip(found.branches, found.special, strict=True):
         if (branch.sign < 0) == symmetric:
-            for each in own:
-                points[each.kind].append((found.value(each.point.place), each))
+            for item in own:
+                points[item.kind].append((found.value(item.point.place), item))
     return points
 
 
 def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Diagram) -> None:
     """references.md: it stops attracting near 9.77 Hz; the issue: the unstable cycle lives on to a fold at 16.2 Hz."""
     points = special(over_crossover, symmetric=True)
-    first = min(points["flip"], key=lambda each: each[0])
+    first = min(points["flip"], key=lambda item: item[0])
     assert first[0] == pytest.approx(9.77, abs=0.005)
     assert first[1].point.multiplier == pytest.approx(-1, abs=1e-6)
     (fold,) = points["fold"]
@@ -67,20 +67,20 @@ def test_errors_are_honest(over_crossover: Diagram) -> None:
     for symmetric in (True, False):
         for kind, points in special(over_crossover, symmetric).items():
             other = [value for value, _ in special(tight, symmetric)[kind]]
-            for value, found in points:
-                nearest = min(other, key=lambda each: abs(each - value))
-                assert abs(nearest - value) < 3 * over_crossover.error(found) + 1e-6
-                assert over_crossover.error(found) < 1e-4
+            for value, result in points:
+                nearest = min(other, key=lambda item: abs(item - value))
+                assert abs(nearest - value) < 3 * over_crossover.error(result) + 1e-6
+                assert over_crossover.error(result) < 1e-4
 
 
 def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -> None:
     (symmetric,) = (branch for branch in over_crossover.branches if branch.sign < 0)
-    some = [point for point in symmetric.points if 0 < point.place < 0.35][::6]
-    stages = over_crossover.space.stages(np.array([[point.place] for point in some]))
+    part = [point for point in symmetric.points if 0 < point.place < 0.35][::6]
+    stages = over_crossover.space.stages(np.array([[point.place] for point in part]))
     alone = symmetric_cycles(stages)
     assert alone.closed.all()
-    assert alone.amplitude == pytest.approx([point.cycle.amplitude[0] for point in some], rel=1e-6)
-    assert alone.multiplier == pytest.approx([point.multiplier for point in some], rel=1e-3)
+    assert alone.amplitude == pytest.approx([point.cycle.amplitude[0] for point in part], rel=1e-6)
+    assert alone.multiplier == pytest.approx([point.multiplier for point in part], rel=1e-3)
 
 
 def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) -> None:
@@ -162,18 +162,18 @@ def refined(points: np.ndarray) -> np.ndarray:
 
 def test_an_asymmetric_stage_loses_its_cycle_in_a_fold() -> None:
     """Unequal friction unfolds the pitchfork: what was a flip of the half period is a fold of the whole one."""
-    found = diagram(
+    traced = diagram(
         Space.of(RIGID.replace({"friction.asymmetry": 0.005}), [KeyRange("controller.crossover", 4.0, 12.0)])
     )
-    assert {branch.sign for branch in found.branches} == {1.0}
-    kinds = {each.kind for own in found.special for each in own}
+    assert {branch.sign for branch in traced.branches} == {1.0}
+    kinds = {item.kind for own in traced.special for item in own}
     assert "fold" in kinds
 
 
 def test_a_range_without_a_boundary_has_no_points() -> None:
-    found = diagram(Space.of(RIGID, [KeyRange("controller.crossover", 4.0, 6.0)]), seeds=5)
-    assert found.cycles.attracting.all()
-    assert not any(found.special)
+    traced = diagram(Space.of(RIGID, [KeyRange("controller.crossover", 4.0, 6.0)]), seeds=5)
+    assert traced.cycles.attracting.all()
+    assert not any(traced.special)
 
 
 def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
@@ -182,21 +182,21 @@ def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
     unwound = VARIANTS["rigid, limit, back-calculation"].replace(
         {"controller.force_limit": "12 N", "controller.anti_windup_time": "50 ms"}
     )
-    found = diagram(Space.of(unwound, [KeyRange("controller.crossover", 36.0, 44.0)]), seeds=5)
-    assert found.decided.all()
-    assert found.attracts.tolist() == [False, False, True, True, True]
-    assert not found.cycles.attracting.any()
-    (fold,) = special(found, symmetric=True)["fold"]
+    traced = diagram(Space.of(unwound, [KeyRange("controller.crossover", 36.0, 44.0)]), seeds=5)
+    assert traced.decided.all()
+    assert traced.attracts.tolist() == [False, False, True, True, True]
+    assert not traced.cycles.attracting.any()
+    (fold,) = special(traced, symmetric=True)["fold"]
     assert fold[0] == pytest.approx(39.599, abs=0.001)
-    (change,) = changes_of(found)
+    (change,) = changes_of(traced)
     assert change.begins
     assert change.low == change.high == pytest.approx(39.599, abs=0.001)
 
 
 def test_a_logarithmic_range_finds_the_same_flip() -> None:
-    found = friso.boundary(RIGID, {"controller.crossover": "8 Hz..12 Hz:log"})
-    assert isinstance(found, Diagram)
-    (flip,) = special(found, symmetric=True)["flip"]
+    traced = friso.boundary(RIGID, {"controller.crossover": "8 Hz..12 Hz:log"})
+    assert isinstance(traced, Diagram)
+    (flip,) = special(traced, symmetric=True)["flip"]
     assert flip[0] == pytest.approx(9.77, abs=0.005)
 
 

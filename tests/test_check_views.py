@@ -309,9 +309,9 @@ def said_by_name() -> dict[str, str]:
 
 
 def test_sentences(snapshots: Snapshots) -> None:
-    said = said_by_name()
-    assert len({*said.values()}) == len(said)
-    snapshots.check("check", "sentences", "\n".join(f"{name}: {text}" for name, text in said.items()))
+    texts = said_by_name()
+    assert len({*texts.values()}) == len(texts)
+    snapshots.check("check", "sentences", "\n".join(f"{name}: {text}" for name, text in texts.items()))
 
 
 @pytest.mark.parametrize(
@@ -326,13 +326,13 @@ def test_sentences(snapshots: Snapshots) -> None:
     ],
 )
 def test_numbers_in_sentences(name: str, facts: list[str]) -> None:
-    said = said_by_name()[name]
-    assert [fact for fact in facts if fact not in said] == []
+    text = said_by_name()[name]
+    assert [fact for fact in facts if fact not in text] == []
 
 
 def test_an_unstable_loop_is_named_before_what_friction_makes_of_it():
-    said = said_by_name()["hunts, unstable"]
-    assert said.index("unstable") < said.index("±0.52 mm")
+    text = said_by_name()["hunts, unstable"]
+    assert text.index("unstable") < text.index("±0.52 mm")
 
 
 def test_freeing_the_joint_is_advised_only_where_the_free_joint_certainly_settles():
@@ -391,10 +391,10 @@ def test_rows_of_other_cycles():
     ],
 )
 def test_windows_of_kicks(windows, text):
-    found = row("Displacements that hunt", hunts(displacement=Kick(tuple(windows), (1e-5, 0.1))))
-    assert found is not None
-    assert found.startswith(text)
-    assert found.endswith("and 3 more ranges") == (len(windows) == 7)
+    row_ = row("Displacements that hunt", hunts(displacement=Kick(tuple(windows), (1e-5, 0.1))))
+    assert row_ is not None
+    assert row_.startswith(text)
+    assert row_.endswith("and 3 more ranges") == (len(windows) == 7)
 
 
 @pytest.mark.parametrize(
@@ -465,7 +465,7 @@ def test_an_edge_is_told_with_the_digits_that_hold() -> None:
 def test_a_motion_that_does_not_move_the_stage_says_so() -> None:
     judgements = settles(), hunts(verdict="bistable")
     unmoved = [sentence(judgement, unmoved=True, largest_force=2.44) for judgement in judgements]
-    assert all("does not move the stage" in said and "2.44 N" in said for said in unmoved)
+    assert all("does not move the stage" in text and "2.44 N" in text for text in unmoved)
     assert not any("does not move" in sentence(judgement) for judgement in judgements)
 
 

@@ -35,8 +35,8 @@ def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]
     assert document["stage"] == "Thesis rig"
     locked = document["cases"]["locked"]
     agreed = {"verdict", "peaks", "peak_to_peak_m", "period_s", "settling_time_s", "cycle", "solver"}
-    known = {"cycles", "reason", "settled_after_s", "margin", "kick", "moves", "observed", "loop_unstable_while_it"}
-    assert agreed | known <= locked.keys()
+    expected = {"cycles", "reason", "settled_after_s", "margin", "kick", "moves", "observed", "loop_unstable_while_it"}
+    assert agreed | expected <= locked.keys()
     assert locked["solver"].keys() == {"status", "steps", "rejected", "rtol"}
     assert (locked["verdict"], locked["peaks"], locked["cycles"], locked["reason"]) == ("hunts", 6, 1, None)
     assert document["cases"]["given"] == document["cases"]["free"]

@@ -230,9 +230,9 @@ def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
 def test_samples_are_noted_at_their_instants(every: int, delay: float) -> None:
     """Every so many samples of the drive: the same numbers as when all are noted."""
     flat = keys(axis(), delay, encoder_noise=NOISE)
-    every_one, some = (run(flat, every=n)[1].samples[0] for n in (1, every))
-    assert np.array_equal(some[:-1], every_one[:-1:every])
-    assert not np.isnan(some[:-1]).any()
+    every_one, part = (run(flat, every=n)[1].samples[0] for n in (1, every))
+    assert np.array_equal(part[:-1], every_one[:-1:every])
+    assert not np.isnan(part[:-1]).any()
 
 
 def test_tables_between_their_points() -> None:
@@ -391,7 +391,7 @@ def plain_drive(flat: Flat, inputs: Mapping[str, np.ndarray]) -> tuple[np.ndarra
     """Commands [N] and integrals [m s] of the drive: encoder, feedforward, deadband, reset, limit."""
     drive = {name.removeprefix("drive."): value for name, value in flat.items() if name.startswith("drive.")}
     noise = drive["encoder_noise"] * np.sin(drive["seed"] + inputs["tick"])
-    reading = np.array([rounded(each, drive["encoder_resolution"]) for each in inputs["seen"] + noise])
+    reading = np.array([rounded(item, drive["encoder_resolution"]) for item in inputs["seen"] + noise])
     error, speed = inputs["reference"] - reading, inputs["speed"]
     demand, gain, added = shares(flat, error, reading)
     demand = demand + drive["feedforward_mass"] * inputs["reference.acceleration"] + inputs["injected_force"]
@@ -439,7 +439,11 @@ FEATURES: Mapping[str, Flat] = {
     "deadband": {"integrator_deadband": 7e-4},
     "reset": {"integrator_reset": 1.0},
 }
-DRIVES = {"plain": {}, **FEATURES, "all": {name: value for each in FEATURES.values() for name, value in each.items()}}
+DRIVES = {
+    "plain": {},
+    **FEATURES,
+    "all": {name: value for feature in FEATURES.values() for name, value in feature.items()},
+}
 
 
 @pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
@@ -447,10 +451,10 @@ DRIVES = {"plain": {}, **FEATURES, "all": {name: value for each in FEATURES.valu
 def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
     """One by one and together; each makes a difference, and the limit is met."""
     flat, inputs = keys(axis(), **DRIVES[feature]) | tuned, motions()
-    found = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
+    result = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
     commands, integrals = plain_drive(flat, inputs)
-    assert found["commanded"] == pytest.approx(commands, abs=1e-9)
-    assert found["integral"] == pytest.approx(integrals, abs=1e-12)
+    assert result["commanded"] == pytest.approx(commands, abs=1e-9)
+    assert result["integral"] == pytest.approx(integrals, abs=1e-12)
     assert 0.02 < np.mean(np.abs(commands) == LIMIT) < 0.7
     without = plain_drive(keys(axis()) | tuned, inputs)[0]
     assert (np.abs(commands - without).max() > 0.01) == (feature != "plain")

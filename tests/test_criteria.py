@@ -48,7 +48,7 @@ lengths = st.floats(1e-8, 1e-1)
 
 def one(end: End, k: int) -> End:
     """The end of one of several runs."""
-    return End(*(getattr(end, each.name)[[k]] for each in fields(End)))
+    return End(*(getattr(end, item.name)[[k]] for item in fields(End)))
 
 
 # ---------------------------------------------------------------- the verdict on a stage
@@ -268,13 +268,13 @@ def test_a_batch_of_turning_points_is_all_of_its_runs(gaps: list[tuple[float, fl
     together = scan(at, pad, counts, swing, ended)
     for k in range(3):
         alone = scan(at[[k]], pad[[k]], counts[[k]], swing[[k]], ended[[k]])
-        for each in fields(together):
-            whole, single = getattr(together, each.name)[k], getattr(alone, each.name)[0]
-            assert np.array_equal(whole, single, equal_nan=each.name in ("period", "earlier"))
+        for item in fields(together):
+            whole, single = getattr(together, item.name)[k], getattr(alone, item.name)[0]
+            assert np.array_equal(whole, single, equal_nan=item.name in ("period", "earlier"))
     assert together.earlier[0] == together.earlier[1]  # a mirror image swings as far
 
 
 def test_an_end_is_made_of_arrays_of_one_length() -> None:
     end = end_of_traces(TIME, np.zeros((3, len(TIME))), BAND)
-    assert {getattr(end, each.name).shape for each in fields(End)} == {(3,)}
+    assert {getattr(end, item.name).shape for item in fields(End)} == {(3,)}
     assert outcomes(replace(end, completed=np.array([True, False, True]))).tolist() == ["rests", "failed", "rests"]

@@ -103,8 +103,8 @@ def test_static_law_equals_python_control() -> None:
         viscous = flat["friction.viscous"] * v
         return (plain.friction(flat, v, 0.0)[0] - viscous) * (1 + 0.2 * np.sign(v)) + viscous
 
-    found = control.describing_function(curve, amplitudes * omega, num_points=4000)
-    assert of(flat, amplitudes, 5.0) == pytest.approx(1j * omega * found, rel=1e-7)
+    result = control.describing_function(curve, amplitudes * omega, num_points=4000)
+    assert of(flat, amplitudes, 5.0) == pytest.approx(1j * omega * result, rel=1e-7)
 
 
 def test_dahl_loses_what_a_spring_behind_a_backlash_loses() -> None:
@@ -149,8 +149,8 @@ def settled(flat: dict[str, Any], amplitude: float, frequency: float, periods: i
         start, end = end, (half + 1) / (2 * frequency)
         if half == 2 * periods - 2:
             y[1:] = 0.0
-        found = solve_ivp(rates, (start, end), y, "Radau", rtol=1e-9, atol=1e-12, max_step=(end - start) / 40)
-        y = found.y[:, -1]
+        solution = solve_ivp(rates, (start, end), y, "Radau", rtol=1e-9, atol=1e-12, max_step=(end - start) / 40)
+        y = solution.y[:, -1]
     return complex(y[1], y[2]) * frequency / amplitude
 
 
@@ -160,20 +160,20 @@ def settled(flat: dict[str, Any], amplitude: float, frequency: float, periods: i
 def test_plain_integration(amplitude: float, frequency: float, periods: int) -> None:
     """The same law written by hand."""
     flat = rigid(LAWS["lugre"]).flat()
-    (found,) = of(flat, amplitude, frequency)
-    assert abs(found / settled(flat, amplitude, frequency, periods) - 1) < 1e-8
+    (value,) = of(flat, amplitude, frequency)
+    assert abs(value / settled(flat, amplitude, frequency, periods) - 1) < 1e-8
 
 
 def test_long_memory_is_solved_for() -> None:
     """At 10 nm a state takes thousands of periods to forget its start: settling for three misses what solving finds."""
     flat = rigid(LAWS["lugre"]).flat()
     friction = Imposition.of(flat, np.array([1e-8]), np.array([10.0]), 1e-10)
-    found = steady(friction)
-    (_, results), *_ = friction.run(found.inner, 1.0)
+    steady_state = steady(friction)
+    (_, results), *_ = friction.run(steady_state.inner, 1.0)
     z = friction.kernel.states.index("bristle_deflection")
-    assert results.ends[0, z] == pytest.approx(found.inner[0, 0], rel=1e-6)
+    assert results.ends[0, z] == pytest.approx(steady_state.inner[0, 0], rel=1e-6)
     (_, three), *_ = friction.run(np.zeros((1, 1)), 3.0)
-    assert abs(three.ends[0, z] / found.inner[0, 0] - 1) > 0.5
+    assert abs(three.ends[0, z] / steady_state.inner[0, 0] - 1) > 0.5
 
 
 # how exact, and invariants
@@ -196,11 +196,11 @@ def test_loose_tolerance_still_finds_the_periodic_state(rtol: float) -> None:
 
 def test_sampled_harmonics_converge_with_the_square_of_the_samples() -> None:
     many = np.array([1024, 4096, 16384])
-    found = [describing(rigid(LAWS["lugre"]), [0.1], [100.0], 9, int(samples)) for samples in many]
-    errors = np.array([float(each["aliasing"].item()) for each in found])
+    result = [describing(rigid(LAWS["lugre"]), [0.1], [100.0], 9, int(samples)) for samples in many]
+    errors = np.array([float(each["aliasing"].item()) for each in result])
     assert errors[-1] < 2e-5
     assert order(errors, many) == pytest.approx(2.0, abs=0.1)
-    third = [each["force"].values[0, 0, 3] for each in found]
+    third = [item["force"].values[0, 0, 3] for item in result]
     assert abs(third[1] / third[2] - 1) < 1e-2
 
 
@@ -221,9 +221,9 @@ def test_whole_and_half_period_agree(law: str, monkeypatch: pytest.MonkeyPatch) 
 
 def test_asymmetric_sliding_has_a_mean_force() -> None:
     """Levels (1 +- 0.2) F_c at speed: a mean of 0.2 F_c, and Coulomb's N on average."""
-    found = describing(rigid(LAWS["stribeck"]), [0.2], [1.0], 3)
-    assert found["force"].values[0, 0, 0] == pytest.approx(0.2, rel=0.02)
-    assert np.imag(found["stiffness"].item()) == pytest.approx(4 / np.pi / 0.2 + np.pi, rel=0.01)
+    responses = describing(rigid(LAWS["stribeck"]), [0.2], [1.0], 3)
+    assert responses["force"].values[0, 0, 0] == pytest.approx(0.2, rel=0.02)
+    assert np.imag(responses["stiffness"].item()) == pytest.approx(4 / np.pi / 0.2 + np.pi, rel=0.01)
 
 
 @STEADY
@@ -234,8 +234,8 @@ def test_passive_friction_takes_energy(
     """sigma_2 > sigma_1 (F_s - F_c)/F_c (Astrom & Canudas de Wit 2008)."""
     viscous = more * damping * (1 - share) / share
     flat = changed(LAWS["lugre"], static=1.0, coulomb=share, bristle_damping=damping, viscous=viscous)
-    (found,) = of(flat, amplitude, frequency)
-    assert np.imag(found) > 0
+    (value,) = of(flat, amplitude, frequency)
+    assert np.imag(value) > 0
 
 
 @STEADY
@@ -257,10 +257,10 @@ def test_units(amplitude: float, frequency: float, length: float, force: float, 
 
 def test_sinusoids_lose_energy_although_the_thesis_values_are_not_passive() -> None:
     """At all amplitudes and frequencies looked at; as a spring, friction is negative at some of them."""
-    found = describing(rigid(LAWS["lugre"]), np.geomspace(1e-8, 1e-1, 29), np.geomspace(0.1, 200, 15))
-    assert set(np.ravel(found["status"])) == {"done"}
-    assert float(found["work"].min()) > 0
-    assert float(np.real(found["stiffness"]).min()) < 0
+    responses = describing(rigid(LAWS["lugre"]), np.geomspace(1e-8, 1e-1, 29), np.geomspace(0.1, 200, 15))
+    assert set(np.ravel(responses["status"])) == {"done"}
+    assert float(responses["work"].min()) > 0
+    assert float(np.real(responses["stiffness"]).min()) < 0
 
 
 def test_friction_may_differ_from_pair_to_pair() -> None:
@@ -291,9 +291,9 @@ def test_bad_input(ask: Callable[[], object], refused: Refused) -> None:
 
 def test_a_state_that_does_not_close_is_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("friso.frequency.describing.steady.ROUNDS", 1)
-    found = describing(rigid(LAWS["lugre"]), [1e-5], [1.0])
-    assert found["status"].item().startswith("no periodic steady state")
-    assert np.isnan(found["stiffness"].item())
+    responses = describing(rigid(LAWS["lugre"]), [1e-5], [1.0])
+    assert responses["status"].item().startswith("no periodic steady state")
+    assert np.isnan(responses["stiffness"].item())
 
 
 # the plant
@@ -306,15 +306,15 @@ def compliance(frequency: float) -> complex:
 
 
 def test_small_forces_see_the_bristles() -> None:
-    found = plant_response(rigid(LAWS["lugre"]), [1e-4], [1.0, 38.0, 200.0])
+    response = plant_response(rigid(LAWS["lugre"]), [1e-4], [1.0, 38.0, 200.0])
     expected = [compliance(frequency) for frequency in (1.0, 38.0, 200.0)]
-    assert found["up"].values[0] == pytest.approx(np.array(expected), rel=1e-4)
+    assert response["up"].values[0] == pytest.approx(np.array(expected), rel=1e-4)
 
 
 def test_large_forces_see_the_mass() -> None:
-    found = plant_response(rigid(LAWS["lugre"]), [300.0], [5.0])
+    response = plant_response(rigid(LAWS["lugre"]), [300.0], [5.0])
     omega = 2 * np.pi * 5
-    assert found["up"].item() == pytest.approx(1 / (-1.7 * omega**2 + 0.5j * omega), rel=0.01)
+    assert response["up"].item() == pytest.approx(1 / (-1.7 * omega**2 + 0.5j * omega), rel=0.01)
 
 
 def driven(force: Callable[[float], float], frequency: float, start: list[float], cycles: int) -> complex:
@@ -336,9 +336,9 @@ def driven(force: Callable[[float], float], frequency: float, start: list[float]
 )
 def test_response_against_simulation(size: float, frequency: float, error: float) -> None:
     """The first harmonic alone acts on the friction: a few percent (docs/describing.md has the table)."""
-    found = plant_response(rigid(LAWS["lugre"]), [size], [frequency])
-    assert found["answers"].item() == 1
-    start = complex(size * found["up"].item())
+    response = plant_response(rigid(LAWS["lugre"]), [size], [frequency])
+    assert response["answers"].item() == 1
+    start = complex(size * response["up"].item())
     velocity = (2j * np.pi * frequency * start).real
     simulated = driven(lambda _: size, frequency, [start.real, velocity, 0.0], 20)
     assert abs(start / simulated - 1) < error
@@ -346,10 +346,10 @@ def test_response_against_simulation(size: float, frequency: float, error: float
 
 def test_two_motions_under_one_force() -> None:
     """1.8 N at 5 Hz: stuck if it comes from rest, sliding if it slid before, and nothing between that lasts."""
-    found = plant_response(rigid(LAWS["lugre"]), [1.8], [5.0]).squeeze()
-    assert found["lasting"].values.tolist() == [1.0, 0.0, 1.0]
-    assert np.max(found["error"]) < 1e-9
-    stuck, _, sliding = 1.8 * found["response"].values
+    result = plant_response(rigid(LAWS["lugre"]), [1.8], [5.0]).squeeze()
+    assert result["lasting"].values.tolist() == [1.0, 0.0, 1.0]
+    assert np.max(result["error"]) < 1e-9
+    stuck, _, sliding = 1.8 * result["response"].values
     from_rest = driven(lambda t: 1.8 * min(1.0, t * 5 / 20), 5.0, [0.0, 0.0, 0.0], 60)
     start = [sliding.real, (10j * np.pi * sliding).real, 0.0]
     assert abs(from_rest / stuck - 1) < 0.15  # near break-away, of which the first harmonic knows little: it is 0.142
@@ -373,16 +373,16 @@ def test_answers_do_not_depend_on_what_else_is_asked(forces: list[float], freque
 
 def test_stuck_answer_of_slow_forces() -> None:
     """1.8 N from rest bends the bristles, however slowly and however much more another force is."""
-    found = plant_response(rigid(LAWS["lugre"]), [1.8, 1000.0], [0.1])
-    assert found["lasting"].values[0, 0].tolist() == [1.0, 0.0, 1.0]
-    assert abs(found["up"].values[0, 0]) == pytest.approx(1.13e-5, rel=1e-2)
+    response = plant_response(rigid(LAWS["lugre"]), [1.8, 1000.0], [0.1])
+    assert response["lasting"].values[0, 0].tolist() == [1.0, 0.0, 1.0]
+    assert abs(response["up"].values[0, 0]) == pytest.approx(1.13e-5, rel=1e-2)
 
 
 def test_absurd_forces_and_frequencies_have_a_status() -> None:
-    found = plant_response(rigid(LAWS["lugre"]), [1e-300, 1.0, 1e300], [1e-6, 1.0, 1e6])
-    assert set(np.ravel(found["status"].values[[0, 2]])) == {NOT_FOUND}
-    assert np.all(np.isnan(found["up"].values[[0, 2]]))
-    assert set(found["status"].values[1]) == {"done"}
+    response = plant_response(rigid(LAWS["lugre"]), [1e-300, 1.0, 1e300], [1e-6, 1.0, 1e6])
+    assert set(np.ravel(response["status"].values[[0, 2]])) == {NOT_FOUND}
+    assert np.all(np.isnan(response["up"].values[[0, 2]]))
+    assert set(response["status"].values[1]) == {"done"}
 
 
 def test_missing_answers_are_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -392,17 +392,17 @@ def test_missing_answers_are_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
         return np.where(amplitudes < 1e-4, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
 
     monkeypatch.setattr("friso.frequency.describing.driven.dynamic_stiffness", partly)
-    found = plant_response(rigid(LAWS["lugre"]), [1.0, 1.8], [5.0])
-    assert set(np.ravel(found["status"])) <= {MISSING, NOT_FOUND}
-    assert np.isnan(found["up"].values[0, 0])
+    response = plant_response(rigid(LAWS["lugre"]), [1.0, 1.8], [5.0])
+    assert set(np.ravel(response["status"])) <= {MISSING, NOT_FOUND}
+    assert np.isnan(response["up"].values[0, 0])
 
 
 def test_an_analyser_shows_the_branch_it_comes_from() -> None:
-    found = plant_response(rigid(LAWS["lugre"]), [2.0], np.geomspace(1, 20, 30))
-    several = found["answers"].values[0] == 3
+    response = plant_response(rigid(LAWS["lugre"]), [2.0], np.geomspace(1, 20, 30))
+    several = response["answers"].values[0] == 3
     assert several.any()
     assert not several.all()
-    up, down = np.abs(found["up"].values[0]), np.abs(found["down"].values[0])
+    up, down = np.abs(response["up"].values[0]), np.abs(response["down"].values[0])
     assert np.all(down[several] > 10 * up[several])
     assert up[~several] == pytest.approx(down[~several])
 
@@ -412,10 +412,10 @@ JOINED = stage(HOLD, masses="both", friction=lugre(2), joint=free("100 mm"), con
 
 def against_simulation(size: float, frequency: float, cycles: int = 25) -> complex:
     """Response of stage and cart on a free joint over that of the equations (LSODA) in the last of so many cycles."""
-    found, flat, samples = plant_response(JOINED, [size], [frequency]), JOINED.flat(), 512
+    result, flat, samples = plant_response(JOINED, [size], [frequency]), JOINED.flat(), 512
     omega, cart, moved = (
         2 * np.pi * frequency,
-        *(size * found[n].values[0, 0, 0] for n in ("cart_response", "response")),
+        *(size * result[n].values[0, 0, 0] for n in ("cart_response", "response")),
     )
 
     def rates(t: float, y: np.ndarray) -> list[float]:
@@ -453,7 +453,7 @@ def test_free_joint_has_its_resonances_and_its_stroke() -> None:
 
 def test_mass_line_scatters_where_friction_matters() -> None:
     places = [{"friction.static": f"{level!r} N", "friction.coulomb": f"{level / 3!r} N"} for level in (1.0, 1.75, 2.5)]
-    found = mass_line(rigid(LAWS["lugre"]), places, [3.0], [20.0, 400.0])
-    assert float(found["spread_magnitude"].values[0, 0]) > 0.02
-    assert float(found["spread_magnitude"].values[0, 1]) < 1e-3
-    assert found["magnitude"].values[:, 0, 1] == pytest.approx(np.ones(3), abs=0.03)
+    line = mass_line(rigid(LAWS["lugre"]), places, [3.0], [20.0, 400.0])
+    assert float(line["spread_magnitude"].values[0, 0]) > 0.02
+    assert float(line["spread_magnitude"].values[0, 1]) < 1e-3
+    assert line["magnitude"].values[:, 0, 1] == pytest.approx(np.ones(3), abs=0.03)

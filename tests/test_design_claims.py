@@ -70,9 +70,9 @@ def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
 
 
 def test_the_leaf_springs_of_the_thesis() -> None:
-    found = registered()["S35"].judge(Evidence({}, {}))
-    assert found.judgement == "holds", found
-    stiffness, first, parasitic, stress = (part.number for part in found.parts)
+    result = registered()["S35"].judge(Evidence({}, {}))
+    assert result.judgement == "holds", result
+    stiffness, first, parasitic, stress = (part.number for part in result.parts)
     assert "2238 to 2541 N/m" in stiffness
     assert first.startswith("10.5")
     assert first.endswith("11.27 Hz")

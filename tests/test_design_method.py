@@ -73,15 +73,15 @@ def tables(*names: str) -> dict[str, object]:
 def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> None:
     """No candidate is beaten in both, all meet the requirements, and no random geometry beats one by a tenth."""
     stiffness, frequency = (
-        np.array([getattr(each, name) for each in candidates]) for name in ("stiffness", "frequency")
+        np.array([getattr(candidate, name) for candidate in candidates]) for name in ("stiffness", "frequency")
     )
     assert np.all(np.diff(stiffness) >= 0)
     assert np.all(np.diff(frequency) >= -1e-9 * frequency[:-1])
-    wanted = [each for each in requirements(task) if each.name != PARASITIC]
-    found = judged(
-        task, wanted, sizes_of([each.geometry for each in candidates]), [e.geometry.sheet for e in candidates]
+    wanted = [requirement for requirement in requirements(task) if requirement.name != PARASITIC]
+    result = judged(
+        task, wanted, sizes_of([candidate.geometry for candidate in candidates]), [e.geometry.sheet for e in candidates]
     )
-    assert np.all(found.excess <= 1 + 1e-9)
+    assert np.all(result.excess <= 1 + 1e-9)
     low, high = box(SPEC)
     rng, bought = np.random.default_rng(0), sheets(SPEC)
     sizes = low + (high - low) * rng.random((20_000, 3))
@@ -108,28 +108,28 @@ def test_better_than_the_thesis_in_both(task: LeafTask, candidates: list[Candida
 def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     """The requirements, written for arrays, against the figures of one mechanism."""
     geometry = Geometry(60e-3, 20e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
-    it = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0)
-    found = closed(it, task.stroke)
-    excess = {each.name: float(each.excess(it)) for each in requirements(task)}
+    item = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0)
+    result = closed(item, task.stroke)
+    excess = {requirement.name: float(requirement.excess(item)) for requirement in requirements(task)}
     weight = 9.80665 * 0.525  # of the heaviest stage
-    assert excess["the cart must not break away inside the stroke"] == pytest.approx(1.1 * 1.1 * found.forces[-1])
+    assert excess["the cart must not break away inside the stroke"] == pytest.approx(1.1 * 1.1 * result.forces[-1])
     bent, twisted = 195e9 * 20e-3 * 0.3e-3**3 / 12, 75e9 * 20e-3 * 0.3e-3**3 / 3
     across = 1 / (2 * 9.23 * np.sqrt(bent * twisted) / 60e-3**2)  # J of a strip; 1 % less for its finite width
     assert excess["buckling under load"] == pytest.approx(
-        RESERVE * 3 * ((5 + weight) / found.buckling + across), rel=0.01
+        RESERVE * 3 * ((5 + weight) / result.buckling + across), rel=0.01
     )
-    assert found.interfering is not None
-    assert excess[PARASITIC] == pytest.approx(480 / found.interfering.frequency, rel=1e-6)
+    assert result.interfering is not None
+    assert excess[PARASITIC] == pytest.approx(480 / result.interfering.frequency, rel=1e-6)
     # a force across the leaf ends turns the stage about z: each leaf is a cantilever (by the stiffness of the stage)
-    moved = np.linalg.solve(closed_forms.stage_stiffness(it), [0, 1, 0, 0, 0, 0])
-    root = -(closed_forms.stage_stiffness(replace_leaves(it)) @ moved)[5] + 60e-3 * 0.5
+    moved = np.linalg.solve(closed_forms.stage_stiffness(item), [0, 1, 0, 0, 0, 0])
+    root = -(closed_forms.stage_stiffness(replace_leaves(item)) @ moved)[5] + 60e-3 * 0.5
     assert root == pytest.approx(0.5 * 60e-3, rel=1e-6)
     stress = 1.5 * (root * 10e-3 / (0.3e-3 * 20e-3**3 / 12) + (5 + weight) / 2 / (20e-3 * 0.3e-3))
     assert excess["fatigue limit under stroke and load"] == pytest.approx(
-        RESERVE * 1.3 * (1 / found.fatigue_margin + stress / 1.3e9)
+        RESERVE * 1.3 * (1 / result.fatigue_margin + stress / 1.3e9)
     )
     assert excess["yield strength under stroke and load"] == pytest.approx(
-        RESERVE * 1.5 * (found.clamp_stress + stress) / 1.3e9
+        RESERVE * 1.5 * (result.clamp_stress + stress) / 1.3e9
     )
 
 
@@ -153,9 +153,9 @@ def test_a_geometry_at_which_beams_fail_is_marked(
         return beams_module.beams(it, stroke)  # type: ignore[arg-type]
 
     monkeypatch.setattr(choice_module, "beams", sometimes)
-    found = list(confirmed(task, candidates))
-    assert {each.failure for each in found} == {"", "The beams gave up."}
-    assert all(np.isnan(each.frequency) == bool(each.failure) for each in found)
+    result = list(confirmed(task, candidates))
+    assert {item.failure for item in result} == {"", "The beams gave up."}
+    assert all(np.isnan(each.frequency) == bool(each.failure) for each in result)
     calls.clear()
     choice = chosen(replace(task, crossover=35.0), candidates)
     assert choice is not None
@@ -168,12 +168,12 @@ def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: py
     monkeypatch.setattr(relax_module, "GENERATIONS", 60)
     task = LeafTask(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
     assert not front(task)
-    found = {each.key: each for each in relaxations(task)}
-    assert {"load.force_x", "friction.static"} <= found.keys()
+    result = {relaxation.key: relaxation for relaxation in relaxations(task)}
+    assert {"load.force_x", "friction.static"} <= result.keys()
     for share, enough in ((1.02, True), (0.9, False)):
-        friction = 1 + (found["friction.static"].needed - 1) * share
+        friction = 1 + (result["friction.static"].needed - 1) * share
         assert bool(front(replace(task, friction=friction))) == enough
-    lighter = found["load.force_x"].needed
+    lighter = result["load.force_x"].needed
     assert front(replace(task, spec=loaded(force_x=f"{lighter * 0.97:.6g} N")))
     assert not front(replace(task, spec=loaded(force_x=f"{lighter * 1.1:.6g} N")))
 
@@ -181,7 +181,7 @@ def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: py
 def test_no_leaves_no_design(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(relax_module, "GENERATIONS", 5)
     with pytest.raises(NoDesign, match="no leaf springs"):
-        leaves(loaded(force_x="500 N"), base.flat(), 1.0, lambda *told: None)
+        leaves(loaded(force_x="500 N"), base.flat(), 1.0, lambda *labels: None)
 
 
 # --- hunting and the controller ---------------------------------------------------------------------------------------
@@ -191,31 +191,31 @@ def test_edges_are_those_that_check_finds(base: Stage) -> None:
     """Two machines without isolator, against the margin of `friso check`."""
     static, coulomb = np.array([3.0, 2.0]), np.array([1.0, 0.8])
     several = Population({"friction.static": static, "friction.coulomb": coulomb}, 2)
-    found = edges_over(rigid(base.flat()), several, 2.0, 40.0, 10)
+    edges = edges_over(rigid(base.flat()), several, 2.0, 40.0, 10)
     whole = friso.load(EXAMPLES / "thesis_rig.toml").replace({"joint": None, "parasitic": None})
     for k in range(2):
         stage = whole.with_numbers({**several.of(k), "controller.crossover": 5.0})
-        known = margin(stage, attracting=True)
-        assert known is not None
-        assert found.edges[k] == pytest.approx(known.crossover, rel=0.02)
-    assert found.highest == found.edges.max()
+        edge = margin(stage, attracting=True)
+        assert edge is not None
+        assert edges.edges[k] == pytest.approx(edge.crossover, rel=0.02)
+    assert edges.highest == edges.edges.max()
 
 
 def test_corners_hunt_as_long_as_anything_attracts() -> None:
     """The symmetric cycle of this stage repels from 11.97 Hz on; beside it one that is not attracts up to 13.03 Hz, as
     simulations at 1e-7 and 1e-9 show."""
     one = Population({"masses.cart": np.array([2.6276])}, 1)
-    found = edges_over(CREEPING.flat(), one, 12.1, 20.0, 8)
-    assert found.edges[0] == pytest.approx(13.03, rel=0.01)
-    assert found.unknown == 0
+    edges = edges_over(CREEPING.flat(), one, 12.1, 20.0, 8)
+    assert edges.edges[0] == pytest.approx(13.03, rel=0.01)
+    assert edges.unknown == 0
 
 
 def test_corners_without_hunting_and_with_no_end() -> None:
-    some = Population({}, 3)
-    none = Corners(some, np.zeros(3), (1.0, 40.0))
+    part = Population({}, 3)
+    none = Corners(part, np.zeros(3), (1.0, 40.0))
     assert not none.hunts
     assert none.highest == 1.0
-    endless = Corners(some, np.array([0.0, np.inf, 3.0]), (1.0, 40.0), unknown=1)
+    endless = Corners(part, np.array([0.0, np.inf, 3.0]), (1.0, 40.0), unknown=1)
     assert endless.hunts
     assert endless.worst == 1
     assert np.isinf(endless.highest)
@@ -223,10 +223,10 @@ def test_corners_without_hunting_and_with_no_end() -> None:
 
 def test_a_stage_that_never_hunts_has_no_edge(base: Stage) -> None:
     """Almost no gap: no cycle attracts anywhere, and none is searched for between."""
-    some = Population({"friction.coulomb": np.array([2.999, 2.998])}, 2)
-    found = edges_over(rigid(base.flat()), some, 4.0, 40.0, 3)
-    assert not found.hunts
-    assert found.highest == 4.0
+    part = Population({"friction.coulomb": np.array([2.999, 2.998])}, 2)
+    edges = edges_over(rigid(base.flat()), part, 4.0, 40.0, 3)
+    assert not edges.hunts
+    assert edges.highest == 4.0
 
 
 def test_modes_count_in_the_margin(base: Stage, task: LeafTask) -> None:
@@ -234,8 +234,8 @@ def test_modes_count_in_the_margin(base: Stage, task: LeafTask) -> None:
     other the loop is found unstable, as the poles of the state space are."""
     leaves_ = Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
     stage = with_leaves(base, leaves_, 1e-3).replace({"controller.crossover": "40 Hz"})
-    found = beams_module.beams(Mechanism.of(stage.flat()), 1e-3)
-    assert Modal.of(stage.flat(), found).margin(np.array([40.0]))[0] == pytest.approx(
+    result = beams_module.beams(Mechanism.of(stage.flat()), 1e-3)
+    assert Modal.of(stage.flat(), result).margin(np.array([40.0]))[0] == pytest.approx(
         settled_margin(stage.flat()), rel=0.01
     )
     opposite = stage.replace({"flexure.actuation_y": "30 mm", "flexure.sensor_y": "-30 mm"})
@@ -251,7 +251,7 @@ def rightmost(stage: Stage, leaves_: Evaluation) -> float:
     """Real part [1/s] of the rightmost closed-loop pole with all modes, over the stuck and the sliding cart."""
     rigid_joint = {key: float(stage.flat()[key]) for key in ("joint.stiffness",)}
     bare = stage.replace({"flexure": None, **{key: f"{value!r} N/m" for key, value in rigid_joint.items()}})
-    found = []
+    result = []
     for state in ("stuck", "sliding"):
         plant = friso.linear(bare, state)["stage", "force"]
         for mode in leaves_.modes[1:]:
@@ -260,8 +260,8 @@ def rightmost(stage: Stage, leaves_: Evaluation) -> float:
             plant = plant + control.ss(swing, [[0], [1]], [[mode.actuator * mode.sensor, 0]], [[0]])
         k_p, tau_z, tau_i, tau_p = (getattr(tuned_gains(stage), name) for name in ("k_p", "tau_z", "tau_i", "tau_p"))
         loop = control.tf(k_p * np.array([tau_z, 1 + tau_z / tau_i, 1 / tau_i]), [tau_p, 1, 0])
-        found.append(control.feedback(plant * control.tf2ss(loop), 1).poles().real.max())
-    return max(found)
+        result.append(control.feedback(plant * control.tf2ss(loop), 1).poles().real.max())
+    return max(result)
 
 
 def tuned_gains(stage: Stage) -> Tuning:
@@ -272,16 +272,18 @@ def tuned_gains(stage: Stage) -> Tuning:
 def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
     stage = stage.replace({"controller.crossover": "40 Hz"})
-    found = limits(stage.flat())
-    assert comfortable_below(found.comfortable, 43.0) == pytest.approx(43.0)
-    assert comfortable_below(found.comfortable, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
-    known = controller(stage, beams_module.beams(Mechanism.of(stage.flat()), 1e-3), found, corners(SPEC, stage.flat()))
-    assert known.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
-    assert known.margin >= 0.5
-    worth = known.damping.worth
-    assert known.damping.margins[worth] >= 0.95 * known.damping.margins.max()
+    loop_limits = limits(stage.flat())
+    assert comfortable_below(loop_limits.comfortable, 43.0) == pytest.approx(43.0)
+    assert comfortable_below(loop_limits.comfortable, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
+    expected = controller(
+        stage, beams_module.beams(Mechanism.of(stage.flat()), 1e-3), loop_limits, corners(SPEC, stage.flat())
+    )
+    assert expected.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
+    assert expected.margin >= 0.5
+    worth = expected.damping.worth
+    assert expected.damping.margins[worth] >= 0.95 * expected.damping.margins.max()
     assert np.all(np.diff(dampings(stage.flat())) > 0)
-    assert known.gains.k_p == pytest.approx(1.7 * (2 * np.pi * 40) ** 2 / np.sqrt(10), rel=1e-6)
+    assert expected.gains.k_p == pytest.approx(1.7 * (2 * np.pi * 40) ** 2 / np.sqrt(10), rel=1e-6)
 
 
 def test_the_least_friction_is_that_of_the_range(base: Stage) -> None:
@@ -307,11 +309,11 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
     rig = friso.load(EXAMPLES / "thesis_rig.toml")
     flat = rig.flat()
     for held, hunts in ((True, True), (False, False)):
-        found = tried({**flat, "joint.locked": held}, 1, 1e-6)
-        assert found.tried == 1
-        assert (found.words[0] == "swings") == hunts
+        result = tried({**flat, "joint.locked": held}, 1, 1e-6)
+        assert result.tried == 1
+        assert (result.words[0] == "swings") == hunts
     within, _ = measured_run(rig.replace({"joint.locked": False}), RTOL).settling_time
-    assert found.settling[0] == pytest.approx(within[0], rel=1e-4)
+    assert result.settling[0] == pytest.approx(within[0], rel=1e-4)
 
 
 def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -319,25 +321,25 @@ def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatc
 
     monkeypatch.setattr(module, "MACHINES", 200)
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
-    found = verification(stage.replace({"controller.crossover": "9 Hz"}), SPEC, 0.3, lambda *told: None)
-    assert found.free.tried == found.locked.tried == 200
-    assert found.free.missed == 0
-    assert found.locked.missed >= found.locked.swinging > 20
-    low, high = found.free.interval
+    outcomes = verification(stage.replace({"controller.crossover": "9 Hz"}), SPEC, 0.3, lambda *labels: None)
+    assert outcomes.free.tried == outcomes.locked.tried == 200
+    assert outcomes.free.missed == 0
+    assert outcomes.locked.missed >= outcomes.locked.swinging > 20
+    low, high = outcomes.free.interval
     assert low == 0
     assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
-    worst = found.free.worst
-    again = tried({**found.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
-    assert again.settling[0] == pytest.approx(found.free.settling[worst], rel=1e-3)
+    worst = outcomes.free.worst
+    again = tried({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
+    assert again.settling[0] == pytest.approx(outcomes.free.settling[worst], rel=1e-3)
 
 
 def test_an_outcome_ranks_what_does_not_rest_before_slow_settling() -> None:
-    found = MachineOutcomes(
+    result = MachineOutcomes(
         np.array(["rests", "swings", "creeps", "rests"], dtype=object),
         np.array([0.1, np.nan, np.nan, 3.0]),
         np.array([0, 1e-3, 2e-3, 0]),
     )
-    assert found.worst == 2
-    assert (found.missed, found.swinging) == (2, 1)
-    assert found.slower_than(0.05) == np.inf
-    assert replace(found, words=np.full(4, "rests"), settling=np.array([0.1, 0.2, 0.3, 3.0])).worst == 3
+    assert result.worst == 2
+    assert (result.missed, result.swinging) == (2, 1)
+    assert result.slower_than(0.05) == np.inf
+    assert replace(result, words=np.full(4, "rests"), settling=np.array([0.1, 0.2, 0.3, 3.0])).worst == 3

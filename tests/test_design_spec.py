@@ -93,32 +93,32 @@ def test_a_missing_file_and_an_empty_one(tmp_path: Path, refused: Refused) -> No
 
 
 def test_corners_hold_the_ends_of_all_ranges(rig: friso.Stage) -> None:
-    found = corners(load_spec(SPEC), rig.flat())
-    static, coulomb = found.keys["friction.static"], found.keys["friction.coulomb"]
-    assert found.count == 3 * 3 * 2
+    result = corners(load_spec(SPEC), rig.flat())
+    static, coulomb = result.keys["friction.static"], result.keys["friction.coulomb"]
+    assert result.count == 3 * 3 * 2
     assert (static.min(), static.max()) == (1, 3)
     gap = (static - coulomb) / static
     assert (gap.min(), gap.max()) == pytest.approx((0.3, 0.85))
-    assert set(np.round(found.keys["masses.stage"], 6)) == {0.475, 0.525}
+    assert set(np.round(result.keys["masses.stage"], 6)) == {0.475, 0.525}
 
 
 def test_drawn_machines_lie_in_all_ranges(rig: friso.Stage) -> None:
     spec = load_spec(SPEC)
     flat = rig.flat()
-    found = sampled(spec, flat, 500, 0.3)
-    factors = found.keys["joint.stiffness"] / flat["joint.stiffness"]
+    samples = sampled(spec, flat, 500, 0.3)
+    factors = samples.keys["joint.stiffness"] / flat["joint.stiffness"]
     assert (factors.min(), factors.max()) == pytest.approx((0.9 * 0.7, 1.1), abs=5e-3)
-    travel = found.keys["motion.acceleration"] * found.keys["motion.acceleration_time"] ** 2
+    travel = samples.keys["motion.acceleration"] * samples.keys["motion.acceleration_time"] ** 2
     assert travel.min() >= 1e-3 * (1 - 1e-9)
     assert travel.max() <= 0.1 * (1 + 1e-9)
-    assert np.all(found.keys["friction.coulomb"] < found.keys["friction.static"])
+    assert np.all(samples.keys["friction.coulomb"] < samples.keys["friction.static"])
     again = sampled(spec, flat, 500, 0.3)
-    assert all(np.array_equal(found.keys[key], again.keys[key]) for key in found.keys)
+    assert all(np.array_equal(samples.keys[key], again.keys[key]) for key in samples.keys)
 
 
 def test_coulomb_friction_never_exceeds_the_static_one(rig: friso.Stage) -> None:
-    found = sampled(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
-    assert np.all(found.keys["friction.coulomb"] <= found.keys["friction.static"])
+    samples = sampled(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
+    assert np.all(samples.keys["friction.coulomb"] <= samples.keys["friction.static"])
 
 
 def test_the_typical_move_is_in_the_middle() -> None:
@@ -186,6 +186,6 @@ def test_a_prepared_stage_takes_leaves(rig: friso.Stage) -> None:
 def test_rounded_sizes_stay_in_the_space() -> None:
     spec = load_spec(SPEC)
     near = rounded(spec, Geometry(69.97e-3, 15.02e-3, 40.04e-3, sheets(spec)[0]), 1e-4)
-    assert {round(each.length * 1e3, 3) for each in near} == {69.9, 70.0}
+    assert {round(item.length * 1e3, 3) for item in near} == {69.9, 70.0}
     assert {round(each.width * 1e3, 3) for each in near} == {15.0, 15.1}
     assert len(near) == 8

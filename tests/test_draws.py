@@ -38,36 +38,36 @@ def fate(stage: Stage, count: int, seed: int = 0) -> tuple[Fates, Sample]:
 
 def test_half_of_the_stages_about_the_edge_hunt(rig: Stage) -> None:
     """Those below it have a cycle that attracts, and no other."""
-    found, drawn = fate(locked(rig, "9.75 Hz +/- 1.5 Hz"), 16)
+    outcome, drawn = fate(locked(rig, "9.75 Hz +/- 1.5 Hz"), 16)
     clear = np.abs(drawn.keys[CROSSOVER] - EDGE) > 0.04  # so near, friso check too takes a transient for hunting
     assert clear.sum() >= 14
     below = drawn.keys[CROSSOVER] < EDGE
-    assert np.array_equal(np.isin(found.verdicts, ATTRACTED)[clear], below[clear])
-    share = found.share(ATTRACTED)
+    assert np.array_equal(np.isin(outcome.verdicts, ATTRACTED)[clear], below[clear])
+    share = outcome.share(ATTRACTED)
     assert share.probability == pytest.approx(0.5, abs=0.1)
     assert share.low < 0.5 < share.high
-    assert found.separations(drawn.keys)[CROSSOVER] == pytest.approx(-1, abs=0.05)
+    assert outcome.separations(drawn.keys)[CROSSOVER] == pytest.approx(-1, abs=0.05)
 
 
 @pytest.mark.parametrize(("crossover", "words"), [("8 Hz +/- 2 %", ATTRACTED), ("20 Hz .. 22 Hz", ("settles",))])
 def test_all_stages_far_from_the_edge_share_their_fate(rig: Stage, crossover: str, words: tuple[str, ...]) -> None:
-    found, drawn = fate(locked(rig, crossover), 8)
-    assert found.share(words).probability == 1
-    assert found.share(words).low == pytest.approx(0.025 ** (1 / 8), rel=1e-6)
-    assert found.share(words).high == 1
-    assert found.separations(drawn.keys) == {}
+    outcome, drawn = fate(locked(rig, crossover), 8)
+    assert outcome.share(words).probability == 1
+    assert outcome.share(words).low == pytest.approx(0.025 ** (1 / 8), rel=1e-6)
+    assert outcome.share(words).high == 1
+    assert outcome.separations(drawn.keys) == {}
 
 
 @pytest.mark.usefixtures("own_bandwidth")
 def test_verdicts_are_those_of_single_stages(rig: Stage) -> None:
     """The slow twin: friso check on each of the stages that were drawn."""
     stage = locked(rig, "6 Hz .. 14 Hz").replace({"friction.static": "2.5 N +/- 0.5 N"})
-    found, drawn = fate(stage, 3, seed=3)
+    outcome, drawn = fate(stage, 3, seed=3)
     alone = [
         friso.check(stage.with_numbers({key: float(values[k]) for key, values in drawn.keys.items()}))["given"].verdict
         for k in range(drawn.count)
     ]
-    assert found.verdicts.tolist() == alone
+    assert outcome.verdicts.tolist() == alone
     assert len(set(alone)) > 1
 
 
@@ -75,23 +75,23 @@ def test_cases_and_seeds(rig: Stage) -> None:
     """The free joint settles where the locked one hunts; "given" is the free one; the same seed, the same verdicts."""
     stage = rig.replace({CROSSOVER: "8 Hz +/- 1 %"})
     drawn, steps = draw(stage, Correlations(), 4, seed=1), []
-    found = fates(stage, drawn, 1e-6, lambda *step: steps.append(step))
+    result = fates(stage, drawn, 1e-6, lambda *step: steps.append(step))
     assert steps[-1][:2] == (8, 8)
     assert len(different(stage)) == 2
-    assert found["given"] is found["free"]
-    assert found["free"].counts["settles"] == 4
-    assert found["locked"].share(ATTRACTED).probability == 1
+    assert result["given"] is result["free"]
+    assert result["free"].counts["settles"] == 4
+    assert result["locked"].share(ATTRACTED).probability == 1
     again = fates(stage, draw(stage, Correlations(), 4, seed=1), 1e-6)
-    assert all(np.array_equal(again[name].verdicts, found[name].verdicts) for name in found)
+    assert all(np.array_equal(again[name].verdicts, result[name].verdicts) for name in result)
 
 
 def test_a_stage_that_cannot_hunt_settles(rig: Stage) -> None:
     """Its reference never stands still: it may stick and slip, but hunts about no place."""
     ramp = {"motion": {"kind": "ramp", "velocity": "0.1 m/s", "duration": "20 s"}}
     stage = locked(rig, "8 Hz +/- 1 %")
-    found, drawn = fate(stage.replace(ramp), 8)
-    assert found.verdicts[0] == friso.check(stage.replace(ramp)).popitem()[1].verdict
-    assert found.share(ATTRACTED).probability == 0
+    outcome, drawn = fate(stage.replace(ramp), 8)
+    assert outcome.verdicts[0] == friso.check(stage.replace(ramp)).popitem()[1].verdict
+    assert outcome.share(ATTRACTED).probability == 0
     assert drawn.count == 8
 
 
@@ -114,16 +114,16 @@ def test_failures_widen_the_interval() -> None:
 
 
 def test_the_decisive_key_comes_first() -> None:
-    found, rng = made(50, 50, 4), np.random.default_rng(0)
+    result, rng = made(50, 50, 4), np.random.default_rng(0)
     keys = {
         "nothing": rng.normal(size=104),
         "falls": np.arange(104.0),
         "some": np.r_[rng.normal(0.5, 1, 50), rng.normal(0, 1, 54)],
     }
-    known = found.separations(keys)
-    assert list(known) == ["falls", "some", "nothing"]
-    assert known["falls"] == -1
-    assert 0.1 < known["some"] < 0.5
+    separation = result.separations(keys)
+    assert list(separation) == ["falls", "some", "nothing"]
+    assert separation["falls"] == -1
+    assert 0.1 < separation["some"] < 0.5
 
 
 def draws(found: Fates) -> Draws:
@@ -178,9 +178,9 @@ def test_check_draws(
     beside.write_text('keys = ["friction.static", "friction.coulomb"]\nmatrix = [[1, 1], [1, 1]]')
     options = ("--draws", "8", "--json", "--set", "friction.coulomb=1 N", "--out", tmp_path / "out")
     assert run(monkeypatch, "check", path, *options) == 0
-    said = capsys.readouterr()
-    assert "centre" not in said.err
-    draws = json.loads(said.out)["cases"]["given"]["draws"]
+    streams = capsys.readouterr()
+    assert "centre" not in streams.err
+    draws = json.loads(streams.out)["cases"]["given"]["draws"]
     assert set(draws["verdicts"]) == set(VERDICTS)
     assert sum(draws["verdicts"].values()) == 8
     assert draws["attracting_cycle"]["probability"] == 0

@@ -116,7 +116,7 @@ def test_parasitic_modes_in_words(snapshots: Snapshots) -> None:
         ParasiticLimits(300.0, 0.01, (0.1, 69.9), (3.82, 14.2)),
         ParasiticLimits(100.0, 0.001, None, None),
     ]
-    said = parasitic_sentences(modes)
+    texts = parasitic_sentences(modes)
     facts = (
         ("0.1 Hz", "69.2 to 69.9 Hz", "1.45 to 4.29"),
         ("locked", "0.001"),
@@ -124,5 +124,5 @@ def test_parasitic_modes_in_words(snapshots: Snapshots) -> None:
         ("free", "0.001"),
         ("1.45 to 21.1",),
     )
-    assert [fact for row, text in zip(facts, said, strict=True) for fact in row if fact not in text] == []
-    snapshots.check("guideline", "parasitic modes", "\n".join(said))
+    assert [fact for row, text in zip(facts, texts, strict=True) for fact in row if fact not in text] == []
+    snapshots.check("guideline", "parasitic modes", "\n".join(texts))

@@ -241,8 +241,8 @@ def test_arrays_are_one_by_one(many: list[Mechanism]) -> None:
     assert np.allclose(frequencies, [closed_forms.modes(alone)[0] for alone in many], rtol=1e-7, atol=0)
     assert np.allclose(first_interfering(arrays), [first_interfering(alone) for alone in many], rtol=1e-7)
     assert np.allclose(parasitic_mode(arrays), np.transpose([parasitic_mode(alone) for alone in many]), rtol=1e-7)
-    for k, each in enumerate(many):
-        assert closed_forms.drive_stiffness(arrays.member(k)) == closed_forms.drive_stiffness(each)
+    for k, item in enumerate(many):
+        assert closed_forms.drive_stiffness(arrays.member(k)) == closed_forms.drive_stiffness(item)
 
 
 def displacements(springs: Mechanism, s: np.ndarray) -> np.ndarray:

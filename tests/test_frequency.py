@@ -70,8 +70,8 @@ def test_low_frequency_stiffness_is_both_springs_in_a_row(rig: Stage) -> None:
 
 @pytest.mark.parametrize(("case", "frequency", "mass"), [("stuck", 60, 0.5), ("sliding", 60, 0.5), ("sliding", 1, 1.7)])
 def test_mass_lines(rig: Stage, case: str, frequency: float, mass: float) -> None:
-    found = 1 / (magnitude(friso.linear(rig, case), "stage", frequency) * (HZ * frequency) ** 2)
-    assert found == pytest.approx(mass, rel=0.05)
+    result = 1 / (magnitude(friso.linear(rig, case), "stage", frequency) * (HZ * frequency) ** 2)
+    assert result == pytest.approx(mass, rel=0.05)
 
 
 def test_joint_deflection_is_the_difference(rig: Stage) -> None:
@@ -107,7 +107,7 @@ def jacobian(flat: dict, one: Members) -> np.ndarray:
     modes = {"forward": 1.0, "stroke_ahead": float(one.touched[0])}
     modes |= {switch.name: float(not one.stuck[0]) for switch in model.switches}
     here |= {kink.beyond: modes.get(kink.name, 0.0) for kink in model.kinks}
-    rates = {str(each.symbol): each.derivative for each in model.states}
+    rates = {str(state.symbol): state.derivative for state in model.states}
     numbers = {key: flat[str(key)] for key in sp.Matrix(model.rhs).free_symbols if str(key) in flat}
     if "bristle_deflection" in rates:
         z = sp.Symbol("bristle_deflection", real=True)
@@ -121,8 +121,8 @@ def jacobian(flat: dict, one: Members) -> np.ndarray:
 def test_stuck_under_a_bias_force(rig: Stage, share: float) -> None:
     """(1 - F_d/F_s)(sigma_1 s + sigma_0) over the displacement (Astrom, Canudas de Wit 2008), and viscous friction."""
     s = 1j * np.geomspace(0.1, 1e4, 20)
-    found = impedance(rig.flat(), member(bias=share * 3.0), s)[0] * s
-    assert found == pytest.approx((1 - share) * (1e5 + np.sqrt(1e5) * s) + 0.5 * s, rel=1e-12)
+    result = impedance(rig.flat(), member(bias=share * 3.0), s)[0] * s
+    assert result == pytest.approx((1 - share) * (1e5 + np.sqrt(1e5) * s) + 0.5 * s, rel=1e-12)
 
 
 @pytest.mark.parametrize("speed", [1e-5, 1e-3, 1.6e-3, 0.1])
@@ -177,18 +177,18 @@ LIGHT = {
 def test_scan_finds_what_exact_margins_find(rig: Stage, stage: dict, drive: dict) -> None:
     flat = rig.replace({**stage, **drive}).flat()
     members = family(flat, 21, 9)
-    found = scan(flat, members)
+    scanned = scan(flat, members)
     exact = [margins(flat, members[k]) for k in range(len(members))]
-    assert found.stable.tolist() == [each.stable for each in exact]
+    assert scanned.stable.tolist() == [item.stable for item in exact]
     distance = np.array([each.modulus_margin for each in exact])
-    stable = found.stable
-    assert found.distance[stable] == pytest.approx(distance[stable], rel=0.03)
-    assert found.distance[found.worst(stable)] == pytest.approx(np.nanmin(distance), rel=1e-6)
+    stable = scanned.stable
+    assert scanned.distance[stable] == pytest.approx(distance[stable], rel=0.03)
+    assert scanned.distance[scanned.worst(stable)] == pytest.approx(np.nanmin(distance), rel=1e-6)
 
 
 def test_exponentials() -> None:
     matrices = np.random.default_rng(0).normal(size=(30, 6, 6)) * np.geomspace(1e-3, 10, 30)[:, None, None]
-    expected = np.array([expm(each) for each in matrices])
+    expected = np.array([expm(matrice) for matrice in matrices])
     scale = np.abs(expected).max(axis=(1, 2))
     assert np.all(np.abs(exponentials(matrices) - expected).max(axis=(1, 2)) < 1e-10 * scale)
 
@@ -218,14 +218,14 @@ CASES = ("stuck", "sliding", "stuck-touched", "sliding-touched")
 def growing(flat: dict, one: Members) -> int:
     """Closed-loop poles in the right half-plane of a loop in continuous time, by how often 1 + L turns round 0 along a
     line just right of the imaginary axis (Nyquist), with the delay as it is."""
-    known = poles(flat, one, DriveTiming(0.0, 0.0))
-    aside = 1e-3 * np.abs(known.closed).min()
-    resonant = np.abs(np.concatenate([known.closed[0], known.cut[0]]).imag)
+    exact_poles = poles(flat, one, DriveTiming(0.0, 0.0))
+    aside = 1e-3 * np.abs(exact_poles.closed).min()
+    resonant = np.abs(np.concatenate([exact_poles.closed[0], exact_poles.cut[0]]).imag)
     near = (resonant[resonant > 0][:, None] * (1 + np.linspace(-0.05, 0.05, 401))).ravel()
     omega = np.unique(np.concatenate([aside * np.geomspace(1e-3, 1e13, 20_001), near, [0.0]]))
     seen = 1 + response(flat, one, DriveTiming.of(flat))(omega - 1j * aside)
     turned = np.angle(seen[1:] / seen[:-1]).sum()
-    return int((known.cut.real > aside).sum()) - round(turned / np.pi)
+    return int((exact_poles.cut.real > aside).sum()) - round(turned / np.pi)
 
 
 @given(stages, st.sampled_from(CASES), st.sampled_from(DRIVES))
@@ -233,28 +233,28 @@ def growing(flat: dict, one: Members) -> int:
 def test_margins_take_the_loop_to_the_edge(rig: Stage, changes: dict, case: str, drive_keys: dict) -> None:
     flat = rig.replace({**changes, **drive_keys}).flat()
     one = limit_cases(flat)[case]
-    found = margins(flat, one)
+    loop_margins = margins(flat, one)
     loop, drive = open_loop(flat, one), DriveTiming.of(flat)
     at = response(flat, one, drive)
     if not drive.sample_time:
-        assert growing(flat, one) == np.count_nonzero(found.poles.real > 0)
-    if not found.stable:
+        assert growing(flat, one) == np.count_nonzero(loop_margins.poles.real > 0)
+    if not loop_margins.stable:
         return
-    for gain in (found.gain_margin, found.gain_reduction):
+    for gain in (loop_margins.gain_margin, loop_margins.gain_reduction):
         if 0 < gain < np.inf and not drive.sample_time and not drive.delay:
             moved = np.linalg.eigvals(loop.a[0] - gain * loop.b[0] @ loop.c[0])
             assert np.abs(moved.real / np.abs(moved)).min() < 1e-6
-    crossed = at(HZ * np.array(found.crossovers)) if found.crossovers else np.ones(0, complex)
+    crossed = at(HZ * np.array(loop_margins.crossovers)) if loop_margins.crossovers else np.ones(0, complex)
     assert np.abs(crossed) == pytest.approx(1, rel=1e-6)
-    if np.isfinite(found.phase_margin):
-        turn = np.exp(1j * np.radians(found.phase_margin))
+    if np.isfinite(loop_margins.phase_margin):
+        turn = np.exp(1j * np.radians(loop_margins.phase_margin))
         assert min(np.abs(1 + crossed * turn).min(), np.abs(1 + crossed / turn).min()) < 1e-6
-    if np.isfinite(found.delay_margin):
-        late = np.exp(-1j * HZ * np.array(found.crossovers) * found.delay_margin)
+    if np.isfinite(loop_margins.delay_margin):
+        late = np.exp(-1j * HZ * np.array(loop_margins.crossovers) * loop_margins.delay_margin)
         assert np.abs(1 + crossed * late).min() < 1e-6
     everywhere = np.abs(1 + at(np.geomspace(1e-3, min(1e6, drive.highest), 20001)))
-    assert found.modulus_margin <= everywhere.min() * (1 + 1e-9)
-    assert np.abs(1 + at(np.array([HZ * found.closest])))[0] == pytest.approx(found.modulus_margin)
+    assert loop_margins.modulus_margin <= everywhere.min() * (1 + 1e-9)
+    assert np.abs(1 + at(np.array([HZ * loop_margins.closest])))[0] == pytest.approx(loop_margins.modulus_margin)
 
 
 @pytest.mark.parametrize(("gain", "turns"), [(0.5, 0.5045), (0.1, 0.5304), (1.5, 0.998)])
@@ -272,30 +272,30 @@ def test_the_delay_margin_of_a_loop_that_leads(gain: float, turns: float) -> Non
     lag = np.mod(np.pi + np.angle(loop(crossed)), 2 * np.pi)  # from L down to -1
     poles = np.roots([1 + gain, 2 * zeta, 1]).astype(complex)
     omega = with_resonances(np.geomspace(1e-3, 1e3, 1000), [poles, np.roots([1, 2 * zeta, 1]).astype(complex)])
-    found = of_loop(loop, poles, float(poles.real.max()), omega, np.zeros(0, complex))
-    assert HZ * np.array(found.crossovers) == pytest.approx(np.sort(crossed), rel=1e-9)
-    assert found.delay_margin == pytest.approx((lag / crossed).min(), rel=1e-9)
+    result = of_loop(loop, poles, float(poles.real.max()), omega, np.zeros(0, complex))
+    assert HZ * np.array(result.crossovers) == pytest.approx(np.sort(crossed), rel=1e-9)
+    assert result.delay_margin == pytest.approx((lag / crossed).min(), rel=1e-9)
     assert lag[np.argmin(lag / crossed)] / (2 * np.pi) == pytest.approx(turns, abs=0.003)
 
 
 @pytest.mark.parametrize("case", CASES)
 def test_margins_against_python_control(rig: Stage, case: str) -> None:
-    found = margins(rig.flat(), limit_cases(rig.flat())[case])
+    loop_margins = margins(rig.flat(), limit_cases(rig.flat())[case])
     gain, phase, distance, *_ = control.stability_margins(friso.linear(rig, case, "open"), returnall=True)
-    assert found.phase_margin == pytest.approx(np.abs(phase).min(), rel=1e-4)
-    assert found.modulus_margin == pytest.approx(distance.min(), rel=1e-3)
+    assert loop_margins.phase_margin == pytest.approx(np.abs(phase).min(), rel=1e-4)
+    assert loop_margins.modulus_margin == pytest.approx(distance.min(), rel=1e-3)
     reductions = gain[(gain < 1) & (gain > 1e-6)]
-    assert found.gain_reduction == pytest.approx(reductions.max(initial=0), rel=1e-4)
+    assert loop_margins.gain_reduction == pytest.approx(reductions.max(initial=0), rel=1e-4)
 
 
 @pytest.mark.parametrize(("alpha", "phase", "peak"), [(0.1, 46.0, 1.37), (0.2, 29.4, 1.99)])
 def test_van_dijk_on_a_bare_mass(alpha: float, phase: float, peak: float) -> None:
-    found = friso.tuning(8.0, alpha, 2.0, 1.7)
-    assert found.margins.phase_margin == pytest.approx(phase, abs=0.05)
-    assert found.margins.peak_sensitivity == pytest.approx(peak, abs=0.005)
-    assert 1.005 < found.true_crossover / 8 < 1.08
-    assert found.tau_z / found.tau_p == pytest.approx(1 / alpha)
-    assert found.k_p == pytest.approx(1.7 * (8 * HZ) ** 2 * np.sqrt(alpha))
+    result = friso.tuning(8.0, alpha, 2.0, 1.7)
+    assert result.margins.phase_margin == pytest.approx(phase, abs=0.05)
+    assert result.margins.peak_sensitivity == pytest.approx(peak, abs=0.005)
+    assert 1.005 < result.true_crossover / 8 < 1.08
+    assert result.tau_z / result.tau_p == pytest.approx(1 / alpha)
+    assert result.k_p == pytest.approx(1.7 * (8 * HZ) ** 2 * np.sqrt(alpha))
 
 
 def test_tuning_depends_on_crossover_and_mass_by_scale_alone() -> None:
@@ -321,8 +321,8 @@ def test_a_sampled_loop_is_the_sum_of_its_aliases(rig: Stage) -> None:
     z = np.exp(1j * omega * step)
     bilinear = 2 / step * (z - 1) / (z + 1)
     compensated = -np.array([answer(w)[0, answer.input_labels.index("stage")] for w in bilinear])
-    found = response(flat, one, DriveTiming.of(flat))(omega)
-    assert found == pytest.approx(held * compensated, rel=1e-4)
+    result = response(flat, one, DriveTiming.of(flat))(omega)
+    assert result == pytest.approx(held * compensated, rel=1e-4)
 
 
 def test_sampling_ever_faster_is_continuous(rig: Stage) -> None:
@@ -345,8 +345,8 @@ def test_a_long_delay_and_a_sharp_mode(rig: Stage, delay: str, crossover: float,
     delay has the wrong sign here."""
     sharp = {"joint.locked": True, "joint.limiter_damping": "1 N*s/m", "parasitic.damping_ratio": 0.001}
     changed = rig.replace({**sharp, "drive.delay": delay, "controller.crossover": f"{crossover} Hz"})
-    found = margins(changed.flat(), limit_cases(changed.flat())["sliding"])
-    assert found.abscissa == pytest.approx(growth, abs=0.005)
+    loop_margins = margins(changed.flat(), limit_cases(changed.flat())["sliding"])
+    assert loop_margins.abscissa == pytest.approx(growth, abs=0.005)
 
 
 def test_a_delay_too_long_is_refused(rig: Stage, refused: Refused) -> None:
@@ -378,13 +378,13 @@ def test_every_kind_of_stage_with_every_drive(name: str, drive: dict) -> None:
     changed = VARIANTS[name].replace(drive)
     flat = changed.flat()
     for case, one in limit_cases(flat).items():
-        found = margins(flat, one)
+        loop_margins = margins(flat, one)
         if not drive:
-            assert growing(flat, one) == np.count_nonzero(found.poles.real > 1e-6), case
-        if found.stable:
-            assert 0 < found.modulus_margin < 1.01
-            assert found.gain_margin == np.inf or found.gain_margin < 1e8
-            assert found.gain_reduction == 0 or found.gain_reduction > 1e-6
+            assert growing(flat, one) == np.count_nonzero(loop_margins.poles.real > 1e-6), case
+        if loop_margins.stable:
+            assert 0 < loop_margins.modulus_margin < 1.01
+            assert loop_margins.gain_margin == np.inf or loop_margins.gain_margin < 1e8
+            assert loop_margins.gain_reduction == 0 or loop_margins.gain_reduction > 1e-6
 
 
 def by_gains(rig: Stage, **gains: str) -> Stage:
@@ -414,8 +414,8 @@ def test_slow_poles_are_where_the_loop_is_minus_1(rig: Stage, turn: float, drive
 def test_a_position_that_is_not_controlled_is_on_the_edge(rig: Stage, drive: dict) -> None:
     for locked in (True, False):
         changed = by_gains(rig, kd="50 N*s/m").replace({"joint.locked": locked, **drive})
-        found = margins(changed.flat(), limit_cases(changed.flat())["sliding"])
-        assert (found.stable, found.on_the_edge) == (False, True)
+        loop_margins = margins(changed.flat(), limit_cases(changed.flat())["sliding"])
+        assert (loop_margins.stable, loop_margins.on_the_edge) == (False, True)
         assert limits(changed.flat()).stable == ()
 
 
@@ -426,8 +426,8 @@ def test_a_controller_that_does_nothing_is_refused(rig: Stage, refused: Refused)
 
 def test_a_proportional_loop_may_lose_all_its_gain(rig: Stage) -> None:
     air = by_gains(rig, kp="1 N/mm", kd="50 N*s/m").replace({"friction": None, "parasitic": None})
-    found = margins(air.flat(), limit_cases(air.flat())["sliding"])
-    assert (found.stable, found.gain_reduction, found.gain_margin) == (True, 0, np.inf)
+    loop_margins = margins(air.flat(), limit_cases(air.flat())["sliding"])
+    assert (loop_margins.stable, loop_margins.gain_reduction, loop_margins.gain_margin) == (True, 0, np.inf)
 
 
 def test_a_slow_loop_has_its_crossover_with_any_delay(rig: Stage) -> None:
@@ -435,9 +435,9 @@ def test_a_slow_loop_has_its_crossover_with_any_delay(rig: Stage) -> None:
     slow = by_gains(rig, kp="3 N/m", ki="4 N/(m*s)", kd="6 N*s/m").replace({"joint.locked": True})
     for drive in DRIVES:
         flat = slow.replace(drive).flat()
-        found = margins(flat, limit_cases(flat)["stuck"])
-        assert found.crossovers == pytest.approx([6.4e-6], rel=0.01)
-        assert found.phase_margin == pytest.approx(90, abs=0.1)
+        loop_margins = margins(flat, limit_cases(flat)["stuck"])
+        assert loop_margins.crossovers == pytest.approx([6.4e-6], rel=0.01)
+        assert loop_margins.phase_margin == pytest.approx(90, abs=0.1)
 
 
 def test_bias_forces_are_those_that_a_stuck_cart_bears(rig: Stage) -> None:
@@ -460,38 +460,38 @@ def test_the_series_formula_without_a_stroke(rig: Stage) -> None:
 def test_limits_are_where_the_margins_say(rig: Stage, locked: bool) -> None:
     drive = {"drive.sample_time": "50 us", "drive.delay": "100 us", "joint.locked": locked}
     flat = rig.replace(drive).flat()
-    found = limits(flat)
-    edge = found.highest_stable
+    loop_limits = limits(flat)
+    edge = loop_limits.highest_stable
     assert edge is not None
-    assert not found.open_ended
+    assert not loop_limits.open_ended
     members = settled_members(flat)
     for share, stable in ((0.999, True), (1.001, False)):
         moved = {**flat, "controller.crossover": share * edge}
         assert bool((spectral_abscissa(moved, members) < 0).all()) == stable
-    for low, high in found.comfortable:
+    for low, high in loop_limits.comfortable:
         for end in (low, high):
-            if not np.isclose(end, found.searched).any():
+            if not np.isclose(end, loop_limits.searched).any():
                 at = {**flat, "controller.crossover": end}
                 least = min(margins(at, members[k]).modulus_margin for k in range(len(members)))
                 assert least == pytest.approx(WANTED, rel=0.01)
 
 
 def test_the_stribeck_range_is_unstable_and_told(rig: Stage) -> None:
-    found = bode(rig)
-    assert not found.stable
-    for each in found.unstable:
-        for speed, stable in ((0.99 * each.low, True), (1.01 * each.low, False), (0.99 * each.high, False)):
-            assert (spectral_abscissa(rig.flat(), member(speed, touched=each.touched))[0] < 0) == stable
-    worst, known = found.worst
-    assert not known.stable
-    assert found.unstable[0].low < worst.speed[0] < found.unstable[0].high
+    result = bode(rig)
+    assert not result.stable
+    for item in result.unstable:
+        for speed, stable in ((0.99 * item.low, True), (1.01 * item.low, False), (0.99 * item.high, False)):
+            assert (spectral_abscissa(rig.flat(), member(speed, touched=item.touched))[0] < 0) == stable
+    worst, expected = result.worst
+    assert not expected.stable
+    assert result.unstable[0].low < worst.speed[0] < result.unstable[0].high
 
 
 def test_a_stage_without_friction_has_one_case() -> None:
-    found = bode(VARIANTS["rigid, no friction section"])
-    assert [*found.cases] == ["given"]
-    assert found.stable
-    assert found.worst[1].modulus_margin == pytest.approx(found.cases["given"].margins.modulus_margin)
+    result = bode(VARIANTS["rigid, no friction section"])
+    assert [*result.cases] == ["given"]
+    assert result.stable
+    assert result.worst[1].modulus_margin == pytest.approx(result.cases["given"].margins.modulus_margin)
 
 
 def test_mechanics_without_friction_is_a_chain(rig: Stage) -> None:

@@ -43,9 +43,9 @@ def test_verdicts_near_the_edge(kind: str) -> None:
     flats = [flat_of(entry) for entry in entries]
     columns = {key: [flat[key] for flat in flats] for key in flats[0]}
     numbers = {key: np.array(values) for key, values in columns.items() if isinstance(values[0], float)}
-    found = judge_many({**flats[0], **numbers}, len(entries), 1e-6)
-    said = zip(entries, found, strict=True)
-    wrong = [(entry["name"], verdict) for entry, verdict in said if verdict not in established(entry)]
+    result = judge_many({**flats[0], **numbers}, len(entries), 1e-6)
+    text = zip(entries, result, strict=True)
+    wrong = [(entry["name"], verdict) for entry, verdict in text if verdict not in established(entry)]
     assert not wrong
 
 

@@ -52,10 +52,12 @@ def near_sine() -> tuple[float, float]:
 
 def test_single_harmonic_balance_finds_a_cycle_that_is_there() -> None:
     amplitude, omega = near_sine()
-    found = single_harmonic(unstable("1e8 N/m"), *GRID)
-    assert found.amplitudes == pytest.approx([amplitude], rel=2e-3)  # but for the angle over which friction turns round
-    assert found.frequencies == pytest.approx([omega / (2 * np.pi)], rel=2e-4)
-    assert np.all(found.residuals < 1e-9)
+    harmonic = single_harmonic(unstable("1e8 N/m"), *GRID)
+    assert harmonic.amplitudes == pytest.approx(
+        [amplitude], rel=2e-3
+    )  # but for the angle over which friction turns round
+    assert harmonic.frequencies == pytest.approx([omega / (2 * np.pi)], rel=2e-4)
+    assert np.all(harmonic.residuals < 1e-9)
 
 
 def test_what_is_not_known_is_no_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -69,10 +71,10 @@ def test_what_is_not_known_is_no_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
         return np.where(there, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
 
     monkeypatch.setattr(balance, "dynamic_stiffness", partly)
-    found = single_harmonic(unstable("1e8 N/m"), sizes, rates)
-    assert (found.unknown, found.unsolved) == (4, 0)
-    assert found.amplitudes == pytest.approx([amplitude], rel=2e-3)
-    assert np.isfinite(found.least)
+    harmonic = single_harmonic(unstable("1e8 N/m"), sizes, rates)
+    assert (harmonic.unknown, harmonic.unsolved) == (4, 0)
+    assert harmonic.amplitudes == pytest.approx([amplitude], rel=2e-3)
+    assert np.isfinite(harmonic.least)
     monkeypatch.setattr(balance, "dynamic_stiffness", lambda _, amplitudes, *__: np.full(len(amplitudes), np.nan))
     nothing = single_harmonic(unstable("1e8 N/m"), sizes, rates)
     assert (nothing.unknown, nothing.amplitudes.size) == (900, 0)
@@ -84,8 +86,8 @@ def test_a_turn_without_a_solution_is_told(monkeypatch: pytest.MonkeyPatch) -> N
     amplitude, omega = near_sine()
     grid = (amplitude * np.geomspace(0.1, 10, 12), omega / (2 * np.pi) * np.geomspace(0.1, 10, 12))
     monkeypatch.setattr(balance, "STEPS", 0)
-    found = single_harmonic(unstable("1e8 N/m"), *grid)
-    assert (found.amplitudes.size, found.unsolved) == (0, 1)
+    harmonic = single_harmonic(unstable("1e8 N/m"), *grid)
+    assert (harmonic.amplitudes.size, harmonic.unsolved) == (0, 1)
     cells, axes = np.array([[2, 2], [2, 2]]), (np.arange(9.0), np.arange(9.0))
     assert balance._near(axes, cells, np.array([[3.9, 2.5], [1.1, 4.1]])).tolist() == [True, False]
 
@@ -118,10 +120,10 @@ def test_multi_harmonic_balance_finds_it_too() -> None:
     times = np.arange(1024) * 2 * np.pi / omega / 1024
     flat = unstable("1e5 N/m").flat()
     one, many = (balanced(flat, times, amplitude * np.cos(omega * times), highest) for highest in (1, 151))
-    found = single_harmonic(unstable("1e5 N/m"), *GRID)
+    harmonic = single_harmonic(unstable("1e5 N/m"), *GRID)
     assert (one.status, many.status) == (DONE, DONE)
     assert [one.amplitude, one.omega / (2 * np.pi)] == pytest.approx(
-        [found.amplitudes[0], found.frequencies[0]], rel=1e-5
+        [harmonic.amplitudes[0], harmonic.frequencies[0]], rel=1e-5
     )
     start = at_start(flat, many)
     held = plain.rates({**flat, "motion.kind": "hold"}, tuple(start))
@@ -169,10 +171,10 @@ def test_derivative_of_the_force_by_the_motion() -> None:
     velocity = 3e-3 * np.sin(angles) + 1e-3 * np.sin(3 * angles + 1)
     aside = rng.normal(size=(400, 2)) * 1e-9
     law, interval = OneStateLaw.of(flat), 1e-3
-    found = friction_answer(law, velocity, interval, -1.0).along(aside)
+    result = friction_answer(law, velocity, interval, -1.0).along(aside)
     for k in range(2):
         ahead, behind = (friction_answer(law, velocity + s * aside[:, k], interval, -1.0).force for s in (1, -1))
-        assert (ahead - behind) / 2 == pytest.approx(found[:, k], rel=1e-4, abs=1e-4 * np.max(np.abs(found)))
+        assert (ahead - behind) / 2 == pytest.approx(result[:, k], rel=1e-4, abs=1e-4 * np.max(np.abs(result)))
 
 
 def test_receptance_is_that_of_the_closed_loop() -> None:
@@ -194,26 +196,26 @@ def test_receptance_is_that_of_the_closed_loop() -> None:
 
 def test_hunting_by_harmonic_balance() -> None:
     """No cycle by one harmonic; by many, 0.6 % of the amplitude are left at the 101st, 0.01 % at the 201st."""
-    found = harmonic_balance(hunting(8.0), [8.0], (1, 25, 51, 101, 201)).squeeze()
-    assert float(found["period"]) == pytest.approx(1.62757, abs=1e-4)
-    assert float(found["amplitude"]) == pytest.approx(0.5202e-3, rel=1e-3)
-    assert int(found["solutions"]) == 0
-    assert found["multiplier"].attrs["of"].startswith("the symmetric cycle")
-    assert "approximation" in found["period_error"].attrs["of"]
-    assert float(found["least_residual"]) > 0.25
-    assert set(found["status"].values[:3]) <= {REST, OPEN}
-    assert set(found["status"].values[3:]) == {DONE}
-    assert np.all(np.isnan(found["amplitude_error"].values[:3]))
-    assert found["amplitude_error"].values[3:] == pytest.approx([-6.3e-3, -1.35e-4], rel=0.02)
-    assert found["period_error"].values[3:] == pytest.approx([2.69e-3, 4.1e-5], rel=0.02)
+    result = harmonic_balance(hunting(8.0), [8.0], (1, 25, 51, 101, 201)).squeeze()
+    assert float(result["period"]) == pytest.approx(1.62757, abs=1e-4)
+    assert float(result["amplitude"]) == pytest.approx(0.5202e-3, rel=1e-3)
+    assert int(result["solutions"]) == 0
+    assert result["multiplier"].attrs["of"].startswith("the symmetric cycle")
+    assert "approximation" in result["period_error"].attrs["of"]
+    assert float(result["least_residual"]) > 0.25
+    assert set(result["status"].values[:3]) <= {REST, OPEN}
+    assert set(result["status"].values[3:]) == {DONE}
+    assert np.all(np.isnan(result["amplitude_error"].values[:3]))
+    assert result["amplitude_error"].values[3:] == pytest.approx([-6.3e-3, -1.35e-4], rel=0.02)
+    assert result["period_error"].values[3:] == pytest.approx([2.69e-3, 4.1e-5], rel=0.02)
 
 
 def test_no_single_harmonic_answer_from_4_to_9_5_hz() -> None:
     for crossover, least in ((4.0, 0.17), (6.0, 0.22), (9.5, 0.30)):
-        found = single_harmonic(hunting(crossover), *GRID)
-        assert found.amplitudes.size == 0
-        assert found.least == pytest.approx(least, abs=0.01)
-        assert GRID[1][0] < found.least_frequency < GRID[1][-1]
+        harmonic = single_harmonic(hunting(crossover), *GRID)
+        assert harmonic.amplitudes.size == 0
+        assert harmonic.least == pytest.approx(least, abs=0.01)
+        assert GRID[1][0] < harmonic.least_frequency < GRID[1][-1]
 
 
 def test_where_the_integrator_can_drive_the_loop_is_a_spring_too() -> None:
@@ -234,15 +236,15 @@ def test_any_linear_mechanics() -> None:
     points (references.md, section 2)."""
     rigid = one_period(hunting(8.0))
     locked = hunting(8.0, LOCKED, PARASITIC).flat()
-    found = balanced(locked, *rigid, 201)
-    assert found.status == DONE
-    assert found.amplitude == pytest.approx(0.520e-3, abs=1e-6)
-    assert np.abs(found.stage - found.cart).max() > 0
+    result = balanced(locked, *rigid, 201)
+    assert result.status == DONE
+    assert result.amplitude == pytest.approx(0.520e-3, abs=1e-6)
+    assert np.abs(result.stage - result.cart).max() > 0
 
 
 def test_intervals_are_fine_enough() -> None:
     flat, motion = hunting(8.0).flat(), one_period(hunting(8.0))
-    usual, fine = (balanced(flat, *motion, 201, intervals=each * 201) for each in (32, 128))
+    usual, fine = (balanced(flat, *motion, 201, intervals=item * 201) for item in (32, 128))
     left = 1 - 0.5202174e-3 / np.array([usual.amplitude, fine.amplitude])  # docs/describing.md: the simulated cycle
     assert left[1] / left[0] == pytest.approx(1.0, abs=0.05)
 

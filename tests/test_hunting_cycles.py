@@ -134,7 +134,7 @@ def test_flip_of_the_rigid_mass(crossover: float, attracting: bool) -> None:
 
 
 def only_symmetric(found: Hunting) -> Cycle:
-    (cycle,) = (each for each in found.cycles if each.symmetric)
+    (cycle,) = (item for item in found.cycles if item.symmetric)
     return cycle
 
 
@@ -166,14 +166,14 @@ def test_edge_of_the_free_rig() -> None:
 def test_asymmetric_pair_between_its_fold_and_the_flip(crossover: float, multiplier: float) -> None:
     """Between 8.47 and 9.77 Hz an unstable pair of cycles beside the symmetric one, which it meets at the flip: it
     bounds what the symmetric one attracts. Its multiplier is of a whole period, its turns differ."""
-    found = known(rigid(crossover))
-    beside = next(each for each in found.cycles if not each.symmetric)
+    result = known(rigid(crossover))
+    beside = next(cycle for cycle in result.cycles if not cycle.symmetric)
     assert beside.multiplier == pytest.approx(multiplier, rel=1e-3)
     assert not beside.attracts
     assert np.isreal(beside.multipliers[0])
     assert np.all(np.abs(beside.multipliers[1:]) < 1e-9)
     turns = np.sort([float(beside.trace.position.max()), -float(beside.trace.position.min())])
-    symmetric = only_symmetric(found)
+    symmetric = only_symmetric(result)
     assert symmetric.attracts
     assert turns[0] < 0.97 * symmetric.amplitude
     assert turns[1] > 1.03 * symmetric.amplitude
@@ -184,8 +184,8 @@ def test_asymmetric_pair_shrinks_into_the_flip() -> None:
     """Its multiplier falls to 1 and its turns approach each other like the root of the distance to the flip."""
     off = {}
     for crossover in (9.65, 9.74):
-        found = known(rigid(crossover))
-        (beside,) = (each for each in found.cycles if not each.symmetric)
+        result = known(rigid(crossover))
+        (beside,) = (cycle for cycle in result.cycles if not cycle.symmetric)
         off[crossover] = float(beside.trace.position.max() + beside.trace.position.min())
     assert off[9.65] / off[9.74] == pytest.approx(np.sqrt((9.77 - 9.65) / (9.77 - 9.74)), rel=0.02)
 
@@ -277,7 +277,7 @@ def test_multipliers_of_machines_drawn_at_random() -> None:
 
     The slope is that of 1 % of the amplitude, hence 1 %; it agrees to some 1e-5.
     """
-    cycles = [only_symmetric(known(each)) for each in machines() if known(each).cycles]
+    cycles = [only_symmetric(known(item)) for item in machines() if known(item).cycles]
     judged = [cycle for cycle in cycles if abs(cycle.multiplier) < 2]
     assert len(judged) >= 6
     for cycle in judged:
@@ -292,13 +292,13 @@ def test_machines_drawn_at_random_hunt_as_their_cycles_say() -> None:
     """Let go at 32 displacements from 0.1 to 30 mm and followed for a hundred periods: a machine without a cycle that
     attracts comes to rest from all; one that has one swings as far as it from some, to what is left of the transient,
     and rests after the others."""
-    for each in machines():
-        found = known(each)
-        period = found.cycles[0].period if found.cycles else 4.0
-        swing = last_swing(each, np.geomspace(1e-4, 3e-2, 32), 100 * period, 2 * period)
-        going = swing[swing > each.flat()["friction.static"] / each.flat()["friction.bristle_stiffness"]]
-        assert bool(going.size) == bool(found.attracting)
-        for cycle in found.attracting:
+    for item in machines():
+        result = known(item)
+        period = result.cycles[0].period if result.cycles else 4.0
+        swing = last_swing(item, np.geomspace(1e-4, 3e-2, 32), 100 * period, 2 * period)
+        going = swing[swing > item.flat()["friction.static"] / item.flat()["friction.bristle_stiffness"]]
+        assert bool(going.size) == bool(result.attracting)
+        for cycle in result.attracting:
             left = 10 * abs(cycle.multiplier) ** 200
             assert going == pytest.approx(cycle.amplitude, rel=1e-4 + left)  # at rtol 1e-6
 
@@ -350,7 +350,7 @@ def moving_parts(trace: xr.Dataset) -> dict[str, np.ndarray]:
 )
 def test_trace_of_an_asymmetric_cycle_is_periodic(chosen: Stage) -> None:
     """To 1e-6 of the range of each signal; the orbit closes to 1e-8 and its trace is followed at rtol 1e-8."""
-    (cycle,) = (each for each in known(chosen).cycles if not each.symmetric)
+    (cycle,) = (item for item in known(chosen).cycles if not item.symmetric)
     for name, signal in moving_parts(cycle.trace).items():
         assert abs(signal[-1] - signal[0]) < 1e-6 * np.ptp(signal), name
 
@@ -361,11 +361,11 @@ def test_trace_of_an_asymmetric_cycle_is_periodic(chosen: Stage) -> None:
 def test_mirror_image_of_a_cycle_is_one(chosen: Stage, sign: float) -> None:
     """From the mirrored state, sticking on the other side, shooting closes the same orbit without a step."""
     stages = Ensemble.held(chosen.flat(), 1)
-    found = symmetric_cycles(stages) if sign < 0 else asymmetric_cycles(stages, return_map(stages, 1e-6))
-    mirrored = close(stages, -found.states, found.orbits.times, sign, RTOL)
+    result = symmetric_cycles(stages) if sign < 0 else asymmetric_cycles(stages, return_map(stages, 1e-6))
+    mirrored = close(stages, -result.states, result.orbits.times, sign, RTOL)
     assert mirrored.closed[0]
-    assert mirrored.times == pytest.approx(found.orbits.times, rel=1e-8)
-    assert mirrored.states == pytest.approx(-found.states, rel=1e-6, abs=1e-12)
+    assert mirrored.times == pytest.approx(result.orbits.times, rel=1e-8)
+    assert mirrored.states == pytest.approx(-result.states, rel=1e-6, abs=1e-12)
 
 
 @UNEQUAL

@@ -63,7 +63,7 @@ def table(log: Log, count: int = COUNT, **changes: Any) -> pd.DataFrame:
     values = {"time": log.time[:count]}
     values |= {role: log[role][:count] * (1.0 if role == "force" else 1e3) for role in COLUMNS if role != "time"}
     values |= changes
-    return pd.DataFrame({COLUMNS.get(role, role): each for role, each in values.items() if each is not None})
+    return pd.DataFrame({COLUMNS.get(role, role): value for role, value in values.items() if value is not None})
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> Said:
@@ -104,7 +104,7 @@ def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
 
 def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapshots: Snapshots) -> None:
     out, answer = done
-    files = {Path(each) for each in answer["files"]}
+    files = {Path(item) for item in answer["files"]}
     assert {out / "identified.toml", out / "identify.html", beside(out / "identified.toml")} <= files
     assert all(each.stat().st_size > 0 for each in files)
     assert {each.suffix for each in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
@@ -155,9 +155,9 @@ def test_a_second_run_needs_no_options_again(
     assert '"force" = "Force"' in kept.read_text()
     monkeypatch.setattr(method, "identify", _stopped)
     kept.write_text(kept.read_text().replace('"Force"', '"Kraft"'))
-    status, _, said = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
+    status, _, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
     kept.write_text(kept.read_text().replace('"Kraft"', '"Force"'))
-    assert (status, "Kraft" in said) == (2, True)
+    assert (status, "Kraft" in text) == (2, True)
     assert run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")[0] == 130
 
 
@@ -174,11 +174,11 @@ def test_one_message_holds_the_command_that_tells_all(
     monkeypatch.setattr(method, "identify", _stopped)
     first = ("bare.csv", "--unit", "u=N", "--out", "out")
     monkeypatch.chdir(tmp_path)
-    status, _, said = run(capsys, *first)
+    status, _, text = run(capsys, *first)
     assert status == 2
     assert '"u" = "N"' in (tmp_path / "bare.csv.friso.toml").read_text()
     assert not (tmp_path / "out").exists()
-    command = next(line for line in said.splitlines() if "friso identify" in line).partition("friso identify")[2]
+    command = next(line for line in text.splitlines() if "friso identify" in line).partition("friso identify")[2]
     assert run(capsys, *shlex.split(command))[0] == 130
     assert run(capsys, "bare.csv", "--out", "out")[0] == 130
 
@@ -187,9 +187,9 @@ def test_ctrl_c_leaves_nothing(
     inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(method, "identify", _stopped)
-    status, out, said = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
+    status, out, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
     assert (status, out) == (130, "")
-    assert "interrupted" in said
+    assert "interrupted" in text
     assert not [*tmp_path.rglob("identified.toml"), *tmp_path.rglob("*.html")]
 
 
@@ -208,7 +208,7 @@ BAD_OPTIONS = [
 ]
 
 
-@pytest.mark.parametrize(("options", "message"), BAD_OPTIONS, ids=lambda each: "".join(each[:2]))
+@pytest.mark.parametrize(("options", "message"), BAD_OPTIONS, ids=lambda item: "".join(item[:2]))
 def test_options_that_do_not_fit_are_refused(
     options: list[str], message: str, inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -219,15 +219,15 @@ def test_options_that_do_not_fit_are_refused(
 
 def refused(capsys: pytest.CaptureFixture[str], message: str, *arguments: object) -> None:
     """Exit 2 with one message, and nothing written."""
-    status, out, said = run(capsys, *arguments)
-    plain = " ".join(said.split())
+    status, out, text = run(capsys, *arguments)
+    plain = " ".join(text.split())
     assert status == 2, plain
     assert out == ""
     assert message in plain
-    assert "Traceback" not in said
-    assert said.count("expected") == 1
-    places = [Path(str(each)) for each in arguments]
-    assert not any((each / "identified.toml").exists() for each in places if each.name == "out")
+    assert "Traceback" not in text
+    assert text.count("expected") == 1
+    places = [Path(str(argument)) for argument in arguments]
+    assert not any((place / "identified.toml").exists() for place in places if place.name == "out")
 
 
 def _bad(log: Log) -> dict[str, tuple[pd.DataFrame, str]]:
@@ -286,6 +286,6 @@ def test_a_folder_that_cannot_be_written(
     inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tmp_path.chmod(0o500)
-    status, _, said = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path)
+    status, _, text = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path)
     tmp_path.chmod(0o700)
-    assert (status, "can be written" in said) == (2, True)
+    assert (status, "can be written" in text) == (2, True)

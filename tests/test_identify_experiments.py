@@ -138,9 +138,9 @@ def test_steps_hold_the_stiffness(rig: friso.Stage) -> None:
         drift = np.cumsum(rng.standard_normal(len(signals["force"]))) * 1e-4
         signals["force"] = measured(signals["force"], 0.05, rng) + 0.4 + drift
         signals["position"] = measured(signals["position"], 1e-7, rng)
-        found = stiffness_from_steps(record("steps", DT, **signals)).stiffness
-        held += found.holds(stiffness)
-        widths.append(found.half_width / stiffness)
+        result = stiffness_from_steps(record("steps", DT, **signals)).stiffness
+        held += result.holds(stiffness)
+        widths.append(result.half_width / stiffness)
     assert 34 <= held <= 40
     assert np.median(widths) < 0.06
 
@@ -149,12 +149,12 @@ def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Sta
     signals = stairs(rig, 2400.0, (1, 1, -1, -1))
     for leave_out in ((), ("reference",)):
         log = record("steps", DT, **{k: v for k, v in signals.items() if k not in leave_out})
-        found = stiffness_from_steps(log)
-        assert len(found.windows) == 5
-        assert found.stiffness.value == pytest.approx(2400, rel=2e-3)
-        assert found.up.value == pytest.approx(found.down.value, rel=5e-3)
-        assert found.cart_fixed is None
-        wording(found.warnings[0])
+        steps = stiffness_from_steps(log)
+        assert len(steps.windows) == 5
+        assert steps.stiffness.value == pytest.approx(2400, rel=2e-3)
+        assert steps.up.value == pytest.approx(steps.down.value, rel=5e-3)
+        assert steps.cart_fixed is None
+        wording(steps.warnings[0])
 
 
 def test_hysteresis_shows_in_steps(rig: friso.Stage) -> None:
@@ -162,8 +162,8 @@ def test_hysteresis_shows_in_steps(rig: friso.Stage) -> None:
     way = np.sign(np.concatenate(([0.0], np.diff(signals["reference"]))))
     last = np.maximum.accumulate(np.where(way != 0, np.arange(len(way)), 0))
     signals["force"] = signals["force"] + 0.1 * way[last]
-    found = stiffness_from_steps(record("steps", DT, **signals))
-    assert found.hysteresis.value == pytest.approx(0.2, rel=0.05)
+    steps = stiffness_from_steps(record("steps", DT, **signals))
+    assert steps.hysteresis.value == pytest.approx(0.2, rel=0.05)
 
 
 def test_a_cart_that_creeps_is_told_and_does_not_matter(rig: friso.Stage, wording: Wording) -> None:
@@ -171,10 +171,10 @@ def test_a_cart_that_creeps_is_told_and_does_not_matter(rig: friso.Stage, wordin
     relative = signals["position"].copy()
     creep = low_pass(0.2 * signals["reference"], DT, 5.0)
     log = record("steps", DT, **{**signals, "position": relative + creep, "relative_position": relative})
-    found = stiffness_from_steps(log)
-    assert found.cart_fixed is False
-    wording(found.warnings[0])
-    assert found.stiffness.value == pytest.approx(2400, rel=5e-3)
+    steps = stiffness_from_steps(log)
+    assert steps.cart_fixed is False
+    wording(steps.warnings[0])
+    assert steps.stiffness.value == pytest.approx(2400, rel=5e-3)
     still = stiffness_from_steps(record("steps", DT, **signals, relative_position=relative))
     assert still.cart_fixed is True
 
@@ -182,10 +182,10 @@ def test_a_cart_that_creeps_is_told_and_does_not_matter(rig: friso.Stage, wordin
 def test_a_slow_integrator_need_not_have_settled(rig: friso.Stage) -> None:
     """The time constant of the integrator against the joint is 0.3 s: after 0.5 s the deflection still drifts."""
     signals = stairs(rig, 2400.0, (1, 1, -1, -1, 1, -1), seconds=0.6)
-    found = stiffness_from_steps(record("steps", DT, **signals))
-    assert len(found.windows) == 7
-    assert found.stiffness.holds(2400)
-    assert found.stiffness.half_width < 0.01 * 2400
+    steps = stiffness_from_steps(record("steps", DT, **signals))
+    assert len(steps.windows) == 7
+    assert steps.stiffness.holds(2400)
+    assert steps.stiffness.half_width < 0.01 * 2400
 
 
 def test_drifting_plateaus_of_few_samples_count_too() -> None:
@@ -193,9 +193,9 @@ def test_drifting_plateaus_of_few_samples_count_too() -> None:
     step, tau = 0.02, 0.3
     reference = np.repeat(np.cumsum([0, 1, 1, -1, -1, 1, -1]) * 0.3e-3, 50)
     level = lfilter([1 - np.exp(-step / tau)], [1, -np.exp(-step / tau)], reference)
-    found = stiffness_from_steps(record("steps", step, reference=reference, position=level, force=2400 * level))
-    assert len(found.windows) >= 6
-    assert found.stiffness.holds(2400)
+    steps = stiffness_from_steps(record("steps", step, reference=reference, position=level, force=2400 * level))
+    assert len(steps.windows) >= 6
+    assert steps.stiffness.holds(2400)
 
 
 def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage, wording: Wording) -> None:
@@ -203,10 +203,10 @@ def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage, wording: Wordin
     quarter = 2 * round(2.0 / DT)
     swing = np.zeros_like(signals["position"])
     swing[quarter : quarter + 2000] = np.linspace(0, 2e-4, 2000)
-    found = stiffness_from_steps(record("steps", DT, **{**signals, "position": signals["position"] + swing}))
-    assert len(found.windows) == 4
-    wording(" ".join(found.warnings))
-    assert found.stiffness.value == pytest.approx(2400, rel=0.01)
+    steps = stiffness_from_steps(record("steps", DT, **{**signals, "position": signals["position"] + swing}))
+    assert len(steps.windows) == 4
+    wording(" ".join(steps.warnings))
+    assert steps.stiffness.value == pytest.approx(2400, rel=0.01)
     few = stiffness_from_steps(record("one", DT, **stairs(rig, 2400.0, (1,))))
     assert not few.stiffness.determined
     wording(few.stiffness.reason)
@@ -217,11 +217,11 @@ def test_what_needs_no_more_force_to_move_shows_no_stiffness(rig: friso.Stage, w
     signals = stairs(rig, 2400.0, (1, 1, -1, -1, 1, -1))
     noise = 0.05 * np.random.default_rng(3).standard_normal(len(signals["force"]))
     for share, bounded in ((-1.0, False), (0.0, True)):
-        found = stiffness_from_steps(record("free", DT, **{**signals, "force": share * signals["force"] + noise}))
-        assert not found.stiffness.determined
-        wording(found.stiffness.reason)
-        assert found.stiffness.low == 0
-        assert np.isfinite(found.stiffness.high) == bounded
+        steps = stiffness_from_steps(record("free", DT, **{**signals, "force": share * signals["force"] + noise}))
+        assert not steps.stiffness.determined
+        wording(steps.stiffness.reason)
+        assert steps.stiffness.low == 0
+        assert np.isfinite(steps.stiffness.high) == bounded
 
 
 # --- static friction from stick-slip ----------------------------------------------------------------------------------
@@ -246,16 +246,16 @@ def test_stick_slip_holds_the_static_friction(rig: friso.Stage) -> None:
         changes = {"friction.static": f"{static} N", "joint.stiffness": f"{stiffness} N/m"}
         changes |= {"friction.coulomb": f"{rng.uniform(0.3, 0.6) * static} N"}
         log = pulled(rig, float(rng.uniform(0.7e-3, 1.5e-3)), rng, **changes)
-        known = Estimate.normal(
+        estimate = Estimate.normal(
             "joint.stiffness", "N/m", stiffness * (1 + 0.02 * rng.standard_normal()), 0.02 * stiffness, ""
         )
-        found = static_from_stick_slip(log, known, stage_mass=rig.flat()["masses.stage"])
-        assert found.static.determined, found.static
-        held += found.static.holds(static)
-        stiff += found.stiffness.holds(stiffness)
-        assert found.stiffness.half_width < 0.02 * stiffness
-        below += found.break_away_forward.value < static * (1 + 0.05)
-        assert found.static.half_width < 0.25 * static
+        slips = static_from_stick_slip(log, estimate, stage_mass=rig.flat()["masses.stage"])
+        assert slips.static.determined, slips.static
+        held += slips.static.holds(static)
+        stiff += slips.stiffness.holds(stiffness)
+        assert slips.stiffness.half_width < 0.02 * stiffness
+        below += slips.break_away_forward.value < static * (1 + 0.05)
+        assert slips.static.half_width < 0.25 * static
     assert held >= 38
     assert below >= 38
     assert stiff >= 34  # of 95 %, 33 or fewer have a probability of 1 %
@@ -269,9 +269,9 @@ def test_nine_logs_at_one_force_rate_hold_the_static_friction() -> None:
         static_friction("friction.static", lowered * (1 + 0.01 * rng.standard_normal(20)), np.full(20, 3.0))
         for _ in range(9)
     ]
-    assert all(each.holds(static) for each in logs)
-    (one,), said = combined(logs)
-    assert not said
+    assert all(log.holds(static) for log in logs)
+    (one,), text = combined(logs)
+    assert not text
     assert one.holds(static)
 
 
@@ -280,23 +280,23 @@ def test_slow_motion_with_the_joint_locked_shows_no_joint(rig: friso.Stage) -> N
     pull = 3 * (time % 1.0)
     way = np.floor(time) * 1e-3
     log = record("held", DT, position=way + pull / 2e7, relative_position=pull / 2e7, force=pull)
-    found = identify([(log, "stick-slip")], rig)
-    assert "joint.stiffness" not in [each.name for each in found.estimates if each.determined]
+    identification = identify([(log, "stick-slip")], rig)
+    assert "joint.stiffness" not in [estimate.name for estimate in identification.estimates if estimate.determined]
 
 
 def test_peaks_come_before_velocity_spikes_and_the_actuator_says_the_same(rig: friso.Stage) -> None:
     log = pulled(rig, 1e-3, np.random.default_rng(4))
-    found = static_from_stick_slip(log, 2400.0)
-    assert len(found.forces) >= 5
-    assert found.spread[0] <= np.median(found.forces) <= found.spread[1]
-    for at, bent in zip(found.times, found.deflections, strict=True):
+    slips = static_from_stick_slip(log, 2400.0)
+    assert len(slips.forces) >= 5
+    assert slips.spread[0] <= np.median(slips.forces) <= slips.spread[1]
+    for at, bent in zip(slips.times, slips.deflections, strict=True):
         after = (log.time >= at) & (log.time < at + 0.1)
-        assert np.abs(found.cart_velocity[after]).max() == pytest.approx(found.speeds.max(), rel=0.5)
+        assert np.abs(slips.cart_velocity[after]).max() == pytest.approx(slips.speeds.max(), rel=0.5)
         assert bent == pytest.approx(np.interp(at, log.time, log["relative_position"]), abs=1e-6)
-    assert np.all(found.directions == 1)
-    assert not found.backward.determined
+    assert np.all(slips.directions == 1)
+    assert not slips.backward.determined
     actuator = static_from_stick_slip(log, stage_mass=0.5)
-    assert actuator.break_away_forward.value == pytest.approx(found.break_away_forward.value, rel=0.02)
+    assert actuator.break_away_forward.value == pytest.approx(slips.break_away_forward.value, rel=0.02)
 
 
 def test_an_offset_of_the_sensor_drops_out_of_both_directions(rig: friso.Stage, wording: Wording) -> None:
@@ -305,19 +305,19 @@ def test_an_offset_of_the_sensor_drops_out_of_both_directions(rig: friso.Stage, 
     both["relative_position"] = both["relative_position"] + 1e-4
     count = len(log.time)
     halves = replace(record("both", DT, **both), segments=(slice(0, count), slice(count, 2 * count)))
-    found = static_from_stick_slip(halves, 2400.0)
+    slips = static_from_stick_slip(halves, 2400.0)
     plain = static_from_stick_slip(log, 2400.0)
-    assert found.static.value == pytest.approx(plain.static.value, rel=0.01)
-    assert found.offset.holds(0.24)
-    wording(" ".join(found.warnings))
+    assert slips.static.value == pytest.approx(plain.static.value, rel=0.01)
+    assert slips.offset.holds(0.24)
+    wording(" ".join(slips.warnings))
 
 
 def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage) -> None:
     log = pulled(rig, 0.5e-3, np.random.default_rng(6), **{"joint.stroke": "1 mm"})
-    for known in (static_from_stick_slip(log, 2400.0), static_from_stick_slip(log, 2400.0, stroke=1e-3)):
-        assert not known.static.determined
-        assert "limiter" in known.static.reason
-        assert 2.3 < known.static.low < 3.0
+    for expected in (static_from_stick_slip(log, 2400.0), static_from_stick_slip(log, 2400.0, stroke=1e-3)):
+        assert not expected.static.determined
+        assert "limiter" in expected.static.reason
+        assert 2.3 < expected.static.low < 3.0
 
 
 def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.Stage, wording: Wording) -> None:
@@ -328,32 +328,32 @@ def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.St
     both["relative_position"] = both["relative_position"] + 1e-4
     count = len(free.time)
     halves = replace(record("both", DT, **both), segments=(slice(0, count), slice(count, len(both["position"]))))
-    found = static_from_stick_slip(halves, 2400.0)
-    assert found.forward.determined
-    assert not found.backward.determined
-    assert not found.static.determined
-    wording(found.static.reason)
-    assert found.static.holds(rig.flat()["friction.static"])
+    slips = static_from_stick_slip(halves, 2400.0)
+    assert slips.forward.determined
+    assert not slips.backward.determined
+    assert not slips.static.determined
+    wording(slips.static.reason)
+    assert slips.static.holds(rig.flat()["friction.static"])
 
 
 def test_motion_hidden_in_noise_widens_the_interval_downwards() -> None:
     """A cart that speeds up slowly: its peak of the pull holds inertia, which noise on the position may not hide."""
     machine = drawn(57, True)
     flat = machine.flat
-    found = static_from_stick_slip(creeping(machine), flat["joint.stiffness"], flat["masses.stage"])
-    assert found.static.determined
-    assert found.static.holds(flat["friction.static"])
+    slips = static_from_stick_slip(creeping(machine), flat["joint.stiffness"], flat["masses.stage"])
+    assert slips.static.determined
+    assert slips.static.holds(flat["friction.static"])
 
 
 def test_what_shows_no_slips_says_so(refused: Refused, wording: Wording) -> None:
     time = np.arange(0, 5, DT)
     rng = np.random.default_rng(0)
     log = record("slides", DT, position=0.01 * time, force=1 + 0.01 * rng.standard_normal(len(time)))
-    found = static_from_stick_slip(log)
-    assert not found.static.determined
-    wording(found.static.reason)
-    wording(found.stiffness.reason)
-    assert found.static.low == 0
+    slips = static_from_stick_slip(log)
+    assert not slips.static.determined
+    wording(slips.static.reason)
+    wording(slips.stiffness.reason)
+    assert slips.static.low == 0
     with refused("relative_position"):
         static_from_stick_slip(log, 2400.0)
     with refused("stiffness"):
@@ -378,11 +378,11 @@ def ramps(
         time = np.arange(0, 0.3 + to * friction[0] / force_rate, DT)
         push = (-1) ** i * np.clip(force_rate * (time - 0.3), 0, None)
         out = twin(mass, friction, np.zeros(2), push, np.zeros_like(push), DT, 25, *FLAT)
-        begin = sum(len(each) for each in signals["force"])
+        begin = sum(len(item) for item in signals["force"])
         parts.append(slice(begin, begin + len(time)))
         signals["position"].append(out[:, 0] + noise[0] * rng.standard_normal(len(time)))
         signals["force"].append(push + noise[1] * rng.standard_normal(len(time)))
-    arrays = {name: np.concatenate(each) for name, each in signals.items()}
+    arrays = {name: np.concatenate(signal) for name, signal in signals.items()}
     return replace(record("ramps", DT, **arrays), segments=tuple(parts))
 
 
@@ -390,13 +390,13 @@ def test_break_away_falls_with_the_rate_as_published() -> None:
     """About 1.42 N at 1 N/s, 1.21 at 10, 1.09 at 20 (Canudas de Wit et al. 1995, read off a figure: 3 %)."""
     rates = [1.0, 1.0, 10.0, 10.0, 20.0, 20.0]
     for noise in ((0.0, 0.0), (1e-7, 5e-3)):
-        found = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(1), 1.15, noise), 1.0)
-        published = np.interp(found.rates, [1.0, 10.0, 20.0], [1.42, 1.21, 1.09])
-        own = found.unsure if any(noise) else 0.0
-        assert np.all(np.abs(found.forces - published) < 0.03 * published + own)
-        assert np.all(found.unsure < 0.05 * found.forces)
-        assert found.rates == pytest.approx(rates, rel=0.01)
-        assert found.static.holds(1.5)
+        result = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(1), 1.15, noise), 1.0)
+        published = np.interp(result.rates, [1.0, 10.0, 20.0], [1.42, 1.21, 1.09])
+        own = result.unsure if any(noise) else 0.0
+        assert np.all(np.abs(result.forces - published) < 0.03 * published + own)
+        assert np.all(result.unsure < 0.05 * result.forces)
+        assert result.rates == pytest.approx(rates, rel=0.01)
+        assert result.static.holds(1.5)
 
 
 def test_noise_does_not_raise_the_break_away() -> None:
@@ -419,8 +419,8 @@ def test_break_aways_of_drawn_machines_hold_the_static_friction() -> None:
     held = 0
     for seed in (38, 42, 43, 45, 51, 55, 56, 57, 64, 67):
         machine = drawn(seed, False)
-        found = static_from_ramps(break_aways(machine), machine.flat["masses.cart"])
-        held += found.static.determined and found.static.holds(machine.flat["friction.static"])
+        result = static_from_ramps(break_aways(machine), machine.flat["masses.cart"])
+        held += result.static.determined and result.static.holds(machine.flat["friction.static"])
     assert held >= 9
 
 
@@ -432,20 +432,20 @@ def test_ramps_hold_the_static_friction() -> None:
         speed = rng.uniform(1e-3, 3e-3)
         friction = np.array([static, rng.uniform(0.3, 0.7) * static, speed, 1e5, 316.0, 0.4])
         rates = [float(r * static) for r in (1.0, 1.0, 2.0, 2.0, 4.0, 4.0)]
-        found = static_from_ramps(ramps(friction, rates, mass, rng), mass)
-        assert found.static.determined, found.static
-        held += found.static.holds(static)
-        widths.append(found.static.half_width / static)
+        result = static_from_ramps(ramps(friction, rates, mass, rng), mass)
+        assert result.static.determined, result.static
+        held += result.static.holds(static)
+        widths.append(result.static.half_width / static)
     assert held >= 27
     assert np.median(widths) < 0.06
 
 
 def test_rates_that_are_too_high_are_told(wording: Wording) -> None:
     for rates in ([10.0, 10.0, 10.0, 20.0, 20.0, 20.0], [35.0] * 4):
-        found = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(2)), 1.0)
-        assert not found.static.determined
-        wording(found.static.reason)
-        assert found.static.holds(1.5)
+        result = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(2)), 1.0)
+        assert not result.static.determined
+        wording(result.static.reason)
+        assert result.static.holds(1.5)
 
 
 def test_the_bound_on_the_rate_effect_holds() -> None:
@@ -453,8 +453,8 @@ def test_the_bound_on_the_rate_effect_holds() -> None:
     by_rate = [break_away(r, 1.5, 1.0, 1e5, 1e-3) for r in (0.1, 1.0, 10.0, 100.0)]
     assert by_rate == sorted(by_rate, reverse=True)
     assert by_rate[-1] == 1.0
-    found = static_from_ramps(ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3)), 1.0)
-    for level, force_rate in zip(found.forces, found.rates, strict=True):
+    result = static_from_ramps(ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3)), 1.0)
+    for level, force_rate in zip(result.forces, result.rates, strict=True):
         assert break_away(force_rate, 1.5, 1.0, 1e5, 1e-3) < level < 1.5
         assert level > 1.5 * (1 - share_below(force_rate))
     small = np.array([share_below(r) for r in (1e-2, 1e-1)])
@@ -464,10 +464,10 @@ def test_the_bound_on_the_rate_effect_holds() -> None:
 def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated(wording: Wording) -> None:
     rates = np.array([50.0, 50.0, 100.0, 100.0, 200.0, 200.0])
     forces = np.array([1.0, 1.01, 1.02, 1.0, 1.01, 1.0])
-    found = static_friction("friction.static", forces, rates)
-    assert not found.determined
-    wording(found.reason)
-    assert found.low == pytest.approx(1.0, abs=0.02)
+    friction = static_friction("friction.static", forces, rates)
+    assert not friction.determined
+    wording(friction.reason)
+    assert friction.low == pytest.approx(1.0, abs=0.02)
 
 
 # --- friction against velocity ----------------------------------------------------------------------------------------
@@ -492,18 +492,18 @@ def travels(speeds: list[float], profile: tuple[np.ndarray, np.ndarray], rng: np
 def test_friction_velocity_map_without_slow_speeds(wording: Wording) -> None:
     """Coulomb, viscous and bias come back; static friction and Stribeck velocity are said to be unseen."""
     friction = np.array([1.5, 1.0, 1e-3, 1e5, 316.2, 4.0])
-    found = friction_velocity(travels([0.02, 0.05, 0.1], FLAT, np.random.default_rng(1), friction=friction), 1.0)
-    assert len(found.velocities) == 6
-    assert found.both.coulomb.holds(1.0)
-    assert found.both.viscous.holds(4.0)
-    assert found.bias.holds(0.3)
-    assert found.both.coulomb.half_width < 0.1
-    assert found.directions["forward"].coulomb.value == pytest.approx(1.3, abs=0.03)
-    assert found.directions["backward"].coulomb.value == pytest.approx(0.7, abs=0.03)
-    assert not found.both.static.determined
-    wording(found.both.static.reason)
-    assert found.both.static.low == found.both.coulomb.low
-    assert found.both.stribeck_velocity.high == pytest.approx(0.02, rel=0.01)
+    curve = friction_velocity(travels([0.02, 0.05, 0.1], FLAT, np.random.default_rng(1), friction=friction), 1.0)
+    assert len(curve.velocities) == 6
+    assert curve.both.coulomb.holds(1.0)
+    assert curve.both.viscous.holds(4.0)
+    assert curve.bias.holds(0.3)
+    assert curve.both.coulomb.half_width < 0.1
+    assert curve.directions["forward"].coulomb.value == pytest.approx(1.3, abs=0.03)
+    assert curve.directions["backward"].coulomb.value == pytest.approx(0.7, abs=0.03)
+    assert not curve.both.static.determined
+    wording(curve.both.static.reason)
+    assert curve.both.static.low == curve.both.coulomb.low
+    assert curve.both.stribeck_velocity.high == pytest.approx(0.02, rel=0.01)
 
 
 def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:
@@ -517,12 +517,12 @@ def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:
             rest = np.stack([np.full(200, path[0]), np.zeros(200)], axis=1)
             rows += [rest, np.stack([path, np.full(len(path), force)], axis=1)]
     position, force = np.concatenate(rows).T
-    found = friction_velocity(record("scatter", DT, position=position, force=force, reference=position))
-    columns = np.stack([np.sign(found.velocities), found.velocities, np.ones(6)], axis=1)
-    solution, squares, *_ = np.linalg.lstsq(columns, found.forces, rcond=None)
+    curve = friction_velocity(record("scatter", DT, position=position, force=force, reference=position))
+    columns = np.stack([np.sign(curve.velocities), curve.velocities, np.ones(6)], axis=1)
+    solution, squares, *_ = np.linalg.lstsq(columns, curve.forces, rcond=None)
     spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * squares[0] / 3)
     for estimate, value, deviation in zip(
-        (found.both.coulomb, found.both.viscous, found.bias), solution, spread, strict=True
+        (curve.both.coulomb, curve.both.viscous, curve.bias), solution, spread, strict=True
     ):
         assert estimate.value == pytest.approx(value, abs=0.01 * deviation)
         assert estimate.half_width == pytest.approx(t_value(3) * deviation, rel=0.01)
@@ -531,19 +531,19 @@ def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:
 def test_friction_velocity_map_with_slow_speeds_has_the_stribeck_curve() -> None:
     friction = np.array([1.5, 1.0, 5e-3, 1e5, 316.2, 4.0])
     speeds = [0.002, 0.003, 0.005, 0.008, 0.015, 0.03, 0.06]
-    found = friction_velocity(travels(speeds, FLAT, np.random.default_rng(2), friction=friction, way=0.01), 1.0)
-    assert found.both.static.value == pytest.approx(1.5, rel=0.05)
-    assert found.both.stribeck_velocity.value == pytest.approx(5e-3, rel=0.1)
-    assert found.both.coulomb.value == pytest.approx(1.0, rel=0.05)
-    assert found.both.covariance.shape == (4, 4)
+    curve = friction_velocity(travels(speeds, FLAT, np.random.default_rng(2), friction=friction, way=0.01), 1.0)
+    assert curve.both.static.value == pytest.approx(1.5, rel=0.05)
+    assert curve.both.stribeck_velocity.value == pytest.approx(5e-3, rel=0.1)
+    assert curve.both.coulomb.value == pytest.approx(1.0, rel=0.05)
+    assert curve.both.covariance.shape == (4, 4)
 
 
 def test_one_speed_leaves_a_range(wording: Wording) -> None:
-    found = friction_velocity(travels([0.05, 0.05, 0.05], FLAT, np.random.default_rng(3)), 1.0)
-    for each, truth in ((found.both.coulomb, 1.0), (found.both.viscous, 0.4)):
-        assert not each.determined
-        wording(each.reason)
-        assert each.low <= truth <= each.high < np.inf
+    curve = friction_velocity(travels([0.05, 0.05, 0.05], FLAT, np.random.default_rng(3)), 1.0)
+    for item, truth in ((curve.both.coulomb, 1.0), (curve.both.viscous, 0.4)):
+        assert not item.determined
+        wording(item.reason)
+        assert item.low <= truth <= item.high < np.inf
 
 
 def test_emps_friction_is_that_published() -> None:
@@ -551,12 +551,12 @@ def test_emps_friction_is_that_published() -> None:
         pytest.skip("the EMPS record is not at hand (shared/data/emps)")
     raw = {name: np.ravel(value) for name, value in loadmat(EMPS).items() if not name.startswith("_")}
     log = record("EMPS", DT, position=raw["qm"], force=raw["gtau"][0] * raw["vir"], reference=raw["qg"])
-    found = friction_velocity(log, 95.1)
-    assert found.both.coulomb.value == pytest.approx(20.3935, rel=0.1)
-    assert found.both.viscous.holds(203.5034)
-    assert found.bias.holds(-3.1648)
-    assert not found.both.static.determined
-    assert not found.both.stribeck_velocity.determined
+    curve = friction_velocity(log, 95.1)
+    assert curve.both.coulomb.value == pytest.approx(20.3935, rel=0.1)
+    assert curve.both.viscous.holds(203.5034)
+    assert curve.bias.holds(-3.1648)
+    assert not curve.both.static.determined
+    assert not curve.both.stribeck_velocity.determined
 
 
 # --- friction against position ----------------------------------------------------------------------------------------
@@ -577,15 +577,15 @@ def test_friction_that_varies_along_the_rail_repeats(wording: Wording) -> None:
     rng = np.random.default_rng(8)
     profile = field(3e-3, 0.15, rng)
     log = travels([0.02, 0.05], profile, rng, way=0.15)
-    found = friction_position(log, 1.0)
-    assert found.separated, found.verdict
-    assert found.repeatability.value > 0.8
-    assert found.repeatability.low > 0.5
-    assert len(found.passes) == 4
-    for each in found.passes:
-        assert each.correlation_length.holds(3e-3)
-        assert each.spread == pytest.approx(0.15, rel=0.3)
-    wording(found.verdict)
+    passes = friction_position(log, 1.0)
+    assert passes.separated, passes.verdict
+    assert passes.repeatability.value > 0.8
+    assert passes.repeatability.low > 0.5
+    assert len(passes.passes) == 4
+    for stretch in passes.passes:
+        assert stretch.correlation_length.holds(3e-3)
+        assert stretch.spread == pytest.approx(0.15, rel=0.3)
+    wording(passes.verdict)
 
 
 def test_a_swinging_loop_is_not_the_friction_of_the_rail() -> None:
@@ -593,19 +593,19 @@ def test_a_swinging_loop_is_not_the_friction_of_the_rail() -> None:
     rng = np.random.default_rng(9)
     log = travels([0.02, 0.033], FLAT, rng, way=0.15)
     swing = 0.4 * np.sin(2 * np.pi * 1.3 * log.time)
-    found = friction_position(replace(log, signals={**log.signals, "force": log["force"] + swing}), 1.0)
-    assert not found.separated
-    assert found.repeatability.value < 0.5
-    assert found.passes[0].harmonics[0].frequency == pytest.approx(1.3, rel=0.1)
-    assert found.passes[0].harmonics[0].amplitude == pytest.approx(0.4, rel=0.2)
+    passes = friction_position(replace(log, signals={**log.signals, "force": log["force"] + swing}), 1.0)
+    assert not passes.separated
+    assert passes.repeatability.value < 0.5
+    assert passes.passes[0].harmonics[0].frequency == pytest.approx(1.3, rel=0.1)
+    assert passes.passes[0].harmonics[0].amplitude == pytest.approx(0.4, rel=0.2)
 
 
 def test_motion_that_sticks_shows_no_dynamic_friction(wording: Wording) -> None:
     rng = np.random.default_rng(10)
     log = travels([2.5e-3], FLAT, rng, way=0.02, gains=np.array([2e3, 5.0]))
-    found = friction_position(log, 1.0)
-    assert not found.separated
-    wording(found.verdict)
+    passes = friction_position(log, 1.0)
+    assert not passes.separated
+    wording(passes.verdict)
     assert len(friction_velocity(log, 1.0).unsteady) == 2
 
 
@@ -613,9 +613,9 @@ def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow(wording
     rng = np.random.default_rng(11)
     log = travels([0.05], field(3e-3, 0.15, rng), rng)
     half = record("one", DT, **{role: values[:2200] for role, values in log.signals.items()})
-    found = friction_position(half, 1.0)
-    assert not found.separated
-    wording(found.verdict)
+    passes = friction_position(half, 1.0)
+    assert not passes.separated
+    wording(passes.verdict)
     slow = friction_position(log, 1.0, crossover=0.1)
     assert not slow.separated
     wording(slow.verdict)
@@ -695,8 +695,8 @@ def test_means_of_correlated_samples_are_not_too_sure() -> None:
     for i in range(1, noise.shape[1]):
         rows[:, i] = 0.95 * rows[:, i - 1] + noise[:, i]
     for mean, step in ((block_mean, 1), (correlated_mean, 20)):
-        found = [mean(row[200::step]) for row in rows]
-        held = sum(abs(each.value) <= t_value(each.freedom) * each.error for each in found)
+        result = [mean(row[200::step]) for row in rows]
+        held = sum(abs(item.value) <= t_value(item.freedom) * item.error for item in result)
         assert 180 <= held <= 199
 
 
@@ -714,9 +714,9 @@ def ramps_there_and_back(speeds: Sequence[float], way: float, sample_time: float
 
 @pytest.mark.parametrize("sample_time", [1e-3, 2e-4])
 def test_the_digits_of_an_encoder_are_no_hunting(sample_time: float) -> None:
-    found = friction_velocity(ramps_there_and_back((3e-3, 5e-3, 9e-3, 15e-3, 29e-3), 0.02, sample_time, 1e-6))
-    assert not len(found.unsteady)
-    assert found.both.coulomb.holds(1.0)
+    curve = friction_velocity(ramps_there_and_back((3e-3, 5e-3, 9e-3, 15e-3, 29e-3), 0.02, sample_time, 1e-6))
+    assert not len(curve.unsteady)
+    assert curve.both.coulomb.holds(1.0)
 
 
 @pytest.mark.parametrize(("swing", "steady"), [(0.01, True), (0.2, False)])
@@ -725,8 +725,8 @@ def test_hunting_quicker_than_the_filter_is_seen(swing: float, steady: bool) -> 
     rate = 2 * np.pi * 60.0  # Hz, above the filter of the velocity
     moved = log["position"] + swing * 9e-3 / rate * np.sin(rate * log.time)
     signals = {**log.signals, "position": moved}
-    found = friction_velocity(record("hunting", log.sample_time, **signals))
-    middle = np.abs(np.abs(found.unsteady) - 9e-3) < 1e-3
+    curve = friction_velocity(record("hunting", log.sample_time, **signals))
+    middle = np.abs(np.abs(curve.unsteady) - 9e-3) < 1e-3
     assert bool(middle.any()) != steady
 
 
@@ -771,15 +771,15 @@ def test_short_and_still_records_show_nothing(length: int) -> None:
 @pytest.mark.parametrize("deviation", [0.1, 1.0, 10.0, 1e6])
 def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float, wording: Wording) -> None:
     """Its interval is one of the logarithm; beyond a factor of 1000 it tells nothing, and is no overflow."""
-    found = ResponseFit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
+    result = ResponseFit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
         "mass", "kg", "fit", lambda p: float(p[0]), positive=True
     )
-    assert found.determined == (deviation < 5)
-    assert found.low >= 0
-    if found.determined:
-        assert np.log(found.high / 2.0) == pytest.approx(1.96 * deviation / 2.0, rel=1e-3)
+    assert result.determined == (deviation < 5)
+    assert result.low >= 0
+    if result.determined:
+        assert np.log(result.high / 2.0) == pytest.approx(1.96 * deviation / 2.0, rel=1e-3)
     else:
-        wording(found.reason)
+        wording(result.reason)
 
 
 def test_runs_are_the_stretches_of_a_mask() -> None:

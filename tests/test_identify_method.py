@@ -40,8 +40,8 @@ def base() -> Stage:
 
 
 def test_estimates_far_beyond_their_intervals_disagree() -> None:
-    (one,), said = combined([normal("k", "N", 1.0, 0.0102, "a"), normal("k", "N", 1.07, 0.0102, "b")])
-    assert len(said) == 1
+    (one,), text = combined([normal("k", "N", 1.0, 0.0102, "a"), normal("k", "N", 1.07, 0.0102, "b")])
+    assert len(text) == 1
     assert one.low == pytest.approx(0.98, abs=1e-3)
     assert one.high == pytest.approx(1.09, abs=1e-3)
 
@@ -54,16 +54,16 @@ def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -
     rng = np.random.default_rng(seed)
     cases = [[normal("k", "N", rng.normal(5, 0.5), 0.02, "a") for _ in range(count)] for _ in range(200)]
     answers = [combined(case)[0][0] for case in cases]
-    assert sum(each.holds(5) for each in answers) > 170
+    assert sum(answer.holds(5) for answer in answers) > 170
     vague = [combined([*case, normal("k", "N", 55.0, 50.0, "b")])[0][0] for case in cases]
-    wider = [more.half_width / each.half_width for more, each in zip(vague, answers, strict=True)]
+    wider = [more.half_width / answer.half_width for more, answer in zip(vague, answers, strict=True)]
     assert np.median(wider) == pytest.approx(1, abs=0.02)
 
 
 def test_what_is_systematic_does_not_average_out() -> None:
     """Nine readings whose intervals of 0.3 are by a third noise: the noise becomes a third, the rest stays."""
-    each = Estimate("k", "N", 5.0, 4.7, 5.3, "a", systematic=0.2)
-    (one,), _ = combined([each] * 9)
+    item = Estimate("k", "N", 5.0, 4.7, 5.3, "a", systematic=0.2)
+    (one,), _ = combined([item] * 9)
     assert one.half_width == pytest.approx(0.2 + 0.1 / 3)
     assert one.systematic == pytest.approx(0.2)
 
@@ -76,23 +76,23 @@ def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, co
     spread = rng.uniform(0.5, 2, count)
     cases = [[normal("k", "N", rng.normal(5, s), s, "a") for s in spread] for _ in range(200)]
     answers = [combined(case) for case in cases]
-    assert sum(bool(said) for _, said in answers) <= 14
-    assert sum(found[0].holds(5) for found, _ in answers) > 170
+    assert sum(bool(text) for _, text in answers) <= 14
+    assert sum(result[0].holds(5) for result, _ in answers) > 170
 
 
 def test_bounds_of_what_is_not_shown_are_kept() -> None:
-    (one,), said = combined([unknown(STATIC, "N", "moves", "no"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
-    assert (one.low, one.high, one.reason, said) == (5.0, np.inf, "stops", [])
-    (both,), said = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 8.0)])
-    assert (both.low, both.high, said) == (5.0, 8.0, [])
-    (hull,), said = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 4.0)])
-    assert (hull.low, hull.high, len(said)) == (2.0, np.inf, 1)
+    (one,), text = combined([unknown(STATIC, "N", "moves", "no"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
+    assert (one.low, one.high, one.reason, text) == (5.0, np.inf, "stops", [])
+    (both,), text = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 8.0)])
+    assert (both.low, both.high, text) == (5.0, 8.0, [])
+    (hull,), text = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 4.0)])
+    assert (hull.low, hull.high, len(text)) == (2.0, np.inf, 1)
 
 
 def test_a_value_beyond_what_another_leaves_possible_is_told() -> None:
-    (one,), said = combined([normal(STATIC, "N", 3.0, 0.1, "moves"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
+    (one,), text = combined([normal(STATIC, "N", 3.0, 0.1, "moves"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
     assert one.value == 3.0
-    assert len(said) == 1
+    assert len(text) == 1
 
 
 # how they hang together
@@ -148,11 +148,11 @@ ODD = {
 
 @pytest.mark.parametrize("case", ODD)
 def test_the_stage_is_always_written(case: str, base: Stage) -> None:
-    found = fitting(base, ODD[case])
-    stage = identified(base, found.estimates, ["log"])
+    fit = fitting(base, ODD[case])
+    stage = identified(base, fit.estimates, ["log"])
     flat = stage.flat()
     assert flat[STATIC] >= flat[COULOMB]
-    assert found.notes
+    assert fit.notes
     if stage.uncertain():
         assert draw(stage, Correlations(), 16, 1).count == 16
 
@@ -163,17 +163,17 @@ def test_ranges_begin_above_zero(base: Stage) -> None:
 
 
 def test_static_friction_moves_along_with_coulomb(base: Stage) -> None:
-    found = fitting(base, ODD["Coulomb above the static friction of the stage"])
-    assert dict(found.follows) == {STATIC: COULOMB}
-    assert {each.name: each.value for each in found.estimates} == {COULOMB: 25.0, STATIC: 25.0}
+    fit = fitting(base, ODD["Coulomb above the static friction of the stage"])
+    assert dict(fit.follows) == {STATIC: COULOMB}
+    assert {estimate.name: estimate.value for estimate in fit.estimates} == {COULOMB: 25.0, STATIC: 25.0}
 
 
 def test_static_friction_is_no_less_than_its_bound(base: Stage, wording: Wording) -> None:
     stage = identified(base, fitting(base, ODD["static at least"]).estimates, ["log"])
     assert stage.uncertain()[STATIC].low == 35.0
-    known = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
-    assert known.estimates == ()
-    wording(known.notes[0])
+    fit = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
+    assert fit.estimates == ()
+    wording(fit.notes[0])
 
 
 def steady(speeds: list[float], rng: np.random.Generator) -> Log:
@@ -187,13 +187,13 @@ def steady(speeds: list[float], rng: np.random.Generator) -> Log:
 @pytest.mark.parametrize("speeds", [[0.05, -0.05], [0.02, -0.02, 0.05, -0.05, 0.1, -0.1]], ids=["one", "three"])
 def test_constant_speed_without_a_stribeck_curve_gives_a_stage(speeds: list[float], base: Stage) -> None:
     low = base.replace({"masses.cart": "20 kg", STATIC: "2 N", COULOMB: "2 N"})
-    found = identify([(steady(speeds * 4, np.random.default_rng(1)), "constant-speed")], low)
-    assert found.stage is not None
-    interval = found.stage.uncertain()[COULOMB]
+    identification = identify([(steady(speeds * 4, np.random.default_rng(1)), "constant-speed")], low)
+    assert identification.stage is not None
+    interval = identification.stage.uncertain()[COULOMB]
     assert interval.low < 5 < interval.high
     if len(speeds) > 2:
-        assert {COULOMB, "friction.viscous", STATIC} <= {*found.correlations.keys}
-        matrix, keys = found.correlations.matrix, found.correlations.keys
+        assert {COULOMB, "friction.viscous", STATIC} <= {*identification.correlations.keys}
+        matrix, keys = identification.correlations.matrix, identification.correlations.keys
         assert matrix[keys.index(COULOMB), keys.index(STATIC)] == pytest.approx(1)
         assert matrix[keys.index(COULOMB), keys.index("friction.viscous")] < -0.3
 
@@ -253,13 +253,13 @@ def test_the_injected_force_makes_the_estimate_indirect() -> None:
         x += v * STEP
     held = {"position": position, "force": force, "reference": np.zeros(injected.size)}
     assert external(record("held", STEP, **held)) is None
-    told = record("told", STEP, **held, disturbance=injected)
-    assert external(told) == "disturbance"
+    labels = record("told", STEP, **held, disturbance=injected)
+    assert external(labels) == "disturbance"
     off = {}
-    for log in (told, record("held", STEP, **held)):
-        found = analyse([log])
-        model = -1 / (2 * (2 * np.pi * found.driven.frequency) ** 2)
-        off[log.name] = np.median(np.abs(found.driven.response / model - 1))
-        if log is told:
-            assert not any("give the" in text for text in found.warnings)
+    for log in (labels, record("held", STEP, **held)):
+        bench = analyse([log])
+        model = -1 / (2 * (2 * np.pi * bench.driven.frequency) ** 2)
+        off[log.name] = np.median(np.abs(bench.driven.response / model - 1))
+        if log is labels:
+            assert not any("give the" in text for text in bench.warnings)
     assert off["told"] < 0.5 * off["held"]

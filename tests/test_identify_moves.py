@@ -55,85 +55,85 @@ def quick() -> tuple[dict[str, Any], Log, IdentifiedMoves]:
 
 
 def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
-    truth, _, found = quick
-    by_name = {each.name: each for each in found.estimates}
+    truth, _, result = quick
+    by_name = {estimate.name: estimate for estimate in result.estimates}
     for name in ("masses.cart", "friction.coulomb", "friction.viscous", "bias.cart"):
-        each, true = by_name[name], truth[name]
-        assert each.determined
-        assert abs(each.value - true) < 1.5 * each.half_width, name  # half again: 5 intervals at once
-        assert each.half_width < 0.15 * abs(true)
+        item, true = by_name[name], truth[name]
+        assert item.determined
+        assert abs(item.value - true) < 1.5 * item.half_width, name  # half again: 5 intervals at once
+        assert item.half_width < 0.15 * abs(true)
     assert by_name["friction.viscous_asymmetry"].value == pytest.approx(0, abs=0.1)
 
 
 def test_the_closed_loop_has_the_last_word_and_leaves_the_noise(
     quick: tuple[dict[str, Any], Log, IdentifiedMoves],
 ) -> None:
-    found, machine = quick[2], drawn(3, False)
-    assert found.fit.problem.closed
+    result, machine = quick[2], drawn(3, False)
+    assert result.fit.problem.closed
     noise = np.hypot(machine.force_noise, machine.force_digit / 12**0.5)
-    assert found.residual.rms == pytest.approx(noise, rel=0.05)
-    assert found.errors.position < 1e-3
+    assert result.residual.rms == pytest.approx(noise, rel=0.05)
+    assert result.errors.position < 1e-3
 
 
 def test_static_friction_is_not_mistaken_for_coulomb_friction(
     quick: tuple[dict[str, Any], Log, IdentifiedMoves],
 ) -> None:
     """Slow moves are under the Stribeck effect: a fit without it must not put it into Coulomb friction."""
-    truth, _, found = quick
-    static = next(each for each in found.estimates if each.name == "friction.static")
+    truth, _, result = quick
+    static = next(estimate for estimate in result.estimates if estimate.name == "friction.static")
     assert static.low < 1.1 * truth["friction.static"]
     assert static.high > 0.9 * truth["friction.static"]
-    assert found.flat["friction.static"] == pytest.approx(truth["friction.static"], rel=0.15)
+    assert result.flat["friction.static"] == pytest.approx(truth["friction.static"], rel=0.15)
 
 
 def test_correlations_are_of_what_is_shown(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
-    found = quick[2]
-    size = len(found.correlated)
-    assert found.correlation.shape == (size, size)
-    assert np.diag(found.correlation) == pytest.approx(np.ones(size))
-    assert np.abs(found.correlation).max() <= 1 + 1e-9
-    names = [each.name for each in found.correlated]
-    assert found.correlation[names.index("friction.coulomb"), names.index("friction.viscous")] < -0.3
+    result = quick[2]
+    size = len(result.correlated)
+    assert result.correlation.shape == (size, size)
+    assert np.diag(result.correlation) == pytest.approx(np.ones(size))
+    assert np.abs(result.correlation).max() <= 1 + 1e-9
+    names = [item.name for item in result.correlated]
+    assert result.correlation[names.index("friction.coulomb"), names.index("friction.viscous")] < -0.3
 
 
 def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     """A record of the same machine with pulses beside the controller: predicted with them, not without."""
-    truth, log, found = quick
+    truth, log, result = quick
     pulses = np.zeros(len(log.time))
     for start in range(500, len(pulses) - 100, 600):
         pulses[start : start + 50] = 20 * truth["friction.coulomb"] * (-1) ** (start // 600)
-    given = replace(log, signals={**log.signals, "disturbance": pulses, "force": log["force"] * 0 + pulses})
+    changed = replace(log, signals={**log.signals, "disturbance": pulses, "force": log["force"] * 0 + pulses})
     machine = drawn(3, False)
-    full = closed_loop(machine.flat, given, given.segments[0], ()).record(np.zeros(0))
-    pushed = replace(given, signals={**given.signals, "position": full.position, "force": full.force + pulses})
-    predicted = simulated_log(found, machine.measured(pushed))
+    full = closed_loop(machine.flat, changed, changed.segments[0], ()).record(np.zeros(0))
+    pushed = replace(changed, signals={**changed.signals, "position": full.position, "force": full.force + pulses})
+    predicted = simulated_log(result, machine.measured(pushed))
     part, errors = predicted.part, predicted.errors
     assert part == pushed.segments[0]
     assert errors.force < 0.05
     assert errors.position < 5e-3
     silent = replace(pushed, signals={**pushed.signals, "disturbance": 0 * pulses})
-    assert simulated_log(found, silent).errors.force > 5 * errors.force
+    assert simulated_log(result, silent).errors.force > 5 * errors.force
 
 
 def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, IdentifiedMoves], refused: Refused) -> None:
-    _, log, found = quick
+    _, log, result = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
     with refused("reference"):
-        simulated_log(found, bare)
+        simulated_log(result, bare)
     volts = replace(log, units={"force": "V"})
     with refused("force"):
-        identify_moves(volts, found.flat, True)
+        identify_moves(volts, result.flat, True)
 
 
 def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
-    found = quick[2].fit
-    low, high = bounds_of(found.problem)
-    every = range(len(found.inner))
-    for starts in (nearby(found), everywhere(found.problem, tuple(every), found.inner)):
-        assert starts[0] == pytest.approx(found.inner)
-        free = [i for i in found.free if not found.problem.parameters[i].core]
+    result = quick[2].fit
+    low, high = bounds_of(result.problem)
+    every = range(len(result.inner))
+    for starts in (nearby(result), everywhere(result.problem, tuple(every), result.inner)):
+        assert starts[0] == pytest.approx(result.inner)
+        free = [i for i in result.free if not result.problem.parameters[i].core]
         assert np.all((starts[:, free] >= low[free] - 1e-9) & (starts[:, free] <= high[free] + 1e-9))
-        assert np.ptp(starts[:, found.free[0]]) > 0
+        assert np.ptp(starts[:, result.free[0]]) > 0
 
 
 def test_without_noise_the_fit_ends_at_the_truth() -> None:
@@ -143,21 +143,21 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     log = replace(log, signals={role: values[:2000] for role, values in log.signals.items()}, time=log.time[:2000])
     log = replace(log, segments=(slice(0, 2000),))
     flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
-    given = method._problems(log, log.segments[0], flat, method.inverse_model(log), True)[1]
-    assert given is not None
-    exact = replace(given, target=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
-    names = [each.name for each in given.parameters]
-    core = tuple(i for i, each in enumerate(given.parameters) if each.core)
+    inputs = method._problems(log, log.segments[0], flat, method.inverse_model(log), True)[1]
+    assert inputs is not None
+    exact = replace(inputs, target=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
+    names = [item.name for item in inputs.parameters]
+    core = tuple(i for i, each in enumerate(inputs.parameters) if each.core)
     kept = {"static friction ratio": flat["friction.static"] / flat["friction.coulomb"]}
-    first = first_values(given.parameters)
-    for i, each in enumerate(given.parameters):
-        if not each.core:
-            first[i] = each.inner(kept.get(each.name, flat.get(each.name)))
+    first = first_values(inputs.parameters)
+    for i, parameter in enumerate(inputs.parameters):
+        if not parameter.core:
+            first[i] = parameter.inner(kept.get(parameter.name, flat.get(parameter.name)))
     first[names.index("mass")] += 0.1
-    found = fit(exact, core, first[None])
-    assert found.cost < 1e-6 * float(costs(exact, first[None])[0])
-    assert found.value("mass") == pytest.approx(flat["masses.cart"], rel=1e-3)
-    assert found.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
+    fitted = fit(exact, core, first[None])
+    assert fitted.cost < 1e-6 * float(costs(exact, first[None])[0])
+    assert fitted.value("mass") == pytest.approx(flat["masses.cart"], rel=1e-3)
+    assert fitted.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
 
 
 # --- the record of the EMPS benchmark ------------------------------------------------------------------------------
@@ -205,7 +205,7 @@ def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, em
 
 
 def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves, wording: Wording) -> None:
-    by_name = {each.name: each for each in identified.estimates}
+    by_name = {estimate.name: estimate for estimate in identified.estimates}
     for name in ("friction.static", "friction.stribeck_velocity", *BRISTLES):
         assert not by_name[name].determined, name
         assert by_name[name].low < by_name[name].high

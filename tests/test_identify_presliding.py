@@ -77,8 +77,8 @@ def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:
     log = shaken()
     late = 2 * DT
     delayed = replace(log, signals={**log.signals, "force": np.roll(log["force"], -2)})
-    found = bristles_from_presliding(delayed, Between(delay=late))
-    assert shown(found) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=5e-3)
+    bristles = bristles_from_presliding(delayed, Between(delay=late))
+    assert shown(bristles) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=5e-3)
     unknown = bristles_from_presliding(delayed)  # looked for: what came 1 ms late would add 100 N s/m to the damping
     assert shown(unknown) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=5e-3)
     wrong = bristles_from_presliding(delayed, Between(delay=late / 2))
@@ -98,10 +98,10 @@ def test_a_held_joint_gives_way_in_series() -> None:
         bent = (force + beyond * acceleration) / contact
         position = log["position"] + bent
     whole = replace(log, signals={**log.signals, "position": position, "force": force + beyond * acceleration})
-    found = bristles_from_presliding(
+    bristles = bristles_from_presliding(
         whole, Between(contact=contact, mass=MASS + beyond, beyond=beyond / (MASS + beyond))
     )
-    assert found.stiffness.value == pytest.approx(STIFFNESS, rel=5e-3)
+    assert bristles.stiffness.value == pytest.approx(STIFFNESS, rel=5e-3)
     soft = bristles_from_presliding(whole)
     assert soft.stiffness.value == pytest.approx(1 / (1 / STIFFNESS + 1 / contact), rel=0.01)
 
@@ -116,16 +116,16 @@ def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
     more = (omega / (2 * np.pi * mode)) ** 2
     extra = -2e-7 * share * MASS * (more / (1 - more) * omega**2 * np.sin(phases)).sum(axis=0)
     shaking = replace(log, signals={**log.signals, "force": log["force"] + extra})
-    found = bristles_from_presliding(shaking)
-    assert found.mass.value == pytest.approx(MASS, rel=2e-3)
-    known = bristles_from_presliding(shaking, Between(delay=0.0, mode=StructureMode(share, mode, 1e-6)))
-    assert known.mass.value == pytest.approx(MASS, rel=1e-3)
+    bristles = bristles_from_presliding(shaking)
+    assert bristles.mass.value == pytest.approx(MASS, rel=2e-3)
+    expected = bristles_from_presliding(shaking, Between(delay=0.0, mode=StructureMode(share, mode, 1e-6)))
+    assert expected.mass.value == pytest.approx(MASS, rel=1e-3)
 
 
 def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it(wording: Wording) -> None:
-    found = bristles_from_presliding(shaken(noise=2e-9))
-    assert found.stiffness.holds(STIFFNESS)
-    assert found.damping.holds(DAMPING)
+    bristles = bristles_from_presliding(shaken(noise=2e-9))
+    assert bristles.stiffness.holds(STIFFNESS)
+    assert bristles.damping.holds(DAMPING)
     lost = bristles_from_presliding(shaken(noise=2e-7))
     wording(lost.stiffness.reason)
 
@@ -149,26 +149,26 @@ def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> N
 @pytest.mark.parametrize("size", [2e-5, 5e-5, 1e-4])
 def test_sliding_is_not_taken_for_bristles(size: float, wording: Wording) -> None:
     """Most of the force is inertia then, which hides how little of the friction the model explains."""
-    found = bristles_from_presliding(shaken(size=size))
-    assert not found.stiffness.determined
-    wording(found.stiffness.reason)
+    bristles = bristles_from_presliding(shaken(size=size))
+    assert not bristles.stiffness.determined
+    wording(bristles.stiffness.reason)
 
 
 @pytest.mark.parametrize("strength", [0.3, 2.0])
 def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> None:
     stage = locked(friso.load(EXAMPLE))
     log = rig_log(excite(stage, 0.02, 1, kind=replace(GENTLE, strength=strength)), 0, "x", None, stage, 1).log
-    found = bristles_from_presliding(log, between(stage.flat()))
-    assert not any(each.determined for each in (found.mass, found.damping, found.stiffness))
+    bristles = bristles_from_presliding(log, between(stage.flat()))
+    assert not any(item.determined for item in (bristles.mass, bristles.damping, bristles.stiffness))
 
 
 def test_a_slow_current_loop_is_taken_off() -> None:
     stage = locked(friso.load(EXAMPLE)).replace({"drive.current_bandwidth": "100 Hz"})
     flat = stage.flat()
-    found = bristles_from_presliding(presliding_log(stage, "slow", 0.02, 1).log, between(flat))
-    assert found.damping.value == pytest.approx(flat["friction.bristle_damping"], rel=0.03)
-    assert found.damping.holds(flat["friction.bristle_damping"])
-    assert found.mass.holds(1.7)
+    bristles = bristles_from_presliding(presliding_log(stage, "slow", 0.02, 1).log, between(flat))
+    assert bristles.damping.value == pytest.approx(flat["friction.bristle_damping"], rel=0.03)
+    assert bristles.damping.holds(flat["friction.bristle_damping"])
+    assert bristles.mass.holds(1.7)
 
 
 def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness(wording: Wording) -> None:
@@ -178,11 +178,11 @@ def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness(wording: Wording
     stage = friso.load(EXAMPLE).replace({"drive.relative_noise": "1 nm", **none})
     flat = stage.flat()
     log = presliding_log(stage, "free", 0.02, 1).log
-    found = bristles_from_presliding(log, between(flat))
-    assert found.stiffness.holds(flat["friction.bristle_stiffness"])
-    assert found.damping.holds(flat["friction.bristle_damping"])
-    assert found.mass.holds(1.7)
-    assert found.stiffness.half_width < 0.1 * found.stiffness.value
+    bristles = bristles_from_presliding(log, between(flat))
+    assert bristles.stiffness.holds(flat["friction.bristle_stiffness"])
+    assert bristles.damping.holds(flat["friction.bristle_damping"])
+    assert bristles.mass.holds(1.7)
+    assert bristles.stiffness.half_width < 0.1 * bristles.stiffness.value
     blind = replace(log, signals={role: log.signals[role] for role in ("position", "force")})
     wording(bristles_from_presliding(blind, between(flat)).stiffness.reason)
 
@@ -192,10 +192,10 @@ def test_the_jackknife_is_the_covariance_of_least_squares() -> None:
     not."""
     rng, count = np.random.default_rng(5), 800
     columns = rng.standard_normal((count, 3)) @ np.array([[1, 0.8, 0], [0, 0.6, 0], [0, 0, 1e-5]])
-    known = np.linalg.inv(columns.T @ columns)
-    found = np.mean([jackknife(columns, rng.standard_normal(count)) for _ in range(400)], axis=0)
-    size = np.sqrt(np.diag(known))
-    assert found / np.outer(size, size) == pytest.approx(known / np.outer(size, size), abs=0.15)
+    expected = np.linalg.inv(columns.T @ columns)
+    average = np.mean([jackknife(columns, rng.standard_normal(count)) for _ in range(400)], axis=0)
+    size = np.sqrt(np.diag(expected))
+    assert average / np.outer(size, size) == pytest.approx(expected / np.outer(size, size), abs=0.15)
 
 
 def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
@@ -206,11 +206,11 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
         machine = built(seed)
         stage, flat = locked(machine.truth), machine.flat
         log = presliding_log(stage, "presliding", travel(stage)[0], seed).log
-        found = bristles_from_presliding(log, between({**flat, "masses.stage": 1.2 * flat["masses.stage"]}))
+        bristles = bristles_from_presliding(log, between({**flat, "masses.stage": 1.2 * flat["masses.stage"]}))
         mass = flat["masses.cart"] + flat["masses.stage"]
-        held += found.stiffness.holds(flat["friction.bristle_stiffness"])
-        held += found.damping.holds(flat["friction.bristle_damping"]) + found.mass.holds(mass)
-        widths.append([found.stiffness.half_width / flat["friction.bristle_stiffness"]])
+        held += bristles.stiffness.holds(flat["friction.bristle_stiffness"])
+        held += bristles.damping.holds(flat["friction.bristle_damping"]) + bristles.mass.holds(mass)
+        widths.append([bristles.stiffness.half_width / flat["friction.bristle_stiffness"]])
     assert held >= 32
     assert np.median(widths) < 0.02
 
@@ -219,10 +219,10 @@ def test_the_stage_file_takes_bristles_and_masses() -> None:
     machine = built(3)
     stage = locked(machine.truth)
     logs = [presliding_log(stage, f"small_{n}", travel(stage)[0], n).log for n in (1, 2)]
-    found = identify([(log, "presliding") for log in logs], machine.guess)
-    assert found.stage is not None
-    flat = found.stage.flat()
+    identification = identify([(log, "presliding") for log in logs], machine.guess)
+    assert identification.stage is not None
+    flat = identification.stage.flat()
     for key in ("friction.bristle_stiffness", "friction.bristle_damping", "masses.cart", "masses.stage"):
         assert flat[key] == pytest.approx(machine.flat[key], rel=0.03)
-    places = [found.correlations.keys.index(f"masses.{name}") for name in ("cart", "stage")]
-    assert found.correlations.matrix[places[0], places[1]] == pytest.approx(1)
+    places = [identification.correlations.keys.index(f"masses.{name}") for name in ("cart", "stage")]
+    assert identification.correlations.matrix[places[0], places[1]] == pytest.approx(1)

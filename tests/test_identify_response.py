@@ -48,8 +48,8 @@ def played(
     off = rng.normal(size=(2, len(lines))) / np.sqrt(2)
     answer = np.zeros_like(spectrum)
     answer[lines] = spectrum[lines] * truth(lines / (PERIOD * DT)) * (1 + distortion * (off[0] + 1j * off[1]))
-    given, output = (np.tile(np.fft.irfft(each), periods) for each in (spectrum, answer))
-    return ResponseRecord(given, output + noise * np.std(output) * rng.normal(size=len(output)), DT)
+    inputs, output = (np.tile(np.fft.irfft(item), periods) for item in (spectrum, answer))
+    return ResponseRecord(inputs, output + noise * np.std(output) * rng.normal(size=len(output)), DT)
 
 
 def exact(
@@ -73,11 +73,11 @@ def test_exact_period_and_whole_periods_from_the_end(before: int, after: int) ->
     rng = np.random.default_rng(1)
     once = np.fft.irfft(np.r_[0, np.exp(2j * np.pi * rng.random(40)), np.zeros(459)], 997)
     ragged = np.tile(once, 6)[997 - before % 997 :] if before else np.tile(once, 5)
-    found = find_periods(np.concatenate([ragged, np.zeros(after)]))
-    assert found.samples == 997
-    assert found.stop == pytest.approx(len(ragged), abs=20)
-    assert found.count == (found.stop // 997)
-    assert found.stop - found.start == found.count * 997
+    periods = find_periods(np.concatenate([ragged, np.zeros(after)]))
+    assert periods.samples == 997
+    assert periods.stop == pytest.approx(len(ragged), abs=20)
+    assert periods.count == (periods.stop // 997)
+    assert periods.stop - periods.start == periods.count * 997
 
 
 def test_a_period_given_roughly_is_corrected_and_that_is_said() -> None:
@@ -91,8 +91,8 @@ def test_a_period_given_roughly_is_corrected_and_that_is_said() -> None:
 def test_noise_on_the_input_does_not_move_the_period() -> None:
     rng = np.random.default_rng(3)
     record = played(rng, rig, np.arange(1, 40))
-    found = find_periods(record.input + 0.1 * np.std(record.input) * rng.normal(size=len(record.input)))
-    assert (found.samples, found.count) == (PERIOD, 6)
+    periods = find_periods(record.input + 0.1 * np.std(record.input) * rng.normal(size=len(record.input)))
+    assert (periods.samples, periods.count) == (PERIOD, 6)
 
 
 def test_what_does_not_repeat_is_refused(refused: Refused) -> None:
@@ -118,8 +118,8 @@ def test_deviations_hold_the_truth_on_95_percent_of_lines() -> None:
     for _ in range(40):
         one = multisine([played(rng, rig, lines, 8, noise=0.05)])
         three = multisine([played(rng, rig, lines, 6, noise=0.02, distortion=0.05) for _ in range(3)])
-        for name, found in (("noise", one), ("both", three)):
-            band, truth = found.band(), np.abs(rig(found.frequency))
+        for name, result in (("noise", one), ("both", three)):
+            band, truth = result.band(), np.abs(rig(result.frequency))
             inside[name].append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
     assert np.mean(inside["noise"]) == pytest.approx(0.95, abs=0.02)
     assert np.mean(inside["both"]) == pytest.approx(0.95, abs=0.03)
@@ -127,12 +127,12 @@ def test_deviations_hold_the_truth_on_95_percent_of_lines() -> None:
 
 def test_noise_and_distortion_are_told_apart() -> None:
     rng, lines = np.random.default_rng(6), np.arange(2, 60)
-    found = multisine([played(rng, rig, lines, 6, noise=1e-4, distortion=0.1) for _ in range(8)])
-    relative = found.distortion / np.abs(found.response) * np.sqrt(8)
+    result = multisine([played(rng, rig, lines, 6, noise=1e-4, distortion=0.1) for _ in range(8)])
+    relative = result.distortion / np.abs(result.response) * np.sqrt(8)
     assert np.sqrt(np.mean(relative**2)) == pytest.approx(0.1, rel=0.15)
     quiet = multisine([played(rng, rig, lines, 6, noise=0.02) for _ in range(8)])
     assert np.median(quiet.distortion / quiet.noise) < 1.0
-    assert np.sqrt(np.mean((found.deviation**2 - found.noise**2 - found.distortion**2) ** 2)) < 1e-12
+    assert np.sqrt(np.mean((result.deviation**2 - result.noise**2 - result.distortion**2) ** 2)) < 1e-12
 
 
 def test_one_realisation_says_that_distortion_is_unknown_unless_lines_are_free(wording: Wording) -> None:
@@ -151,9 +151,9 @@ def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
     record = played(rng, rig, lines, 8, noise=1e-3)
     time = np.arange(len(record.output)) * DT
     start = 3 * np.std(record.output) * np.exp(-time / 0.5) * np.cos(60 * time)
-    found = multisine([ResponseRecord(record.input, record.output + start + 1e-3 * time, DT)])
-    assert any("transient" in text for text in found.warnings)
-    assert np.abs(found.response / rig(found.frequency) - 1).max() < 0.05
+    result = multisine([ResponseRecord(record.input, record.output + start + 1e-3 * time, DT)])
+    assert any("transient" in text for text in result.warnings)
+    assert np.abs(result.response / rig(result.frequency) - 1).max() < 0.05
     assert not any("transient" in text for text in multisine([record]).warnings)
 
 
@@ -207,9 +207,9 @@ def test_bad_records_are_refused(spoilt: Callable[[ResponseRecord], ResponseReco
 
 def test_weak_lines_are_left_out_and_nothing_left_is_an_error(refused: Refused, wording: Wording) -> None:
     rng = np.random.default_rng(11)
-    found = multisine([played(rng, rig, np.arange(2, 200), noise=0.3)])
-    strong = found.usable()
-    assert 0 < len(strong.frequency) < len(found.frequency)
+    result = multisine([played(rng, rig, np.arange(2, 200), noise=0.3)])
+    strong = result.usable()
+    assert 0 < len(strong.frequency) < len(result.frequency)
     wording(strong.warnings[-1])
     record = played(rng, rig, np.arange(2, 60))
     with refused("excitation"):
@@ -217,13 +217,13 @@ def test_weak_lines_are_left_out_and_nothing_left_is_an_error(refused: Refused, 
 
 
 def test_other_forms_of_a_response(refused: Refused) -> None:
-    found = multisine([played(np.random.default_rng(12), rig, np.arange(2, 60), noise=0.01)])
-    assert found.accelerations().response == pytest.approx(-((2 * np.pi * found.frequency) ** 2) * found.response)
-    assert found.accelerations().channels.output_unit == "m/s^2"
-    frd = found.frd()
-    assert frd(2j * np.pi * found.frequency[3]) == pytest.approx(found.response[3])
+    result = multisine([played(np.random.default_rng(12), rig, np.arange(2, 60), noise=0.01)])
+    assert result.accelerations().response == pytest.approx(-((2 * np.pi * result.frequency) ** 2) * result.response)
+    assert result.accelerations().channels.output_unit == "m/s^2"
+    frd = result.frd()
+    assert frd(2j * np.pi * result.frequency[3]) == pytest.approx(result.response[3])
     with refused("band"):
-        found.between(400, 500)
+        result.between(400, 500)
 
 
 def test_a_log_becomes_a_record(refused: Refused) -> None:
@@ -251,43 +251,43 @@ def test_arbitrary_excitation_holds_the_truth() -> None:
     rng = np.random.default_rng(13)
     inside: dict[str, list[float]] = {"welch": [], "local polynomial": []}
     for _ in range(12):
-        given = rng.normal(size=20000)
-        output = signal.lfilter(B, A, given) + 0.05 * rng.normal(size=20000)
-        for found in (
-            welch(ResponseRecord(given, output, DT), 0.5),
-            local_polynomial(ResponseRecord(given, output, DT)),
+        estimate = rng.normal(size=20000)
+        output = signal.lfilter(B, A, estimate) + 0.05 * rng.normal(size=20000)
+        for result in (
+            welch(ResponseRecord(estimate, output, DT), 0.5),
+            local_polynomial(ResponseRecord(estimate, output, DT)),
         ):
-            band, truth = found.band(), np.abs(filtered(found.frequency))
-            part = (found.frequency < 30) | (found.frequency > 55)  # Welch is biased at the resonance by leakage
-            inside[found.kind].append(np.mean(((band.magnitude_low <= truth) & (truth <= band.magnitude_high))[part]))
+            band, truth = result.band(), np.abs(filtered(result.frequency))
+            part = (result.frequency < 30) | (result.frequency > 55)  # Welch is biased at the resonance by leakage
+            inside[result.kind].append(np.mean(((band.magnitude_low <= truth) & (truth <= band.magnitude_high))[part]))
     assert np.mean(inside["welch"]) == pytest.approx(0.95, abs=0.03)
     assert np.mean(inside["local polynomial"]) == pytest.approx(0.95, abs=0.03)
 
 
 def test_local_polynomials_are_free_of_the_leakage_that_welch_has() -> None:
     rng = np.random.default_rng(14)
-    given = rng.normal(size=8000)
-    record = ResponseRecord(given, signal.lfilter(B, A, given), DT)
+    estimate = rng.normal(size=8000)
+    record = ResponseRecord(estimate, signal.lfilter(B, A, estimate), DT)
     peak = 0.5 / (2 * np.pi * DT)
     worst = [
-        np.max(np.abs(each.response / filtered(each.frequency) - 1)[np.abs(each.frequency - peak) < 3])
-        for each in (welch(record, 1.0), local_polynomial(record))
+        np.max(np.abs(item.response / filtered(item.frequency) - 1)[np.abs(item.frequency - peak) < 3])
+        for item in (welch(record, 1.0), local_polynomial(record))
     ]
     assert worst[1] < 1e-2 < 5e-2 < worst[0]
 
 
 def test_coherence_falls_with_noise_and_short_records_are_refused(refused: Refused) -> None:
     rng = np.random.default_rng(15)
-    given = rng.normal(size=20000)
+    estimate = rng.normal(size=20000)
     clean, noisy = (
-        welch(ResponseRecord(given, signal.lfilter(B, A, given) + size * rng.normal(size=20000), DT), 1.0)
+        welch(ResponseRecord(estimate, signal.lfilter(B, A, estimate) + size * rng.normal(size=20000), DT), 1.0)
         for size in (0.0, 3.0)
     )
     assert clean.coherence is not None
     assert noisy.coherence is not None
     assert np.median(clean.coherence) > 0.999 > 0.3 > np.median(noisy.coherence)
     with refused("resolution"):
-        welch(ResponseRecord(given, given, DT), 0.03)
+        welch(ResponseRecord(estimate, estimate, DT), 0.03)
 
 
 # Closed loop
@@ -312,7 +312,7 @@ def test_indirect_estimates_are_right_where_direct_ones_are_not() -> None:
     direct = ResponseRecord(record.input, record.output, DT)
     for method in (lambda one: welch(one, 2.0), local_polynomial):
         good, bad = method(record), method(direct)
-        off = [np.mean(np.abs(each.response - loop_plant(each.frequency)) / each.deviation) for each in (good, bad)]
+        off = [np.mean(np.abs(item.response - loop_plant(item.frequency)) / item.deviation) for item in (good, bad)]
         assert off[0] < 1.1
         assert off[1] > 2
         assert disagreement(bad, good)
@@ -325,8 +325,8 @@ def test_indirect_multisine_holds_the_truth() -> None:
         for _ in range(2):
             once = played(rng, rig, np.arange(2, 100), 1).input
             records.append(looped(rng, 8 * PERIOD, np.tile(once, 8) / np.std(once), noise=0.3))
-        found = multisine(records)
-        band, truth = found.band(), np.abs(loop_plant(found.frequency))
+        result = multisine(records)
+        band, truth = result.band(), np.abs(loop_plant(result.frequency))
         inside.append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
     assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
 
@@ -340,11 +340,11 @@ def test_feedback_is_noticed_and_not_imagined(wording: Wording) -> None:
     assert feedback(ResponseRecord(periodic.input, periodic.output, DT))
     white = rng.normal(size=8000)
     coloured = signal.lfilter(*signal.butter(4, 0.2), rng.normal(size=8000))
-    for given in (white, coloured):
-        output = signal.lfilter(B, A, given) + 0.1 * rng.normal(size=8000)
-        assert feedback(ResponseRecord(given, output, DT), direct=True) == ()
+    for inputs in (white, coloured):
+        output = signal.lfilter(B, A, inputs) + 0.1 * rng.normal(size=8000)
+        assert feedback(ResponseRecord(inputs, output, DT), direct=True) == ()
         later = np.r_[0.0, output[:-1]]
-        assert feedback(ResponseRecord(given, later, DT)) == ()
+        assert feedback(ResponseRecord(inputs, later, DT)) == ()
     assert feedback(played(rng, rig, np.arange(2, 60), noise=0.05)) == ()
 
 
@@ -353,23 +353,23 @@ def test_crossover_of_the_open_loop() -> None:
     truth = np.sqrt(40.0 / (2 * np.pi) ** 2 / 1.7) * np.sqrt(100)
     for _ in range(100):
         plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.02, rng)
-        (found,) = crossovers(open_loop(plant, np.full(len(frequency), 4000.0)))
-        held += found.holds(truth)
+        (result,) = crossovers(open_loop(plant, np.full(len(frequency), 4000.0)))
+        held += result.holds(truth)
     assert held >= 88
 
 
 def test_a_noisy_open_loop_crosses_once() -> None:
     """Lines closer than the noise pass 0 dB several times."""
     frequency, rng = np.arange(1.0, 100.0, 0.25), np.random.default_rng(28)
-    truth, passed, found = np.sqrt(4000.0 / 1.7) / (2 * np.pi), [], []
+    truth, passed, result = np.sqrt(4000.0 / 1.7) / (2 * np.pi), [], []
     for _ in range(40):
         plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.1, rng)
         loop = open_loop(plant, np.full(len(frequency), 4000.0))
         passed.append(np.count_nonzero(np.diff(np.abs(loop.response) > 1)))
-        found.append(crossovers(loop))
+        result.append(crossovers(loop))
     assert np.mean(passed) > 1.5
-    assert [len(each) for each in found].count(1) >= 38
-    assert sum(each[0].holds(truth) for each in found) >= 36
+    assert [len(each) for each in result].count(1) >= 38
+    assert sum(item[0].holds(truth) for item in result) >= 36
 
 
 # Lines and modes
@@ -377,9 +377,9 @@ def test_a_noisy_open_loop_crosses_once() -> None:
 
 def test_mass_lines_of_both_masses() -> None:
     rng = np.random.default_rng(20)
-    found = mass_lines(exact(rig, np.arange(0.5, 100, 0.5), 0.01, rng))
-    assert [line.value.holds(mass) for line, mass in zip(found, (1.7, 1.2), strict=True)] == [True, True]
-    assert found[0].high < 8.0 < 13.0 < found[1].low
+    lines = mass_lines(exact(rig, np.arange(0.5, 100, 0.5), 0.01, rng))
+    assert [line.value.holds(mass) for line, mass in zip(lines, (1.7, 1.2), strict=True)] == [True, True]
+    assert lines[0].high < 8.0 < 13.0 < lines[1].low
 
 
 def test_mass_line_intervals_hold_the_mass() -> None:
@@ -409,9 +409,9 @@ def test_modes_and_their_intervals() -> None:
     rng, held = np.random.default_rng(23), {"resonance": 0, "antiresonance": 0}
     antiresonance = np.sqrt(2400 / 0.5) / (2 * np.pi)
     for _ in range(40):
-        found = fit_modes(exact(rig, np.arange(2.0, 40, 1.0), 0.03, rng), rigid=True, most=1)
-        held["resonance"] += found["resonance 1 frequency"].holds(antiresonance * np.sqrt(1.7 / 1.2))
-        held["antiresonance"] += found["antiresonance 1 frequency"].holds(antiresonance)
+        fit = fit_modes(exact(rig, np.arange(2.0, 40, 1.0), 0.03, rng), rigid=True, most=1)
+        held["resonance"] += fit["resonance 1 frequency"].holds(antiresonance * np.sqrt(1.7 / 1.2))
+        held["antiresonance"] += fit["antiresonance 1 frequency"].holds(antiresonance)
     assert min(held.values()) >= 35
 
 
@@ -421,14 +421,14 @@ def test_the_number_of_modes_is_found_and_said(refused: Refused) -> None:
         modes = ((11.0, 0.02, 0.4), (60.0, 0.01, 0.3))
         return 0.6 / s**2 + sum(r / (s**2 + 4 * np.pi * f * z * s + (2 * np.pi * f) ** 2) for f, z, r in modes)
 
-    found = fit_modes(exact(three, np.geomspace(3, 100, 150), 0.02, np.random.default_rng(24)))
-    assert (found.shape.modes, found.shape.rigid, found.shape.constant) == (2, True, False)
-    assert found.order.startswith("2 modes + rigid body")
+    fit = fit_modes(exact(three, np.geomspace(3, 100, 150), 0.02, np.random.default_rng(24)))
+    assert (fit.shape.modes, fit.shape.rigid, fit.shape.constant) == (2, True, False)
+    assert fit.order.startswith("2 modes + rigid body")
     for number, (frequency, damping) in enumerate(((11.0, 0.02), (60.0, 0.01)), 1):
-        assert found[f"resonance {number} frequency"].value == pytest.approx(frequency, rel=0.01)
-        assert found[f"resonance {number} damping ratio"].value == pytest.approx(damping, rel=0.2)
-    assert found.low_level.value == pytest.approx(0.6, rel=0.02)
-    assert found.high_level.value == pytest.approx(1.3, rel=0.02)
+        assert fit[f"resonance {number} frequency"].value == pytest.approx(frequency, rel=0.01)
+        assert fit[f"resonance {number} damping ratio"].value == pytest.approx(damping, rel=0.2)
+    assert fit.low_level.value == pytest.approx(0.6, rel=0.02)
+    assert fit.high_level.value == pytest.approx(1.3, rel=0.02)
     with refused("band"):
         fit_modes(exact(three, np.arange(3.0, 10.0), 0.02, None))
 
@@ -459,21 +459,21 @@ def test_two_mass_intervals_hold_the_truth() -> None:
     held = dict.fromkeys(truth, 0)
     for _ in range(60):
         both = [exact(lambda f, i=i: rig(f, i), frequency, 0.03, rng) for i in (0, 1)]
-        found = fit_two_mass(*both)
+        fit = fit_two_mass(*both)
         for name, value in truth.items():
-            held[name] += found[name].holds(value)
+            held[name] += fit[name].holds(value)
     assert min(held.values()) >= 53, held
 
 
 def test_two_mass_predicts_another_record_and_signs_are_told(refused: Refused, wording: Wording) -> None:
     rng, lines = np.random.default_rng(26), np.arange(6, 80)
     first, second = (multisine([played(rng, lambda f, i=i: -rig(f, i), lines, noise=0.01)]) for i in (0, 1))
-    found = fit_two_mass(first, second, (3, 40))
-    assert found.signs == (-1.0, -1.0)
-    wording(found.warnings[0])
+    fit = fit_two_mass(first, second, (3, 40))
+    assert fit.signs == (-1.0, -1.0)
+    wording(fit.warnings[0])
     for collocated, which in ((True, 0), (False, 1)):
         aside = played(rng, lambda f, i=which: -rig(f, i), lines, noise=0.01)
-        assert relative_error(lambda f, c=collocated: found.predict(f, c), aside, (3, 20)) < 0.02
+        assert relative_error(lambda f, c=collocated: fit.predict(f, c), aside, (3, 20)) < 0.02
     assert relative_error(lambda f: 0.0 * f, aside, (3, 20)) == pytest.approx(1.0)
     with refused("band"):
         relative_error(rig, aside, (200, 220))
@@ -502,10 +502,10 @@ def dragged(frequency: np.ndarray) -> np.ndarray:
 def test_departure_from_the_mass_line(wording: Wording) -> None:
     rng, frequency = np.random.default_rng(28), np.arange(0.2, 20, 0.2)
     response = exact(dragged, frequency, 0.05, rng)
-    found = departure(response, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
-    assert found.frequency.determined
-    assert 1.0 < found.frequency.value < 8.0  # damping is a tenth of the inertia force at 7.5 Hz
-    assert found.differ is None
+    result = departure(response, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
+    assert result.frequency.determined
+    assert 1.0 < result.frequency.value < 8.0  # damping is a tenth of the inertia force at 7.5 Hz
+    assert result.differ is None
     straight = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.05, rng)
     none = departure(straight, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
     assert not none.frequency.determined
@@ -521,12 +521,12 @@ def test_coulomb_friction_behind_a_departure() -> None:
     paths, velocities = slid(np.tile(inputs, 8), DT, mass, level, 3.0)
     records = [ResponseRecord(sign * np.tile(one, 8), path, DT) for one, path in zip(inputs, paths, strict=True)]
     response = multisine(records)
-    found = friction_from_departure(response, list(velocities), (0.4, 6.0), sign)
-    assert found.coulomb.holds(level)
-    assert found.coulomb.half_width < 0.5 * level
-    told = explained(found, response, sign * inputs, DT, (0.4, 6.0))
-    assert told.left < 0.4
-    low = {factor: np.mean(np.abs(each.response[1:6])) for factor, each in told.responses.items()}
+    result = friction_from_departure(response, list(velocities), (0.4, 6.0), sign)
+    assert result.coulomb.holds(level)
+    assert result.coulomb.half_width < 0.5 * level
+    explanation = explained(result, response, sign * inputs, DT, (0.4, 6.0))
+    assert explanation.left < 0.4
+    low = {factor: np.mean(np.abs(item.response[1:6])) for factor, item in explanation.responses.items()}
     assert low[0.5] < low[1.0] < low[2.0]  # the smaller the force, the more friction holds the mass back
 
 
@@ -543,8 +543,8 @@ def test_sliding_mass_against_its_closed_form() -> None:
 
 @pytest.mark.parametrize(("value", "factors"), [(0.0, (1.0,)), (0.1, (0.5, 2.0))])
 def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], refused: Refused) -> None:
-    some = Estimate.normal("x", "N", value, 0.01, "")
-    drag = Drag(some, some, some, some, 1.0, 1.0, 0.1, ())
+    estimate = Estimate.normal("x", "N", value, 0.01, "")
+    drag = Drag(estimate, estimate, estimate, estimate, 1.0, 1.0, 0.1, ())
     response = exact(dragged, np.arange(1.0, 30), 0.05, None)
     with refused():
         explained(drag, response, [np.ones(100)], DT, (1, 20), factors)
@@ -592,11 +592,11 @@ def test_limit_cases_are_recognised(cart: str) -> None:
         return np.asarray(plant(2j * np.pi * frequency, squeeze=False))[row, column]
 
     response = exact(truth, np.geomspace(1.0, 200, 150), 0.02, np.random.default_rng(30))
-    found = visible(response)
-    assert found.case == cart
-    assert found.words[-1].startswith(f"cart {cart}: ")
+    shown_modes = visible(response)
+    assert shown_modes.case == cart
+    assert shown_modes.words[-1].startswith(f"cart {cart}: ")
     if cart == "stuck":
-        assert found.lines[0].value.value == pytest.approx(2400 / (1 + 2400 / 1e5), rel=0.05)
+        assert shown_modes.lines[0].value.value == pytest.approx(2400 / (1 + 2400 / 1e5), rel=0.05)
     else:
-        assert found.lines[0].value.value == pytest.approx(1.7, rel=0.05)
-    assert found.lines[-1].value.value == pytest.approx(0.5, rel=0.05)
+        assert shown_modes.lines[0].value.value == pytest.approx(1.7, rel=0.05)
+    assert shown_modes.lines[-1].value.value == pytest.approx(0.5, rel=0.05)

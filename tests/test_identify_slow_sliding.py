@@ -40,36 +40,36 @@ def sliding(
 ) -> Log:
     """Motion at a mean velocity [m/s] that swings by `swing` [m/s], there and back, and the force of a mass on LuGre's
     bristles, computed in fine steps from a deflection at the `start` [m] on."""
-    each = DT / FINE
-    time = np.arange(0, SECONDS, each)
+    item = DT / FINE
+    time = np.arange(0, SECONDS, item)
     way = np.tanh(20 * (SECONDS / 2 - time))
     omega = 2 * np.pi * 9.0
     velocity = mean * way + swing * np.sin(omega * time) * (1 + 0.3 * np.sin(0.37 * omega * time))
-    position = np.cumsum(velocity) * each
-    acceleration = np.gradient(velocity, each)
+    position = np.cumsum(velocity) * item
+    acceleration = np.gradient(velocity, item)
     moves = np.diff(position)
-    level = coulomb + (STATIC - coulomb) * np.exp(-(np.abs(moves / each / stribeck) ** exponent))
+    level = coulomb + (STATIC - coulomb) * np.exp(-(np.abs(moves / item / stribeck) ** exponent))
     z = deflections(moves, level / STIFFNESS, start)
-    force = MASS * acceleration + STIFFNESS * z + DAMPING * np.gradient(z, each) + VISCOUS * velocity + 0.2
+    force = MASS * acceleration + STIFFNESS * z + DAMPING * np.gradient(z, item) + VISCOUS * velocity + 0.2
     rng = np.random.default_rng(1)
     seen = position[::FINE]
     return record("slow", DT, position=seen + noise * rng.standard_normal(len(seen)), force=force[::FINE])
 
 
 def values(found: SlowSliding) -> list[float]:
-    return [each.value for each in found.estimates]
+    return [estimate.value for estimate in found.estimates]
 
 
 def holds(found: SlowSliding) -> list[bool]:
-    return [each.holds(true) for each, true in zip(found.estimates, TRUE, strict=True)]
+    return [estimate.holds(true) for estimate, true in zip(found.estimates, TRUE, strict=True)]
 
 
 @given(st.floats(0.4, 1.8), st.floats(0.7e-3, 2.5e-3))
 @settings(max_examples=8, deadline=None)
 def test_known_friction_is_found(coulomb: float, stribeck: float) -> None:
-    found = stribeck_from_slow_sliding(sliding(coulomb=coulomb, stribeck=stribeck), THERE, KNOWN)
-    assert values(found) == pytest.approx([coulomb, STATIC, stribeck], rel=0.02)
-    assert found.unexplained < 0.01
+    sliding_fit = stribeck_from_slow_sliding(sliding(coulomb=coulomb, stribeck=stribeck), THERE, KNOWN)
+    assert values(sliding_fit) == pytest.approx([coulomb, STATIC, stribeck], rel=0.02)
+    assert sliding_fit.unexplained < 0.01
 
 
 def test_noise_of_the_sensor_and_doubt_about_the_bristles_widen_the_intervals() -> None:
@@ -88,8 +88,8 @@ def test_strained_bristles_at_the_start_and_another_exponent_do_not_matter() -> 
     for start in (-1.5e-5, 1e-5):
         assert values(stribeck_from_slow_sliding(sliding(start=start), THERE, KNOWN)) == pytest.approx(TRUE, rel=0.02)
     other = replace(KNOWN, exponent=1.0)
-    found = stribeck_from_slow_sliding(sliding(exponent=1.0), THERE, other)
-    assert values(found) == pytest.approx(TRUE, rel=0.03)
+    sliding_fit = stribeck_from_slow_sliding(sliding(exponent=1.0), THERE, other)
+    assert values(sliding_fit) == pytest.approx(TRUE, rel=0.03)
     assert not all(holds(stribeck_from_slow_sliding(sliding(exponent=1.0), THERE, KNOWN)))
 
 
@@ -139,9 +139,9 @@ def test_a_contact_is_taken_off() -> None:
 
 
 def reason(log: Log, known: MassOnBristles | None = KNOWN) -> str:
-    found = stribeck_from_slow_sliding(log, THERE, known)
-    assert not found.estimates[2].determined
-    return found.estimates[2].reason
+    sliding_fit = stribeck_from_slow_sliding(log, THERE, known)
+    assert not sliding_fit.estimates[2].determined
+    return sliding_fit.estimates[2].reason
 
 
 def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> None:
@@ -163,8 +163,8 @@ def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> N
 
 
 def test_level_friction_shows_its_level_alone(wording: Wording) -> None:
-    found = stribeck_from_slow_sliding(sliding(coulomb=STATIC), THERE, KNOWN)
-    coulomb, static, stribeck = found.estimates
+    sliding_fit = stribeck_from_slow_sliding(sliding(coulomb=STATIC), THERE, KNOWN)
+    coulomb, static, stribeck = sliding_fit.estimates
     assert coulomb.value == pytest.approx(STATIC, rel=0.02)
     wording(static.reason)
     assert not stribeck.determined
@@ -191,10 +191,10 @@ def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig
     stage, flat = locked(machine.truth), machine.flat
     passes = many_speeds.many_speeds(stage, 1)
     assert not passes.places[0].velocity.both.stribeck_velocity.determined
-    for each in slow_sliding.slow_sliding(stage, [place.log for place in passes.places], 1):
-        places = each.log.true["cart_position"]
+    for item in slow_sliding.slow_sliding(stage, [place.log for place in passes.places], 1):
+        places = item.log.true["cart_position"]
         there = friction_factors(flat, np.linspace(places.min(), places.max(), 500)).mean(axis=1)
-        coulomb, static, stribeck = each.result.estimates
+        coulomb, static, stribeck = item.result.estimates
         assert coulomb.value == pytest.approx(flat["friction.coulomb"] * there[1], rel=0.02)
         assert static.value == pytest.approx(flat["friction.static"] * there[0], rel=0.02)
         assert stribeck.value == pytest.approx(flat["friction.stribeck_velocity"], rel=0.03)
@@ -209,17 +209,17 @@ def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
     stage, flat = locked(machine.truth), machine.flat
     passed = many_speeds.many_speeds_logs(stage, 1)
     slow: list[tuple[Any, str]] = [
-        (each.log, "slow-sliding") for each in slow_sliding.slow_sliding_logs(stage, passed, 1)
+        (log.log, "slow-sliding") for log in slow_sliding.slow_sliding_logs(stage, passed, 1)
     ]
     alone = identify(slow, machine.guess)
     assert alone.stage is not None
     assert alone.stage.flat()["friction.stribeck_velocity"] == machine.guess.flat()["friction.stribeck_velocity"]
     small = presliding_log(stage, "small", 0.01, 1).log
-    found = identify([*slow, (small, "presliding")], machine.guess)
-    assert found.stage is not None
+    identification = identify([*slow, (small, "presliding")], machine.guess)
+    assert identification.stage is not None
     for key in ("friction.static", "friction.coulomb"):
-        assert found.stage.flat()[key] == pytest.approx(flat[key], rel=0.15)
-    assert found.stage.flat()["friction.stribeck_velocity"] == pytest.approx(
+        assert identification.stage.flat()[key] == pytest.approx(flat[key], rel=0.15)
+    assert identification.stage.flat()["friction.stribeck_velocity"] == pytest.approx(
         flat["friction.stribeck_velocity"], rel=0.03
     )
-    assert found.correlations.keys
+    assert identification.correlations.keys

@@ -91,24 +91,27 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
     loop = closed_loop(flat, log, part, parameters) if own_loop else None
     problem = loop if fitted_in_loop and loop else follows
     residual = 0.2 * np.random.default_rng(2).standard_normal(len(log.time))
-    core = tuple(i for i, each in enumerate(parameters) if each.core)
+    core = tuple(i for i, parameter in enumerate(parameters) if parameter.core)
     fit = OutputErrorFit(problem, first_values(parameters), core, 1e-6 * np.eye(len(core)), residual)
-    profiles = {each.name: profile_of(each.name, each.low, each.high, each.core, fit.cost) for each in parameters}
+    profiles = {
+        parameter.name: profile_of(parameter.name, parameter.low, parameter.high, parameter.core, fit.cost)
+        for parameter in parameters
+    }
     moved = motion(log["position"], DT, 25.0)
-    known = (
+    expected = (
         Estimate.normal("friction.coulomb", "N", COULOMB, 0.05, "output error"),
         Estimate.normal("masses.cart", "kg", MASS, 0.02, "output error"),
         Estimate.unknown("friction.static", "N", "output error", WHY, COULOMB, 4 * COULOMB),
         Estimate.unknown("friction.stribeck_velocity", "m/s", "output error", WHY, 5e-5, 0.16),
     )
-    found = IdentifiedMoves(
-        log, part, inverse, inverse_model(log, 5.0, by_direction=True), fit, profiles, known, np.eye(2),
+    result = IdentifiedMoves(
+        log, part, inverse, inverse_model(log, 5.0, by_direction=True), fit, profiles, expected, np.eye(2),
         coverage(log["position"], moved, MASS, COULOMB, DT),
         Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
         SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
         residual_of(residual, moved, DT), loop, Quality(0.2, 0.2, 0.2, 0.05, 0.04),
     )  # fmt: skip
-    return found, log
+    return result, log
 
 
 def profile_of(name: str, low: float, high: float, closed: bool, best: float) -> Profile:
@@ -135,7 +138,7 @@ def multisine_bench() -> tuple[Any, tuple[Log, ...]]:
         spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines))) * period / 2
         bent = 1 + 0.02 * rng.standard_normal(len(lines))
         answers[lines] = spectrum[lines] * two_masses(TWO_MASSES, lines / (period * 2e-3))[0] * bent
-        force, position = (np.tile(np.fft.irfft(each), 5) for each in (spectrum, answers))
+        force, position = (np.tile(np.fft.irfft(item), 5) for item in (spectrum, answers))
         position = position + 1e-3 * position.std() * rng.standard_normal(len(position))
         log = record(f"exp{number + 1}", 2e-3, force=force, position=position)
         logs.append(replace(log, units={"force": "V"}))
@@ -174,7 +177,7 @@ def break_away() -> tuple[Any, Log]:
         signals["force"].append(way * push + 5e-3 * rng.standard_normal(len(time)))
         spans.append(slice(begin, begin + len(time)))
         begin += len(time)
-    arrays = {name: np.concatenate(each) for name, each in signals.items()}
+    arrays = {name: np.concatenate(signal) for name, signal in signals.items()}
     log = replace(record("ramps", DT, **arrays), segments=tuple(spans))
     return static_from_ramps(log), log
 
@@ -235,15 +238,15 @@ def everything() -> tuple[Identification, list[LogFile], list[Prediction]]:
     experiments = tuple(Experiment(kind, logs, result, moved.estimates) for kind, result, logs in rows)
     estimates = tuple(combined(list(moved.estimates))[0])
     stage = identified(made_up(log, moved.inverse), estimates, ["axis"])
-    found = Identification(stage, Correlations(), experiments, estimates, ("something <to> know",))
+    outcome = Identification(stage, Correlations(), experiments, estimates, ("something <to> know",))
     files = [
-        LogFile(Path(f"{each.name}.csv"), each, kind, "as specified", None) for kind, _, logs in rows for each in logs
+        LogFile(Path(f"{item.name}.csv"), item, kind, "as specified", None) for kind, _, logs in rows for item in logs
     ]
     predictions = [
         Prediction(log, "moves", SimulatedLog(moved.part, moved.simulated, moved.errors)),
         Prediction(exps[0], "frequency", (0.1, 0.7)),
     ]
-    return found, files, predictions
+    return outcome, files, predictions
 
 
 @pytest.fixture(scope="module")
@@ -289,9 +292,9 @@ def test_a_value_has_the_digits_of_its_interval(found: Estimate, said: str) -> N
     ],
 )
 def test_what_is_left_possible(low: float, high: float, unit: str, said: str) -> None:
-    found = Estimate.unknown("x", unit, "", "a reason", low, high)
-    assert interval_text(found) == said
-    assert value_text(found) == "–"
+    result = Estimate.unknown("x", unit, "", "a reason", low, high)
+    assert interval_text(result) == said
+    assert value_text(result) == "–"
 
 
 @pytest.mark.parametrize(
@@ -316,10 +319,10 @@ def test_rounding_hides_less_than_a_twentieth_of_half_the_interval(
     size: float, share: float, unit: str, negative: bool
 ) -> None:
     value = -size if negative else size
-    found = Estimate("x", unit, value, value - share * size, value + share * size, "")
-    number, _, told = value_text(found).partition(" ")
+    result = Estimate("x", unit, value, value - share * size, value + share * size, "")
+    number, _, report = value_text(result).partition(" ")
     prefix = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
-    factor = prefix.get(told[0], 1.0) if unit != "kg" and len(told) > len(unit) else 1.0
+    factor = prefix.get(report[0], 1.0) if unit != "kg" and len(report) > len(unit) else 1.0
     rounding = share * size / 20 if "e" not in number else 1e-3 * size
     assert abs(float(number) * factor - value) <= rounding * 1.001
 
@@ -361,10 +364,10 @@ def test_experiments_of_a_kind_are_numbered_and_their_figures_told_apart(case: t
 def test_the_facts_of_moves_say_how_the_machine_was_simulated(snapshots: Snapshots) -> None:
     says = []
     for own, inside in ((True, True), (True, False), (False, False)):
-        found, log = moves(own, inside)
-        estimates = found.estimates
-        stage = made_up(log, found.inverse)
-        whole = Identification(stage, Correlations(), (Experiment("moves", (log,), found, ()),), estimates, ())
+        result, log = moves(own, inside)
+        estimates = result.estimates
+        stage = made_up(log, result.inverse)
+        whole = Identification(stage, Correlations(), (Experiment("moves", (log,), result, ()),), estimates, ())
         (part,) = summaries(whole)
         says.append(part.sentences[0])
         errors = dict(part.facts)["Relative errors of the simulation"]
@@ -374,10 +377,10 @@ def test_the_facts_of_moves_say_how_the_machine_was_simulated(snapshots: Snapsho
 
 
 def test_the_terminal_says_all_of_it_the_answer_first(case: tuple, snapshots: Snapshots) -> None:
-    found, files, predictions = case
-    lines = answer(found, files, predictions)
+    result, files, predictions = case
+    lines = answer(result, files, predictions)
     text = "\n".join(lines)
-    assert lines[: len(headline(found))] == [sentence for _, sentence in headline(found)]
+    assert lines[: len(headline(result))] == [sentence for _, sentence in headline(result)]
     for part in ("axis.csv", "118", "something <to> know", " 4 %", "70 %"):
         assert part in text
     assert case[0].experiments[-3].result.position.verdict in text
@@ -386,10 +389,10 @@ def test_the_terminal_says_all_of_it_the_answer_first(case: tuple, snapshots: Sn
 
 
 def test_logs_that_make_no_stage_have_a_page_all_the_same(case: tuple) -> None:
-    found = replace(case[0], stage=None, experiments=())
-    assert NO_STAGE in [sentence for _, sentence in headline(found)]
-    assert identify_document(found, case[1], [])["stage"] is None
-    text = Page(identify_html(found, case[1][:2], [], [])).text
+    changed = replace(case[0], stage=None, experiments=())
+    assert NO_STAGE in [sentence for _, sentence in headline(changed)]
+    assert identify_document(changed, case[1], [])["stage"] is None
+    text = Page(identify_html(changed, case[1][:2], [], [])).text
     assert "bench.csv, exp1.csv" in text
     assert "Copy" not in text
     assert "Copy" in Page(identify_html(case[0], case[1][:2], [], [])).text
@@ -400,8 +403,8 @@ def test_logs_that_make_no_stage_have_a_page_all_the_same(case: tuple) -> None:
 
 def test_the_document_is_plain_json_and_nothing_unknown_has_a_number(case: tuple) -> None:
     document = json.loads(json.dumps(identify_document(*case), allow_nan=False))
-    assert [each["kind"] for each in document["logs"]] == [each.kind for each in case[1]]
-    keys = {each["key"]: each for each in document["estimates"]}
+    assert [log["kind"] for log in document["logs"]] == [log.kind for log in case[1]]
+    keys = {estimate["key"]: estimate for estimate in document["estimates"]}
     assert keys["masses.cart"]["value"] == MASS
     assert keys["masses.cart"]["written"] == written(case[0].estimates[1])
     assert keys["masses.cart"]["written"] in case[0].stage.to_toml()
@@ -414,9 +417,9 @@ def test_the_document_is_plain_json_and_nothing_unknown_has_a_number(case: tuple
 
 def test_the_document_of_each_experiment(case: tuple) -> None:
     document = identify_document(*case)
-    kinds = [each["kind"] for each in document["experiments"]]
+    kinds = [experiment["kind"] for experiment in document["experiments"]]
     own, follows = (document["experiments"][i] for i, kind in enumerate(kinds) if kind == "moves")
-    by = {each["kind"]: each for each in document["experiments"]}
+    by = {experiment["kind"]: experiment for experiment in document["experiments"]}
     inverse = own["inverse_model"]
     assert inverse["mass_kg"]["low"] < inverse["mass_kg"]["value"] < inverse["mass_kg"]["high"]
     assert inverse["mass_kg"]["value"] == pytest.approx(MASS, rel=0.01)
@@ -427,13 +430,13 @@ def test_the_document_of_each_experiment(case: tuple) -> None:
     assert follows["output_error"]["errors"]["position"] is None
     assert own["output_error"]["profiles"]["mass"]["mean_squares_n2"][-1] is None
     assert own["output_error"]["profiles"]["friction.stribeck_velocity"]["open_low"]
-    assert {each["key"] for each in own["not_shown"]} == {"friction.static", "friction.stribeck_velocity"}
+    assert {item["key"] for item in own["not_shown"]} == {"friction.static", "friction.stribeck_velocity"}
     assert by["steps"]["stiffness"]["value"] == pytest.approx(2400, rel=0.01)
     assert by["stick-slip"]["slips"] > 5
     assert len(by["break-away"]["forces_n"]) == 6
     assert by["constant-speed"]["directions"]["both"]["coulomb"]["unit"] == "N"
     response = document["experiments"][0]
-    masses = {each["name"]: each["value"] for each in response["two_masses"]}
+    masses = {mass["name"]: mass["value"] for mass in response["two_masses"]}
     assert masses["driven mass"] == pytest.approx(1.2, rel=0.05)
 
 
@@ -445,12 +448,12 @@ def named(figures: list[Figure], name: str) -> Figure:
 
 
 def line(panel: Panel, label: str) -> Series:
-    return next(each for each in panel.series if each.label == label)
+    return next(item for item in panel.series if item.label == label)
 
 
 def test_the_friction_map_shows_force_without_inertia_and_the_curve_found() -> None:
-    found, _ = moves(own_loop=True, fitted_in_loop=True)
-    (panel,) = named(moves_figures(found, "identify_moves"), "identify_moves_friction").panels
+    result, _ = moves(own_loop=True, fitted_in_loop=True)
+    (panel,) = named(moves_figures(result, "identify_moves"), "identify_moves_friction").panels
     measured, curve = line(panel, "measured force less inertia"), line(panel, "identified")
     quick = np.abs(measured.x) > 0.02
     truth = COULOMB * np.sign(measured.x) + VISCOUS * measured.x
@@ -460,25 +463,25 @@ def test_the_friction_map_shows_force_without_inertia_and_the_curve_found() -> N
 
 
 def test_profiles_are_1_where_the_interval_ends() -> None:
-    found, _ = moves(own_loop=True, fitted_in_loop=True)
-    figure = named(moves_figures(found, "identify_moves"), "identify_moves_profiles")
+    result, _ = moves(own_loop=True, fitted_in_loop=True)
+    figure = named(moves_figures(result, "identify_moves"), "identify_moves_profiles")
     mass = next(panel for panel in figure.panels if panel.x.quantity == "Mass")
     assert mass.series[0].y[2:5] == pytest.approx([1, 0, 1])
     assert np.isnan(mass.series[0].y[-1])
-    assert tuple(mass.bands[0].x) == (found.profiles["mass"].low, found.profiles["mass"].high)
+    assert tuple(mass.bands[0].x) == (result.profiles["mass"].low, result.profiles["mass"].high)
     assert "Below 0" not in figure.caption
-    better = {**found.profiles, "mass": replace(found.profiles["mass"], cost=found.profiles["mass"].cost * 0.5)}
+    better = {**result.profiles, "mass": replace(result.profiles["mass"], cost=result.profiles["mass"].cost * 0.5)}
     assert (
-        "Below 0" in named(moves_figures(replace(found, profiles=better), "identify_m"), "identify_m_profiles").caption
+        "Below 0" in named(moves_figures(replace(result, profiles=better), "identify_m"), "identify_m_profiles").caption
     )
 
 
 @pytest.mark.parametrize("own_loop", [True, False])
 def test_the_force_that_opens_the_page_is_of_the_stretch_that_moves_most(own_loop: bool) -> None:
-    found, log = moves(own_loop, own_loop)
+    result, log = moves(own_loop, own_loop)
     place = 0.05 * (1 - np.cos(np.pi * np.clip(log.time - 2.0, 0.0, 1.0)))  # one move, from 2 to 3 s
     halved = replace(log, signals={**log.signals, "position": place})
-    quick = replace(found, log=halved, inverse=replace(found.inverse, bandwidth=40.0))
+    quick = replace(result, log=halved, inverse=replace(result.inverse, bandwidth=40.0))
     (panel,) = named(moves_figures(quick, "identify_m"), "identify_m_force").panels
     measured = line(panel, "measured")
     assert measured.x[-1] - measured.x[0] == pytest.approx(1.0, abs=2 * DT)
@@ -488,10 +491,10 @@ def test_the_force_that_opens_the_page_is_of_the_stretch_that_moves_most(own_loo
 
 
 def test_traces_with_a_disturbance_and_of_a_stage_that_follows() -> None:
-    found, log = moves(own_loop=True, fitted_in_loop=True)
+    result, log = moves(own_loop=True, fitted_in_loop=True)
     pulses = np.where(log.time > 2, 5.0, 0.0)
     disturbed = replace(log, signals={**log.signals, "disturbance": pulses})
-    panels = record_panels(disturbed, found.part, replace(found.simulated, force=log["force"] - pulses))
+    panels = record_panels(disturbed, result.part, replace(result.simulated, force=log["force"] - pulses))
     assert line(panels[2], "simulated").y == pytest.approx(log["force"])
     assert np.abs(panels[3].series[0].y).max() < 1e-9
     follows, _ = moves(own_loop=False, fitted_in_loop=False)
@@ -522,17 +525,17 @@ def test_noise_and_distortion_are_drawn_where_the_record_tells_them(figures: lis
 
 
 def test_experiments_in_time_are_drawn_with_what_was_found(case: tuple, figures: list[Figure]) -> None:
-    results = {each.kind: each.result for each in case[0].experiments}
+    results = {experiment.kind: experiment.result for experiment in case[0].experiments}
     (panel,) = named(figures, "identify_steps_stiffness").panels
     (slope,) = panel.series
     assert np.diff(slope.y) / np.diff(slope.x) == pytest.approx(results["steps"].stiffness.value)
     assert len(panel.markers[0].x) == len(results["steps"].windows)
     above = named(figures, "identify_stick_slip_slips").panels[0]
-    assert sum(len(each.x) for each in above.markers) == len(results["stick-slip"].times)
+    assert sum(len(marker.x) for marker in above.markers) == len(results["stick-slip"].times)
     (rates,) = named(figures, "identify_break_away_rates").panels
-    assert {each.label for each in rates.markers} == {"forward", "backward"}
+    assert {marker.label for marker in rates.markers} == {"forward", "backward"}
     (speeds,) = named(figures, "identify_constant_speed_velocity").panels
-    assert sum(len(each.x) for each in speeds.markers) == len(results["constant-speed"].velocity.velocities)
+    assert sum(len(marker.x) for marker in speeds.markers) == len(results["constant-speed"].velocity.velocities)
     forward = line(speeds, "fit, forward")
     truth = 2 + np.exp(-((forward.x / 0.006) ** 2)) + 10 * forward.x
     assert forward.y == pytest.approx(truth, abs=0.1)
@@ -565,24 +568,24 @@ def test_every_figure_can_be_drawn_and_its_axes_have_their_units(figures: list[F
 
 
 def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tuple, figures: list[Figure]) -> None:
-    found, files, predictions = case
+    result, files, predictions = case
     ends = ("intervals", "moves1_force", "moves1_friction", "frequency1_bode")
-    some = [each for each in figures if each.name.endswith(ends)]
-    assert len(some) == 4
-    html = identify_html(found, files, predictions, some)
-    assert html == identify_html(found, files, predictions, some)
+    subset = [item for item in figures if item.name.endswith(ends)]
+    assert len(subset) == 4
+    html = identify_html(result, files, predictions, subset)
+    assert html == identify_html(result, files, predictions, subset)
     page = Page(html)
     assert all(address.startswith("data:") for address in page.loads)
     text = " ".join(page.text.split())
-    for _, sentence in headline(found):
+    for _, sentence in headline(result):
         assert sentence in text
-    for part in summaries(found):
+    for part in summaries(result):
         assert part.title in text
         assert all(sentence in text for sentence in part.sentences)
-    for figure in some:
+    for figure in subset:
         assert html.count(f'id="figure-{figure.name}"') == 1
     places = [html.index(f'id="figure-identify_{name}"') for name in ("moves1_force", "intervals", "moves1_friction")]
     assert places == sorted(places)  # the force opens the page
     assert "something <to> know" in text
     assert all(prediction_line(prediction)[1] in text for prediction in predictions)
-    assert found.stage.to_toml().strip() in page.text
+    assert result.stage.to_toml().strip() in page.text

@@ -28,10 +28,10 @@ SHARE = Span(Number(Bound("0 to 1", lambda value: (value >= 0) & (value <= 1)), 
     ],
 )
 def test_quantities(given_text: str, low: float, high: float) -> None:
-    found = FORCE.read(given_text)
-    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)
-    assert found.text == given_text
-    assert FORCE.read(found) is found
+    value = FORCE.read(given_text)
+    assert (value.low, value.high) == pytest.approx((low, high), rel=1e-12)
+    assert value.text == given_text
+    assert FORCE.read(value) is value
 
 
 @pytest.mark.parametrize(
@@ -45,8 +45,8 @@ def test_quantities(given_text: str, low: float, high: float) -> None:
     ],
 )
 def test_numbers(given_text: str | float, low: float, high: float) -> None:
-    found = SHARE.read(given_text)
-    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)
+    value = SHARE.read(given_text)
+    assert (value.low, value.high) == pytest.approx((low, high), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -96,20 +96,20 @@ def test_what_is_expected_names_unit_and_forms() -> None:
 @settings(max_examples=50, deadline=None, derandomize=True)
 @given(low=st.floats(1e-6, 1e6), width=st.floats(0, 1e6), share=st.floats(0, 1))
 def test_places_between(low: float, width: float, share: float) -> None:
-    found = FORCE.read(f"{low!r} N .. {low + width!r} N")
-    assert (found.low, found.high) == pytest.approx((low, low + width), rel=1e-12)
-    assert found.at(0) == found.low
-    assert found.at(1) == pytest.approx(found.high, rel=1e-12)
-    assert found.low <= found.at(share) <= found.high * (1 + 1e-12)
-    assert found.at(0.5) == pytest.approx(found.centre, rel=1e-12)
+    value = FORCE.read(f"{low!r} N .. {low + width!r} N")
+    assert (value.low, value.high) == pytest.approx((low, low + width), rel=1e-12)
+    assert value.at(0) == value.low
+    assert value.at(1) == pytest.approx(value.high, rel=1e-12)
+    assert value.low <= value.at(share) <= value.high * (1 + 1e-12)
+    assert value.at(0.5) == pytest.approx(value.centre, rel=1e-12)
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)
 @given(value=st.floats(1e-6, 1e6), percent=st.floats(0, 99))
 def test_tolerance(value: float, percent: float) -> None:
-    found = FORCE.read(f"{value!r} N +/- {percent!r} %")
-    assert found.centre == pytest.approx(value, rel=1e-12)
-    assert found.high - found.low == pytest.approx(2 * value * percent / 100, rel=1e-9, abs=1e-12 * value)
+    result = FORCE.read(f"{value!r} N +/- {percent!r} %")
+    assert result.centre == pytest.approx(value, rel=1e-12)
+    assert result.high - result.low == pytest.approx(2 * value * percent / 100, rel=1e-9, abs=1e-12 * value)
 
 
 def test_interval_is_plain_data() -> None:

@@ -37,26 +37,26 @@ def swinging(
 
 
 def values(log: Log, bandwidth: float | None = 10.0, by_direction: bool = False) -> dict[str, float]:
-    return {each.name: each.value for each in inverse_model(log, bandwidth, by_direction).estimates}
+    return {estimate.name: estimate.value for estimate in inverse_model(log, bandwidth, by_direction).estimates}
 
 
 @settings(max_examples=20, deadline=None)
 @given(SIZES, SIZES, SIZES, st.floats(-1.0, 1.0))
 def test_without_noise_all_is_found(mass: float, viscous: float, coulomb: float, offset: float) -> None:
     """But for the filters, which smear the turning points."""
-    found = values(swinging(mass, viscous, coulomb, offset))
+    numbers = values(swinging(mass, viscous, coulomb, offset))
     scale = mass + viscous + coulomb  # of accelerations and speeds of about 1
-    for name, truth in zip(found, (mass, viscous, coulomb, offset), strict=True):
-        assert found[name] == pytest.approx(truth, rel=1e-2, abs=0.02 * scale)
+    for name, truth in zip(numbers, (mass, viscous, coulomb, offset), strict=True):
+        assert numbers[name] == pytest.approx(truth, rel=1e-2, abs=0.02 * scale)
 
 
 def test_smooth_forces_are_found_exactly() -> None:
     """Without Coulomb friction nothing is smeared but the end of the record, where the filters swing out."""
-    found = values(swinging(2.0, 5.0, 0.0, -0.3))
-    assert found["mass"] == pytest.approx(2.0, rel=2e-4)
-    assert found["viscous"] == pytest.approx(5.0, rel=2e-3)
-    assert found["coulomb"] == pytest.approx(0.0, abs=2e-3)
-    assert found["offset"] == pytest.approx(-0.3, abs=2e-3)
+    numbers = values(swinging(2.0, 5.0, 0.0, -0.3))
+    assert numbers["mass"] == pytest.approx(2.0, rel=2e-4)
+    assert numbers["viscous"] == pytest.approx(5.0, rel=2e-3)
+    assert numbers["coulomb"] == pytest.approx(0.0, abs=2e-3)
+    assert numbers["offset"] == pytest.approx(-0.3, abs=2e-3)
 
 
 @pytest.mark.parametrize("every", [20, 50, 100])
@@ -87,11 +87,11 @@ def test_directions_are_told_apart() -> None:
     log = swinging(2.0, 0.0, 0.0, 0.0)
     speed = np.gradient(log["position"], DT)
     friction = np.where(speed > 0, 3 + 2 * speed, -1 + 4 * speed)
-    found = values(replace(log, signals={**log.signals, "force": log["force"] + friction}), by_direction=True)
+    numbers = values(replace(log, signals={**log.signals, "force": log["force"] + friction}), by_direction=True)
     expected = {"mass": 2, "viscous forward": 2, "coulomb forward": 3, "viscous backward": 4, "coulomb backward": 1}
-    assert list(found) == list(expected)
+    assert list(numbers) == list(expected)
     for name, truth in expected.items():
-        assert found[name] == pytest.approx(truth, rel=0.05), name
+        assert numbers[name] == pytest.approx(truth, rel=0.05), name
 
 
 def test_a_long_rest_says_nothing_of_friction() -> None:
@@ -101,10 +101,10 @@ def test_a_long_rest_says_nothing_of_friction() -> None:
     position = np.concatenate([log["position"], np.full(rest, log["position"][-1])])
     force = np.concatenate([log["force"], np.full(rest, -2.0)])
     position += 1e-7 * rng.standard_normal(len(position))
-    found = inverse_model(record("rests", DT, position=position, force=force), 10.0)
-    assert found.value("coulomb") == pytest.approx(4.0, rel=0.02)
-    assert found.value("offset") == pytest.approx(0.5, abs=0.05)
-    assert found.time[-1] < 10.2  # the filters smear
+    model = inverse_model(record("rests", DT, position=position, force=force), 10.0)
+    assert model.value("coulomb") == pytest.approx(4.0, rel=0.02)
+    assert model.value("offset") == pytest.approx(0.5, abs=0.05)
+    assert model.time[-1] < 10.2  # the filters smear
 
 
 @pytest.mark.parametrize("slow", [0.0, 100.0])
@@ -132,8 +132,8 @@ def test_intervals_hold_the_truth() -> None:
     rng, log, held = np.random.default_rng(5), swinging(2.0, 5.0, 0.0, 0.0), np.zeros(2)
     for _ in range(60):
         noise = np.convolve(rng.standard_normal(len(log.time) + 49), np.ones(50) / 50, "valid")
-        found = inverse_model(replace(log, signals={**log.signals, "force": log["force"] + noise}), 10.0)
-        held += [found.estimates[0].holds(2.0), found.estimates[1].holds(5.0)]
+        model = inverse_model(replace(log, signals={**log.signals, "force": log["force"] + noise}), 10.0)
+        held += [model.estimates[0].holds(2.0), model.estimates[1].holds(5.0)]
     assert np.all(held >= 50)
 
 
@@ -145,10 +145,12 @@ def test_the_cart_of_a_joint_has_the_friction() -> None:
     signals = {"position": log["position"] + swing, "cart_position": log["position"], "force": force}
     both = record("joint", DT, **signals)
     relative = record("joint", DT, position=signals["position"], relative_position=swing, force=force)
-    one, other = (inverse_model(each, 10.0, cart_share=0.7) for each in (both, relative))
+    one, other = (inverse_model(item, 10.0, cart_share=0.7) for item in (both, relative))
     assert one.value("mass") == pytest.approx(2.0, rel=5e-3)
     assert one.value("coulomb") == pytest.approx(4.0, rel=0.02)
-    assert [each.value for each in other.estimates] == pytest.approx([each.value for each in one.estimates], rel=1e-9)
+    assert [estimate.value for estimate in other.estimates] == pytest.approx(
+        [estimate.value for estimate in one.estimates], rel=1e-9
+    )
     assert inverse_model(both, 10.0).value("mass") != pytest.approx(2.0, rel=0.02)
 
 
@@ -185,15 +187,15 @@ PER_DIRECTION = {
     ("by_direction", "published", "error"), [(False, PUBLISHED, 4.0834), (True, PER_DIRECTION, 3.1117)]
 )
 def test_emps(emps: Log, by_direction: bool, published: dict[str, tuple[float, float]], error: float) -> None:
-    found = inverse_model(emps, 20.0, by_direction)
+    model = inverse_model(emps, 20.0, by_direction)
     for name, (value, tolerance) in published.items():
-        assert found.value(name) == pytest.approx(value, rel=tolerance), name
-        assert next(each for each in found.estimates if each.name == name).holds(value)
-    assert 100 * found.error <= error + 5e-5
+        assert model.value(name) == pytest.approx(value, rel=tolerance), name
+        assert next(estimate for estimate in model.estimates if estimate.name == name).holds(value)
+    assert 100 * model.error <= error + 5e-5
 
 
 def test_emps_by_its_own_bandwidth(emps: Log) -> None:
     """Near the published one, 20 Hz, and so are the values."""
-    found = inverse_model(emps)
-    assert 15 < found.bandwidth < 35
-    assert found.value("mass") == pytest.approx(95.1089, rel=5e-3)
+    model = inverse_model(emps)
+    assert 15 < model.bandwidth < 35
+    assert model.value("mass") == pytest.approx(95.1089, rel=5e-3)

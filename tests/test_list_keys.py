@@ -37,9 +37,9 @@ def test_elements_have_flat_keys_of_their_own(three: Stage) -> None:
     assert [flat[f"{STRENGTH}.{n}"] for n in (1, 2, 3)] == [0.5, 1.0, 2.0]
     assert f"{STIFFNESS}.4" not in flat
     assert STIFFNESS not in flat
-    known = numeric_keys(flat)
-    assert {known[f"{STIFFNESS}.{n}"].unit for n in (1, 2, 3)} == {"N/m"}
-    assert f"{STIFFNESS}.4" not in known
+    expected = numeric_keys(flat)
+    assert {expected[f"{STIFFNESS}.{n}"].unit for n in (1, 2, 3)} == {"N/m"}
+    assert f"{STIFFNESS}.4" not in expected
 
 
 def test_saved_and_loaded_it_is_the_same(three: Stage) -> None:
@@ -114,10 +114,10 @@ def test_elements_are_uncertain_and_drawn(three: Stage, tmp_path) -> None:
     intervals = three.uncertain()
     assert [*intervals] == [f"{STRENGTH}.2", f"{STRENGTH}.3"]
     assert (intervals[f"{STRENGTH}.3"].low, intervals[f"{STRENGTH}.3"].high) == (1.0, 3.0)
-    known = Correlations((f"{STRENGTH}.2", f"{STRENGTH}.3"), np.array([[1.0, 0.9], [0.9, 1.0]]))
-    (tmp_path / "c.toml").write_text(correlations_text(known, three))
+    expected = Correlations((f"{STRENGTH}.2", f"{STRENGTH}.3"), np.array([[1.0, 0.9], [0.9, 1.0]]))
+    (tmp_path / "c.toml").write_text(correlations_text(expected, three))
     read = read_correlations(tmp_path / "c.toml", three)
-    assert np.array_equal(read.matrix, known.matrix)
+    assert np.array_equal(read.matrix, expected.matrix)
     drawn = draw(three, read, 512, 1)
     second, third = drawn.keys[f"{STRENGTH}.2"], drawn.keys[f"{STRENGTH}.3"]
     assert np.mean(second) == pytest.approx(1.0, abs=0.01)

@@ -29,7 +29,7 @@ COLUMNS = [M["time"] * 1e3, M["position"] * 1e3, M["force"]]
 
 
 def channel(table: ChannelTable, name: str) -> Channel:
-    return next(each for each in table.channels if each.name == name)
+    return next(item for item in table.channels if item.name == name)
 
 
 def check_motion(table: ChannelTable, unit: str = "mm", scale: float = 1e3) -> None:
@@ -209,8 +209,8 @@ def test_time_stamps(tmp_path: Path, stamps: list[str]) -> None:
 def test_any_numbers_come_back(tmp_path: Path, rows: list[tuple[float, ...]], writing: tuple[str, str]) -> None:
     columns = list(np.array(rows).T)
     table = read_table(log_files.write_text(tmp_path / "a.csv", ["a [m]", "b [N]", "c [V]"], columns, *writing))
-    for each, expected in zip(table.channels, columns, strict=True):
-        assert each.values == pytest.approx(expected, rel=1e-15, abs=0)
+    for item, expected in zip(table.channels, columns, strict=True):
+        assert item.values == pytest.approx(expected, rel=1e-15, abs=0)
 
 
 @pytest.mark.parametrize(
@@ -382,11 +382,11 @@ def test_frequency_responses_as_text(
         tmp_path / "plant.csv", [*heading, "coherence"], [axis, *columns, 0.9 + 0 * axis], ";", ","
     )
     assert is_frequency_response(path)
-    found = read_frequency_response(path)
-    assert found.frequency == pytest.approx(FREQUENCY, rel=1e-12)
-    assert np.allclose(found.response, RESPONSE, rtol=1e-10, atol=0)
-    assert found.coherence == pytest.approx(0.9)
-    assert (found.unit, found.name) == (unit, "plant")
+    response = read_frequency_response(path)
+    assert response.frequency == pytest.approx(FREQUENCY, rel=1e-12)
+    assert np.allclose(response.response, RESPONSE, rtol=1e-10, atol=0)
+    assert response.coherence == pytest.approx(0.9)
+    assert (response.unit, response.name) == (unit, "plant")
 
 
 def test_frequency_response_of_a_universal_file(tmp_path: Path) -> None:
@@ -395,10 +395,10 @@ def test_frequency_response_of_a_universal_file(tmp_path: Path) -> None:
     signals = {"plant": ("mm/N", 1e3 / (1e4 - axis**2 + 1j * axis)), "coherence": ("", 0.8 + 0 * axis)}
     path = log_files.write_uff(tmp_path / "a.uff", axis, signals, 4)
     assert is_frequency_response(path)
-    found = read_frequency_response(path)
-    assert found.frequency == pytest.approx(axis[1:])  # the line at 0 Hz is left out
-    assert np.allclose(found.response, (1 / (1e4 - axis**2 + 1j * axis))[1:], rtol=1e-9)
-    assert (found.unit, found.coherence) == ("m/N", pytest.approx(0.8))
+    response = read_frequency_response(path)
+    assert response.frequency == pytest.approx(axis[1:])  # the line at 0 Hz is left out
+    assert np.allclose(response.response, (1 / (1e4 - axis**2 + 1j * axis))[1:], rtol=1e-9)
+    assert (response.unit, response.coherence) == ("m/N", pytest.approx(0.8))
 
 
 def test_a_log_is_no_frequency_response(tmp_path: Path) -> None:

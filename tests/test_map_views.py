@@ -118,13 +118,13 @@ def test_the_verification_stands_on_the_figure(snapshots: Snapshots):
     share, z = 81 / 84, 1.959963984540054
     middle = (share + z**2 / 168) / (1 + z**2 / 84)
     half = z * math.sqrt(share * (1 - share) / 84 + z**2 / (4 * 84**2)) / (1 + z**2 / 84)  # Wilson (1927)
-    first, said, runs = figure.note.splitlines()
+    first, texts, runs = figure.note.splitlines()
     ends = [round(100 * (middle + sign * half), 1) for sign in (-1, 1)]
-    assert numbers(said) == [round(100 * share, 1), 84, 1e-6, 95, *ends]
+    assert numbers(texts) == [round(100 * share, 1), 84, 1e-6, 95, *ends]
     assert (numbers(first), numbers(runs)) == ([75], [20, 1e-4, 15, 5])
     on_paper = " ".join(text.get_text() for text in matplotlib_renderer.render(figure).texts)
-    assert said in on_paper
-    assert said in plotly_renderer.render(figure).layout.annotations[0].text
+    assert texts in on_paper
+    assert texts in plotly_renderer.render(figure).layout.annotations[0].text
     assert numbers(verification(plain())) == []
     snapshots.check("map", "note", f"{figure.note}\n{verification(plain())}")
 
@@ -629,18 +629,18 @@ def test_where_runs_swing_holds_for_every_cell() -> None:
 def test_words_samples_and_verdicts_have_their_sentence(snapshots: Snapshots) -> None:
     runs = made_up({LOCKED: [True, False], CROSSOVER: np.linspace(1, 16, 4)})
     runs["outcome"] = (runs.outcome.dims, [["swings"] * 4, ["rests"] * 4])
-    said = [headline(runs, "outcome")]
-    assert numbers(said[0]) == [50]
+    text = [headline(runs, "outcome")]
+    assert numbers(text[0]) == [50]
     runs["verdict"] = (runs.outcome.dims, [["settles"] * 4, ["settles", "bistable", "hunts", "settles"]])
-    said += [headline(runs, "verdict"), statement(runs, "verdict").splitlines()[-1]]
-    assert numbers(said[1]) == [12, 11, 12, 6]
-    assert numbers(said[2])[-3:] == [1, 1, 6]
+    text += [headline(runs, "verdict"), statement(runs, "verdict").splitlines()[-1]]
+    assert numbers(text[1]) == [12, 11, 12, 6]
+    assert numbers(text[2])[-3:] == [1, 1, 6]
     drawn = sampled()
     drawn["outcome"] = (drawn.outcome.dims, np.where(drawn["mass"] < drawn["mass"].median(), "swings", "creeps"))
-    said.append(headline(drawn, "outcome"))
-    assert numbers(said[-1])[0] == 50
+    text.append(headline(drawn, "outcome"))
+    assert numbers(text[-1])[0] == 50
     nothing = troubled()
     nothing["outcome"][:] = "invalid"
-    said.append(headline(nothing, "outcome"))
-    assert numbers(said[-1]) == []
-    snapshots.check("map", "headlines", "\n".join(said))
+    text.append(headline(nothing, "outcome"))
+    assert numbers(text[-1]) == []
+    snapshots.check("map", "headlines", "\n".join(text))

@@ -95,28 +95,28 @@ def closures(displacement: np.ndarray) -> int:
 def test_force_over_displacement_remembers_every_turn() -> None:
     """On a path with loops within loops, every element's deflection is that of the reference, to rounding: inner loops
     close, and are forgotten once they have."""
-    found = friso.simulate(HELD, 1e-10, 2e-5)
-    positions, sampled = path(found)
-    turns = found.turning_deviation.values
+    result = friso.simulate(HELD, 1e-10, 2e-5)
+    positions, sampled = path(result)
+    turns = result.turning_deviation.values
     assert len(turns) > 20
     assert closures(np.concatenate([[positions[0]], turns, [positions[-1]]])) > 3
     exact = imposed(HELD.flat(), positions)[sampled]
-    ours = np.stack([found[f"deflection_{n}"].values for n in (1, 2, 3)], axis=1)
+    ours = np.stack([result[f"deflection_{n}"].values for n in (1, 2, 3)], axis=1)
     assert np.max(np.abs(ours - exact)) < 1e-9 * LIMIT.max()
     force = exact @ STIFFNESS
-    assert np.max(np.abs(found.friction_force.values - force)) < 1e-9 * STRENGTH.sum()
-    slips = np.stack([found[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
+    assert np.max(np.abs(result.friction_force.values - force)) < 1e-9 * STRENGTH.sum()
+    slips = np.stack([result[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
     assert set(np.unique(slips)) == {0.0, 1.0}
     assert np.all(np.abs(np.abs(exact[slips == 1]) / np.broadcast_to(LIMIT, exact.shape)[slips == 1] - 1) < 1e-9)
 
 
 def test_masing_s_rule() -> None:
     """From a turn with everything slipping, the force follows the virgin curve at twice its size."""
-    found = friso.simulate(SLIDES, 1e-10, 2e-6)
-    (first, second), positions = found.turning_time.values[:2], found.position.values
-    total = found.friction_force.values
-    branch = np.flatnonzero((found.time.values > first) & (found.time.values < second))
-    turn = float(found.turning_deviation[0])
+    result = friso.simulate(SLIDES, 1e-10, 2e-6)
+    (first, second), positions = result.turning_time.values[:2], result.position.values
+    total = result.friction_force.values
+    branch = np.flatnonzero((result.time.values > first) & (result.time.values < second))
+    turn = float(result.turning_deviation[0])
     side = np.sign(positions[branch[-1]] - turn)
     expected = -side * STRENGTH.sum() + side * 2 * virgin(SLIDES.flat(), np.abs(positions[branch] - turn) / 2)
     assert np.ptp(positions[branch]) > 4 * LIMIT.max()
@@ -129,14 +129,14 @@ def test_a_loop_against_scipy_with_events() -> None:
     start = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     times, states, slips = Loop(flat).run(start, 0.06, 1e-11)
     assert len(times) > 6
-    found = friso.simulate(DROPS.replace({"motion.duration": "60 ms"}), 1e-11, 1e-6)
-    ours = np.stack([found[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
+    result = friso.simulate(DROPS.replace({"motion.duration": "60 ms"}), 1e-11, 1e-6)
+    ours = np.stack([result[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
     changes = np.flatnonzero(np.any(np.diff(ours, axis=0) != 0, axis=1))
     moments = np.unique(np.round(times[1:-1], 5))
-    assert len(np.unique(np.round(found.time.values[changes], 5))) == pytest.approx(len(moments), abs=1)
-    assert found.time.values[changes][[0, -1]] == pytest.approx(times[[1, -2]], abs=2e-6)
-    assert found.position.values[-1] == pytest.approx(states[-1, 0], rel=1e-6)
-    assert found.friction_force.values[-1] == pytest.approx(states[-1, 4:] @ STIFFNESS + 0.5 * states[-1, 1], rel=1e-5)
+    assert len(np.unique(np.round(result.time.values[changes], 5))) == pytest.approx(len(moments), abs=1)
+    assert result.time.values[changes][[0, -1]] == pytest.approx(times[[1, -2]], abs=2e-6)
+    assert result.position.values[-1] == pytest.approx(states[-1, 0], rel=1e-6)
+    assert result.friction_force.values[-1] == pytest.approx(states[-1, 4:] @ STIFFNESS + 0.5 * states[-1, 1], rel=1e-5)
     assert np.array_equal(ours[-1], slips[-1])
 
 
@@ -217,10 +217,10 @@ def test_small_motions_of_a_stage_that_sticks() -> None:
     assert steady_force(flat, np.array([1e-3]), False)[0] == pytest.approx(STRENGTH.sum() + 0.5e-3)
     assert level(DROPS.flat(), True) == pytest.approx(0.4 * STRENGTH.sum())
     assert speeds(flat, 2) == pytest.approx([0.1 * 9e-6, 1e5 * 16e-6])
-    found = friso.bode(MOVES)
-    assert found.stable
+    loops = friso.bode(MOVES)
+    assert loops.stable
     resonance = np.sqrt(STIFFNESS.sum() / 1.7)
-    shown = found.omega[np.argmax(np.abs(found.cases["stuck"].plant))]
+    shown = loops.omega[np.argmax(np.abs(loops.cases["stuck"].plant))]
     assert shown == pytest.approx(resonance, rel=1e-3)
     system = friso.linear(MOVES, "stuck")
     assert np.max(np.abs(system.poles().imag)) > 0
@@ -229,8 +229,8 @@ def test_small_motions_of_a_stage_that_sticks() -> None:
 def test_describing_function_of_elements() -> None:
     """Of each: k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A), cos(theta) = 1 - 2 L/A; k below L."""
     amplitudes, frequency = np.array([2e-6, 1e-5, 1.3e-5, 3e-5, 1e-3]), 3.0
-    found = describing(MOVES, amplitudes, [frequency])
-    assert set(np.ravel(found.status)) == {"done"}
+    responses = describing(MOVES, amplitudes, [frequency])
+    assert set(np.ravel(responses.status)) == {"done"}
     expected = np.zeros(len(amplitudes), complex) + 2j * np.pi * frequency * 0.5
     for k, limit in zip(STIFFNESS, LIMIT, strict=True):
         slips = amplitudes > limit
@@ -238,7 +238,7 @@ def test_describing_function_of_elements() -> None:
         theta = np.arccos(1 - 2 * share)
         expected += np.where(slips, k * (theta - np.sin(2 * theta) / 2) / np.pi, k)
         expected += np.where(slips, 4j * k * share * (1 - share) / np.pi, 0)
-    assert np.abs(found.stiffness.values[:, 0] / expected - 1) == pytest.approx(0, abs=1e-7)
+    assert np.abs(responses.stiffness.values[:, 0] / expected - 1) == pytest.approx(0, abs=1e-7)
 
 
 def test_harmonic_balance_refuses_modes_that_remember() -> None:
@@ -254,9 +254,9 @@ def test_the_drive_as_built() -> None:
     built = MOVES.replace({"drive": {"sample_time": "20 us"}})
     (recorded,) = run(built, own_motion(built), [0], 1e-3)
     assert not failures(recorded)
-    found = friso.simulate(MOVES, 1e-8, 1e-3)
+    result = friso.simulate(MOVES, 1e-8, 1e-3)
     position = recorded.true["position"][0]
-    gap = np.abs(position - found.position.values[: len(position)])
+    gap = np.abs(position - result.position.values[: len(position)])
     assert gap.max() < 0.05 * np.ptp(position)
     assert np.ptp(position) > 1e-5
 

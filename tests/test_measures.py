@@ -80,8 +80,8 @@ def test_period_of_a_cycle_with_ringing_on_top(many: float, monkeypatch: pytest.
     time = np.linspace(0.0, 20.0, 200_001)
     wave = np.sin(np.pi * time) + 0.1 * np.sin(40 * np.pi * time)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(wave)))) + 1
-    found = periods(time[None, turns], 1e-3 * wave[None, turns], np.array([turns.size]), np.array([2.2e-3]))
-    assert found[0] == pytest.approx(2.0, rel=1e-3)
+    period = periods(time[None, turns], 1e-3 * wave[None, turns], np.array([turns.size]), np.array([2.2e-3]))
+    assert period[0] == pytest.approx(2.0, rel=1e-3)
 
 
 def swung(maxima: list[float], minima: list[float], leg: float) -> float:
@@ -108,8 +108,8 @@ def test_no_period_without_a_cycle() -> None:
 
 def test_a_period_longer_than_the_last_quarter_is_taken_from_the_last_half() -> None:
     times, values = np.array([[10.5, 13.5, 16.5, 19.5]]), 1e-3 * np.array([[1.0, -1.0, 1.0, -1.0]])
-    found = periods(times, values, np.array([4]), np.array([2e-3]))
-    assert found[0] == pytest.approx(6.0)
+    period = periods(times, values, np.array([4]), np.array([2e-3]))
+    assert period[0] == pytest.approx(6.0)
 
 
 def test_rounding_noise_is_no_peak() -> None:
@@ -147,18 +147,24 @@ def test_small_swings_that_are_passed_over_change_no_measure(rig: Stage, rtol: f
     study = Request(rig, {}, samples).study()
     flat = rig.flat(study.columns(np.arange(256)))
     shape = kernel(structure(flat))
-    found = {}
+    result = {}
     for least in (options(rtol).least_swing, 0.0):
         columns = [np.full(256, np.nan) for _ in range(7)]
         for runs in run_chunks(shape, flat, 256, replace(options(rtol), least_swing=least)):
-            each = measure(runs.part(flat), runs)
-            swings = each.outcome == "swings"
-            measured = (each.distinct_peaks, each.period, each.peak_to_peak, *each.settling_time, swings)
+            measures = measure(runs.part(flat), runs)
+            swings = measures.outcome == "swings"
+            measured = (
+                measures.distinct_peaks,
+                measures.period,
+                measures.peak_to_peak,
+                *measures.settling_time,
+                swings,
+            )
             measured = (*measured, runs.results.turn_counts)
             for column, values in zip(columns, measured, strict=True):
                 column[runs.numbers] = values
-        found[least] = columns
-    (*filtered, few), (*unfiltered, many) = found.values()
+        result[least] = columns
+    (*filtered, few), (*unfiltered, many) = result.values()
     for one, other in zip(filtered, unfiltered, strict=True):
         assert np.array_equal(one, other, equal_nan=True)
     assert few.sum() < many.sum()

@@ -84,15 +84,15 @@ def backup(folder: Path, **changes: Any) -> Path:
 
 def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
     options = [part for key, value in MACHINE.items() for part in ("--set", f"{key}={value}")]
-    told = ["--set", "force_per_output=60 N", *options]
-    done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *told)
+    labels = ["--set", "force_per_output=60 N", *options]
+    done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *labels)
     assert (done.returncode, done.stderr) == (0, "")
     flat = friso.load(tmp_path / "axis.toml").flat()
     assert flat["controller.kp"] == pytest.approx(2.0 * 60 / 1e-3)
     assert flat["controller.error_deadband"] == pytest.approx(0.5e-6)
     assert flat["drive.sample_time"] == pytest.approx(0.5e-3)
     assert flat["motion.acceleration"] == pytest.approx(2.0)
-    again = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *told)
+    again = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *labels)
     assert (again.returncode, "nothing was overwritten" in again.stderr) == (2, True)
 
 
@@ -171,8 +171,8 @@ def test_the_commands_are_those_of_the_component_pid(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("travel", ["5 mm", "360 deg"])
 def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
-    told = {**(MACHINE if travel == "5 mm" else ROTARY), "travel_per_turn": travel}
-    drawn = stage_from(backup(tmp_path), None, told)
+    labels = {**(MACHINE if travel == "5 mm" else ROTARY), "travel_per_turn": travel}
+    drawn = stage_from(backup(tmp_path), None, labels)
     config = ODRIVE["axis0"]["controller"]["config"]
     back = gains_of(friso.loads(drawn.text()), {"travel_per_turn": travel}, "odrive").parameters
     assert back is not None
@@ -186,8 +186,8 @@ def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
 
 def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
     """Turns and N m by the firmware's formula, against metres and newtons by the stage's."""
-    told = {**MACHINE, "travel_per_turn": "5 mm"}
-    key = {k.removeprefix("controller."): v for k, v in stage_from(backup(tmp_path), None, told).stage.flat().items()}
+    labels = {**MACHINE, "travel_per_turn": "5 mm"}
+    key = {k.removeprefix("controller."): v for k, v in stage_from(backup(tmp_path), None, labels).stage.flat().items()}
     error, speed, wound = 3e-5, 0.01, 4e-5  # [m], [m/s], [m] of the velocity's error
     turns = [value / 5e-3 for value in (error, speed, wound)]
     torque = 0.16 * (20.0 * turns[0] - turns[1]) + 0.32 * turns[2]
@@ -197,9 +197,10 @@ def test_an_odrive_exerts_the_force_of_its_torque(tmp_path: Path) -> None:
 
 def test_gains_in_the_units_of_drives() -> None:
     stage = friso.load(EXAMPLES / "twincat_cascade.toml")
-    told = {"travel_per_turn": "10 mm", "motor_constant": "0.5 N*m/A"}
+    labels = {"travel_per_turn": "10 mm", "motor_constant": "0.5 N*m/A"}
     rows = {
-        row.symbol: {unit: value for value, unit in row.values} for row in conversions(stage.flat(), UserAnswers(told))
+        row.symbol: {unit: value for value, unit in row.values}
+        for row in conversions(stage.flat(), UserAnswers(labels))
     }
     lever = 10e-3 / (2 * np.pi)
     assert rows["kv"]["(m/min)/mm"] == pytest.approx(1.5)
@@ -276,10 +277,10 @@ def test_what_is_no_parameter_file(tmp_path: Path, name: str) -> None:
     content, part = BAD[name]
     path = tmp_path / "file.ini"
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    told = {**MACHINE, "force_per_output": "20 N", "machine_unit": "mm", "drive.sample_time": "1 ms"}
-    told |= {"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "0.1 s"}
+    labels = {**MACHINE, "force_per_output": "20 N", "machine_unit": "mm", "drive.sample_time": "1 ms"}
+    labels |= {"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "0.1 s"}
     with pytest.raises(InputError, match=part) as refused:
-        stage_from(path, None, told)
+        stage_from(path, None, labels)
     assert str(path) in str(refused.value)
 
 

@@ -46,41 +46,41 @@ def test_a_cycle_of_known_shape() -> None:
     time = np.arange(0, 20, 1e-3)
     phase = time % 1.6
     deviation = np.where(phase < 0.4, -0.2 + 2 * phase, 0.6 - (phase - 0.4) * 2 / 3) * 1e-3
-    found = rail_runs(recorded(deviation))
-    assert found.swings[0]
-    assert found.swing[0] == pytest.approx(0.8e-3, rel=1e-2)
-    assert found.period[0] == pytest.approx(1.6, rel=1e-3)
-    assert (found.above[0], found.below[0]) == pytest.approx((0.6e-3, 0.2e-3), rel=1e-2)
-    assert found.rising[0] == pytest.approx(0.25, rel=1e-2)
-    assert max(found.period_scatter[0], found.height_scatter[0]) < 1e-2
-    assert found.peaks[0] == 7  # maxima at 10.0, 11.6, ..., 19.6 s
+    runs = rail_runs(recorded(deviation))
+    assert runs.swings[0]
+    assert runs.swing[0] == pytest.approx(0.8e-3, rel=1e-2)
+    assert runs.period[0] == pytest.approx(1.6, rel=1e-3)
+    assert (runs.above[0], runs.below[0]) == pytest.approx((0.6e-3, 0.2e-3), rel=1e-2)
+    assert runs.rising[0] == pytest.approx(0.25, rel=1e-2)
+    assert max(runs.period_scatter[0], runs.height_scatter[0]) < 1e-2
+    assert runs.peaks[0] == 7  # maxima at 10.0, 11.6, ..., 19.6 s
 
 
 def test_swings_that_die_out_count_but_do_not_last() -> None:
     time = np.arange(0, 20, 1e-3)
     dying = np.where(time < 16.5, 5e-4 * np.sin(2 * np.pi * time), 0.0)
-    found = rail_runs(recorded(dying))
-    assert found.peaks[0] == 7  # maxima at 10.25, 11.25, ..., 16.25 s
-    assert not found.swings[0]
+    runs = rail_runs(recorded(dying))
+    assert runs.peaks[0] == 7  # maxima at 10.25, 11.25, ..., 16.25 s
+    assert not runs.swings[0]
 
 
 def test_runs_that_failed_neither_hunt_nor_settle() -> None:
     time = np.arange(0, 20, 1e-3)
     cycle = 5e-4 * np.sin(2 * np.pi * time)
-    found = rail_runs(recorded(cycle, np.where(time < 15, cycle, np.nan), np.zeros_like(time)))
-    assert found.failed.tolist() == [False, True, False]
-    assert np.isnan(found.swing[1])
-    share = found.share()
+    runs = rail_runs(recorded(cycle, np.where(time < 15, cycle, np.nan), np.zeros_like(time)))
+    assert runs.failed.tolist() == [False, True, False]
+    assert np.isnan(runs.swing[1])
+    share = runs.share()
     assert share.probability == 0.5
     assert (
         share.high
-        > replace(found, **{each.name: getattr(found, each.name)[[0, 2]] for each in fields(found)}).share().probability
+        > replace(runs, **{item.name: getattr(runs, item.name)[[0, 2]] for item in fields(runs)}).share().probability
     )
 
 
 def test_turning_points_of_a_flat_top() -> None:
     time, values = np.arange(7.0), np.array([0, 1, 1, 1, 0, 0, 2.0])
-    assert [each.tolist() for each in turning_points(time, values)] == [[3.0, 5.0], [1.0, 0.0]]
+    assert [point.tolist() for point in turning_points(time, values)] == [[3.0, 5.0], [1.0, 0.0]]
 
 
 def test_the_move_is_the_thesis_s() -> None:
@@ -125,7 +125,7 @@ def test_hunting_can_be_started() -> None:
     tasks = [move(machine), *(released(machine, place) for place in (-5e-3, -5e-4, 1e-3))]
     after_move, *after_release = (follow(machine, task, [20], {}) for task in tasks)
     assert after_move.peaks[0] == 0
-    assert sum(bool(each.swings[0]) for each in after_release) >= 2
+    assert sum(bool(item.swings[0]) for item in after_release) >= 2
 
 
 SMALL = {
@@ -142,14 +142,14 @@ def test_free_joint_does_not_hunt_and_its_stroke_matters() -> None:
     """Fig. 24 and 26, and what is told of them."""
     sizes = {module: {**values, "rails": small} for module, values in SMALL.items()}
     with patched(sizes):
-        told = hunting.run_experiment(RIG, 1, silent)
+        labels = hunting.run_experiment(RIG, 1, silent)
         grid = stroke_crossover.run_experiment(RIG, 1, silent)
-    assert not told.result.cases["free"].peaks.any()
-    assert told.result.cases["locked"].peaks[0].any()
-    assert [log.kind for log in told.logs] == ["moves"] * 6
+    assert not labels.result.cases["free"].peaks.any()
+    assert labels.result.cases["locked"].peaks[0].any()
+    assert [log.kind for log in labels.logs] == ["moves"] * 6
     assert grid.result.share[1, 1] == 0
     assert grid.result.share[0].max() > 0
-    for outcome in (told, grid):
+    for outcome in (labels, grid):
         assert all(sentences(outcome))
         assert figures(outcome)
         assert rig_document(outcome)["results"]
@@ -177,14 +177,14 @@ def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
 def test_standstill_adds_up_and_stiffness_holds() -> None:
     """Fig. 28: variances of independent disturbances add up; the free joint moves more."""
     with patched({in_position: {"SETTLING": 1.0, "WATCHED": 4.0, "DAMPING_RATIOS": (0.01, 1.0)}}):
-        found, kept = in_position.in_position(RIG, 1, silent)
+        standstill, kept = in_position.in_position(RIG, 1, silent)
     assert set(kept) == {"locked", "free"}
     for case in in_position.CASES:
-        alone = [found.runs[case, source].true[0, 0] ** 2 for source in in_position.SOURCES[:-1]]
-        assert found.runs[case, "all"].true[0, 0] ** 2 == pytest.approx(sum(alone), rel=0.2)
-        spectrum = found.runs[case, "all"].spectrum[0]
-        step = found.frequencies[1]
-        assert np.sqrt((spectrum**2).sum() * step) == pytest.approx(found.runs[case, "all"].true[0, 0], rel=0.2)
-    assert found.ratio("all") > 3
-    assert found.recovered[1] > found.recovered[0]
-    assert found.amplifier == pytest.approx(400 / 2**14 / np.sqrt(12))
+        alone = [standstill.runs[case, source].true[0, 0] ** 2 for source in in_position.SOURCES[:-1]]
+        assert standstill.runs[case, "all"].true[0, 0] ** 2 == pytest.approx(sum(alone), rel=0.2)
+        spectrum = standstill.runs[case, "all"].spectrum[0]
+        step = standstill.frequencies[1]
+        assert np.sqrt((spectrum**2).sum() * step) == pytest.approx(standstill.runs[case, "all"].true[0, 0], rel=0.2)
+    assert standstill.ratio("all") > 3
+    assert standstill.recovered[1] > standstill.recovered[0]
+    assert standstill.amplifier == pytest.approx(400 / 2**14 / np.sqrt(12))

@@ -33,28 +33,28 @@ def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
 
 
 def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
-    found = stiffness.run_experiment(built, 1, silent).result
-    on_cables = found.true + built.flat()["cable.stiffness"]
-    assert found.steps.stiffness.holds(on_cables)
-    assert found.steps.stiffness.value == pytest.approx(on_cables, rel=1e-3)
+    result = stiffness.run_experiment(built, 1, silent).result
+    on_cables = result.true + built.flat()["cable.stiffness"]
+    assert result.steps.stiffness.holds(on_cables)
+    assert result.steps.stiffness.value == pytest.approx(on_cables, rel=1e-3)
 
 
 def test_a_weaker_motor_makes_the_joint_look_stiffer(built: Stage) -> None:
     weak = built.replace({"drive.motor_constant_ratio": 0.68})
-    found = stiffness.run_experiment(weak, 1, silent).result
-    assert found.steps.stiffness.value == pytest.approx(found.apparent, rel=5e-3)
-    assert found.apparent > found.true
+    result = stiffness.run_experiment(weak, 1, silent).result
+    assert result.steps.stiffness.value == pytest.approx(result.apparent, rel=5e-3)
+    assert result.apparent > result.true
 
 
 def test_slips_lie_within_the_static_friction_of_their_rail(built: Stage) -> None:
     (log,) = stiction.slow_motion(built, 1, 1)
     flat = log.stage.flat()
-    found = static_from_stick_slip(log.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
+    slips = static_from_stick_slip(log.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
     low, high = stiction.true_range(log)
-    assert len(found.forces) > 8
-    assert found.forces.max() < high
-    assert found.forces.min() > 0.9 * low
-    assert found.static.holds((low + high) / 2)
+    assert len(slips.forces) > 8
+    assert slips.forces.max() < high
+    assert slips.forces.min() > 0.9 * low
+    assert slips.static.holds((low + high) / 2)
 
 
 def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
@@ -64,8 +64,8 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     monkeypatch.setattr(sizes, "WAY", 1 / 6)
     monkeypatch.setattr(constant_speed, "DURATIONS", (48.0, 12.0))
     monkeypatch.setattr(many_speeds, "PLACES", 1)
-    found = constant_speed.run_experiment(built, 1, silent).result
-    free, (place,) = found.cases[0], found.many.places
+    result = constant_speed.run_experiment(built, 1, silent).result
+    free, (place,) = result.cases[0], result.many.places
     assert not free.place.separated
     assert not free.velocity.both.coulomb.determined
     assert place.velocity.both.coulomb.determined
@@ -87,8 +87,8 @@ def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: St
     """Controller times plant, both measured in the same run, against the loop read from the sensitivity alone."""
     stage = sizes.locked(built)
     _, loops = frf.open_loops(stage, PLACE, 1, frf.SETTINGS)
-    for each in loops[2:]:
-        assert frf.nearest(each) == pytest.approx(each.tuned, rel=0.15)
+    for item in loops[2:]:
+        assert frf.nearest(item) == pytest.approx(item.tuned, rel=0.15)
     log = rig_log(excitation.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
     plant, loop = excitation.plant([log]), excitation.loop(log)
     hertz = plant.frequency
@@ -119,9 +119,9 @@ def test_a_free_joint_is_stable_up_to_a_setting_and_not_beyond(built: Stage) -> 
 
 def test_an_experiment_on_the_joint_needs_one(built: Stage, refused: Refused) -> None:
     rigid = built.replace({"joint": None, "parasitic": None})
-    for each in (frf, stiffness, stiction, constant_speed):
+    for item in (frf, stiffness, stiction, constant_speed):
         with refused():
-            each.run_experiment(rigid, 1, silent)
+            item.run_experiment(rigid, 1, silent)
 
 
 def test_a_standing_stage_is_simulated_as_exactly_as_a_moving_one(built: Stage) -> None:

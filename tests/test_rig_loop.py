@@ -25,19 +25,19 @@ STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path) -> None:
     machine = built(3)
     slow = slow_motion(machine.truth, 1, 1)
-    given = through_files([steps(machine.truth, 1), *slow], tmp_path)
-    assert [each.kind for each in given] == ["steps", "stick-slip"]
+    files = through_files([steps(machine.truth, 1), *slow], tmp_path)
+    assert [item.kind for item in files] == ["steps", "stick-slip"]
     stroke = freed(machine.truth).flat()["joint.stroke"]
     guess = machine.guess.with_numbers({"joint.stroke": stroke})
-    found = identify(sources(given), guess)
-    assert found.stage is not None
-    save(found.stage, tmp_path / "identified.toml")
-    told = load(tmp_path / "identified.toml").uncertain()
-    assert set(told) == {STIFFNESS, STATIC}
+    identification = identify(sources(files), guess)
+    assert identification.stage is not None
+    save(identification.stage, tmp_path / "identified.toml")
+    labels = load(tmp_path / "identified.toml").uncertain()
+    assert set(labels) == {STIFFNESS, STATIC}
     for key, truth in ((STIFFNESS, machine.flat[STIFFNESS]), (STATIC, mean_level(slow, STATIC))):
-        assert told[key].low <= truth <= told[key].high
-        assert not told[key].low <= guess.flat()[key] <= told[key].high
-    assert found.stage.flat()[STIFFNESS] == pytest.approx(machine.flat[STIFFNESS], rel=2e-3)
+        assert labels[key].low <= truth <= labels[key].high
+        assert not labels[key].low <= guess.flat()[key] <= labels[key].high
+    assert identification.stage.flat()[STIFFNESS] == pytest.approx(machine.flat[STIFFNESS], rel=2e-3)
 
 
 def test_the_mass_line_of_a_free_joint_is_not_taken_for_the_whole_mass() -> None:
@@ -63,8 +63,8 @@ def test_two_speeds_bound_friction_and_do_not_show_it(wording: Wording) -> None:
     force = friction + 0.01 * np.random.default_rng(1).standard_normal(len(position))
     both = friction_velocity(record("two", sample_time, reference=position, position=position, force=force)).both
     wording(both.coulomb.reason)
-    for found, truth in ((both.coulomb, coulomb), (both.viscous, viscous), (both.static, coulomb + rise)):
-        assert not found.determined
-        assert found.holds(truth)
+    for result, truth in ((both.coulomb, coulomb), (both.viscous, viscous), (both.static, coulomb + rise)):
+        assert not result.determined
+        assert result.holds(truth)
     assert both.coulomb.high < 2.5
     assert both.stribeck_velocity.holds(stribeck)

@@ -114,19 +114,19 @@ def spectra(draw: st.DrawFn) -> dict[str, list[str]]:
     level = st.floats(1e-12, 1e3, allow_subnormal=False)
     densities = draw(st.lists(level, min_size=len(frequencies), max_size=len(frequencies)))
     return {
-        "frequency": [f"{each} uHz" for each in frequencies],
-        "acceleration": [f"{each!r} m/s^2/Hz^0.5" for each in densities],
+        "frequency": [f"{frequency} uHz" for frequency in frequencies],
+        "acceleration": [f"{density!r} m/s^2/Hz^0.5" for density in densities],
     }
 
 
 @settings(max_examples=50, deadline=None)
 @given(spectra())
 def test_floors_come_through(floor: dict[str, list[str]]) -> None:
-    found = loads(load(EXAMPLE).replace({"floor": floor}).to_toml()).floor
-    assert found
-    assert found.as_written() == floor
-    assert [*found.acceleration] == [float(text.split()[0]) for text in floor["acceleration"]]
-    assert all(low < high for low, high in pairwise(found.frequency))
+    result = loads(load(EXAMPLE).replace({"floor": floor}).to_toml()).floor
+    assert result
+    assert result.as_written() == floor
+    assert [*result.acceleration] == [float(text.split()[0]) for text in floor["acceleration"]]
+    assert all(low < high for low, high in pairwise(result.frequency))
 
 
 def test_commented_lines_of_the_example_load() -> None:

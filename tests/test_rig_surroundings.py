@@ -36,7 +36,7 @@ def spectrum(*points: tuple[float, float]) -> Floor:
     """A floor from frequencies [Hz] and densities [m/s^2/Hz^0.5]."""
     frequency, density = zip(*points, strict=True)
     return Floor(
-        frequency=[f"{each!r} Hz" for each in frequency],  # pyright: ignore[reportArgumentType]
+        frequency=[f"{item!r} Hz" for item in frequency],  # pyright: ignore[reportArgumentType]
         acceleration=[f"{each!r} m/s^2/Hz^0.5" for each in density],  # pyright: ignore[reportArgumentType]
     )
 
@@ -73,11 +73,11 @@ def test_mean_and_deviation_over_rails(first: int, length: float, deviation: flo
     """At one place of many rails."""
     count = 1500
     flat = rail(static_deviation=deviation, correlation_length=length)
-    found = np.array([friction_factors(flat, np.array([place]), first + k)[:, 0] for k in range(count)])
-    assert np.all(found[:, 1] == 1)
+    values = np.array([friction_factors(flat, np.array([place]), first + k)[:, 0] for k in range(count)])
+    assert np.all(values[:, 1] == 1)
     width = np.log1p(deviation**2)
-    logs = (np.log(found[:, 0]) + width / 2) / np.sqrt(width)
-    assert abs(found[:, 0].mean() - 1) < SURE * deviation / np.sqrt(count)
+    logs = (np.log(values[:, 0]) + width / 2) / np.sqrt(width)
+    assert abs(values[:, 0].mean() - 1) < SURE * deviation / np.sqrt(count)
     assert abs(logs.mean()) < SURE / np.sqrt(count)
     assert abs(logs.var() - 1) < SURE * np.sqrt(2 / count)
 
@@ -92,11 +92,11 @@ def test_deviation_and_correlation_length_along_one_rail(seed: int, length: floa
     width = np.log1p(deviation**2)
     field = (np.log(factor) + width / 2) / np.sqrt(width)
     lags = np.arange(9)
-    found = np.array([np.mean(field[: count - lag] * field[lag:]) for lag in lags])
+    values = np.array([np.mean(field[: count - lag] * field[lag:]) for lag in lags])
     far = np.arange(-40, 41)
     error = np.sqrt([np.sum(known(far) ** 2 + known(far + lag) * known(far - lag)) / count for lag in lags])
     correlation = known(lags)
-    assert np.all(np.abs(found - correlation) < SURE * error)
+    assert np.all(np.abs(values - correlation) < SURE * error)
     # The factor itself: a lognormal field's covariance, exp(s^2 rho) - 1, tells the variance of its mean.
     mean_error = np.sqrt(np.sum(np.expm1(width * known(far))) / count)
     assert abs(factor.mean() - 1) < SURE * mean_error
@@ -141,11 +141,11 @@ def test_other_seeds_are_other_rails(seed: int, other: int, length: float) -> No
 def test_field_against_its_sum_over_cells() -> None:
     """The slow twin: each place's sum over 12 lengths of white noise, read one number at a time."""
     length, places = 5e-3, np.array([-0.0301, -1e-9, 0.0, 0.00125, 0.0062, 1.7])
-    for place, found in zip(places, gaussian_field(places, length, 11), strict=True):
+    for place, result in zip(places, gaussian_field(places, length, 11), strict=True):
         cells = np.arange(round(place / length * 2) - 24, round(place / length * 2) + 25)
         noise = np.array([white_noise(int(cell), 11) for cell in cells])
         kernel = np.exp(-((place / length - cells / 2) ** 2))
-        assert found == pytest.approx(noise @ kernel / np.sqrt(kernel @ kernel), abs=1e-7)
+        assert result == pytest.approx(noise @ kernel / np.sqrt(kernel @ kernel), abs=1e-7)
 
 
 def white_noise(cell: int, seed: int) -> float:
@@ -160,9 +160,9 @@ def white_noise(cell: int, seed: int) -> float:
 def test_harmonics_of_the_rolling_elements(seed: int, pitch: float, shares: list[float]) -> None:
     harmonics = dict(zip(("first_harmonic", "second_harmonic", "third_harmonic"), shares, strict=True))
     factors = friction_factors(rail(offset=0.5, rolling_pitch=pitch, **harmonics), np.arange(64) * pitch / 64, seed)
-    found = np.fft.rfft(factors[0]) / 64
+    result = np.fft.rfft(factors[0]) / 64
     np.testing.assert_array_equal(factors[0], factors[1])
-    np.testing.assert_allclose(np.abs(found[:5]), [1.5, *(0.75 * each for each in shares), 0], atol=1e-12)
+    np.testing.assert_allclose(np.abs(result[:5]), [1.5, *(0.75 * share for share in shares), 0], atol=1e-12)
 
 
 def test_a_rail_without_variation_is_even() -> None:
@@ -190,8 +190,8 @@ def test_variance_of_a_floor_is_the_integral_of_its_spectrum(several: list[tuple
     frequency, density = np.array(sorted(several)).T
     fine = np.unique(np.concatenate([np.geomspace(frequency[0], frequency[-1], 200_001), frequency]))
     power = np.exp(2 * np.interp(np.log(fine), np.log(frequency), np.log(density)))
-    found = variance_below(spectrum(*sorted(several)), np.array([0.0, frequency[0], frequency[-1], 1e4]))
-    np.testing.assert_allclose(found, [0, 0, *[np.trapezoid(power, fine)] * 2], rtol=1e-5)
+    variance = variance_below(spectrum(*sorted(several)), np.array([0.0, frequency[0], frequency[-1], 1e4]))
+    np.testing.assert_allclose(variance, [0, 0, *[np.trapezoid(power, fine)] * 2], rtol=1e-5)
 
 
 @settings(max_examples=10, deadline=None)
@@ -200,15 +200,15 @@ def test_spectrum_is_recovered(seed: int, first: float, second: float) -> None:
     """Welch's estimate in tenths of the band, each within five standard errors of the spectrum's mean there."""
     floor = spectrum((2.0, 1e-4), (10.0, 1e-4 * 5**first), (100.0, 1e-4 * 5**first * 10**second))
     interval, window = 1 / 400, 2000
-    found = floor_acceleration(floor, 400.0, interval, seed)
-    frequency, power = welch(found, 1 / interval, nperseg=window, detrend=False)  # pyright: ignore[reportArgumentType]
+    acceleration = floor_acceleration(floor, 400.0, interval, seed)
+    frequency, power = welch(acceleration, 1 / interval, nperseg=window, detrend=False)  # pyright: ignore[reportArgumentType]
     density = np.interp(np.log(np.maximum(frequency, 1)), np.log(floor.frequency), np.log(floor.acceleration))
     inside = np.flatnonzero((frequency > 3) & (frequency < 97))
     ratio = power[inside] / np.exp(2 * density[inside])
     for part in np.array_split(ratio, 10):
         # Hann windows that overlap by half count for 0.95 independent ones each, and of bins, whose neighbours
         # correlate by (2/3)^2, half do (Welch 1967, doi.org/10.1109/TAU.1967.1161901).
-        error = 1 / np.sqrt(len(found) / window * 2 * 0.95 * len(part) / 2)
+        error = 1 / np.sqrt(len(acceleration) / window * 2 * 0.95 * len(part) / 2)
         assert abs(part.mean() - 1) < SURE * error
     assert power[frequency < 1].max() < 1e-3 * power[inside].max()
     assert power[frequency > 101].max() < 1e-3 * power[inside].max()
@@ -219,20 +219,20 @@ def test_spectrum_is_recovered(seed: int, first: float, second: float) -> None:
 def test_variance_of_a_floor_however_short(first: int, duration: float) -> None:
     """Over many seeds at one time, and not only of the waves that fit into the record."""
     floor, count = spectrum((0.2, 1e-3), (5.0, 1e-4), (90.0, 1e-4)), 1500
-    found = np.array([floor_acceleration(floor, duration, 1 / 400, first + k)[-1] for k in range(count)])
+    values = np.array([floor_acceleration(floor, duration, 1 / 400, first + k)[-1] for k in range(count)])
     expected = variance_below(floor, np.array([1e3]))[0]
-    assert abs(found.mean()) < SURE * np.sqrt(expected / count)
-    assert abs(np.mean(found**2) / expected - 1) < SURE * np.sqrt(2 / count)
+    assert abs(values.mean()) < SURE * np.sqrt(expected / count)
+    assert abs(np.mean(values**2) / expected - 1) < SURE * np.sqrt(2 / count)
 
 
 @settings(max_examples=30, deadline=None)
 @given(seeds, st.integers(1, 5000), st.sampled_from([5e-5, 1e-3, 0.005]))
 def test_a_floor_is_sampled_from_start_to_end(seed: int, steps: int, interval: float) -> None:
     floor = spectrum((1.0, 1e-4), (100.0, 1e-4))
-    found = floor_acceleration(floor, steps * interval, interval, seed)
-    assert found.shape == (steps + 1,)
-    np.testing.assert_array_equal(found, floor_acceleration(floor, steps * interval, interval, seed))
-    assert np.any(found != floor_acceleration(floor, steps * interval, interval, seed + 1))
+    acceleration = floor_acceleration(floor, steps * interval, interval, seed)
+    assert acceleration.shape == (steps + 1,)
+    np.testing.assert_array_equal(acceleration, floor_acceleration(floor, steps * interval, interval, seed))
+    assert np.any(acceleration != floor_acceleration(floor, steps * interval, interval, seed + 1))
 
 
 def test_a_floor_faster_than_it_is_sampled(refused: Refused) -> None:

@@ -202,8 +202,8 @@ def test_commands(folder: Path, command: str) -> None:
         documents.append(json.loads(answer.stdout))
         assert bool(written) == bool([*folder.glob(f"{command}_{name}*")])
         if name == "rotary":
-            said = LENGTHS.search(answer.stderr + " ".join(texts(documents[1])))
-            assert not said, said
+            match = LENGTHS.search(answer.stderr + " ".join(texts(documents[1])))
+            assert not match, match
     assert numbers(documents[0]) == without_files(documents[1])
 
 

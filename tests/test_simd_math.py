@@ -107,10 +107,10 @@ def test_steps_are_vectorised() -> None:
 def first_crossing(B):
     p0, p1, p2, p3 = B[0], B[1], B[2], B[3]
     guess = roots.first_guess(p0, p1, p2, p3)
-    found = roots.crossing(p0, p1, p2, p3, guess)
+    root = roots.crossing(p0, p1, p2, p3, guess)
     B[4] = guess
-    B[5] = found
-    B[6] = roots.cubic(p0, p1, p2, p3, found)
+    B[5] = root
+    B[6] = roots.cubic(p0, p1, p2, p3, root)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -122,14 +122,14 @@ def test_first_crossing_of_a_cubic(seed: int) -> None:
     rows[:4] = rng.normal(size=(4, 2000)) + rng.choice([0.0, 0.3, 1.0], size=2000)
     rows[0] = np.abs(rows[0])
     dips = 0
-    for *p, guess, found, there in in_all(first_crossing, rows).T:
+    for *p, guess, result, there in in_all(first_crossing, rows).T:
         zeros = np.roots(np.polyfit(np.array([0, 1, 2, 3]) / 3, p, 3))
         inside = np.sort([z.real for z in zeros if abs(z.imag) < 1e-12 and 1e-9 < z.real < 1 - 1e-9])
         assert (guess < 2.0) == bool(inside.size)
         if inside.size:
             dips += all(point > 0 for point in p)
             assert there <= 0.01 * p[0] + 1e-12
-            assert inside[0] - 0.02 <= found <= 1.0 or there > 0
+            assert inside[0] - 0.02 <= result <= 1.0 or there > 0
     assert dips > 20
 
 

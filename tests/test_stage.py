@@ -159,8 +159,8 @@ def test_template_with_its_optional_lines_loads() -> None:
     """All of it but the controller's other form."""
     lines = TEMPLATE.read_text(encoding="utf-8").splitlines()
     other_form = ("# kp", "# ki", "# kd", "# tau", "# derivative_on", "# kind")
-    given = [line if line.startswith(other_form) else re.sub(r"^# (\[|\w+ = )", r"\1", line) for line in lines]
-    whole = loads("\n".join(given))
+    inputs = [line if line.startswith(other_form) else re.sub(r"^# (\[|\w+ = )", r"\1", line) for line in lines]
+    whole = loads("\n".join(inputs))
     assert load(TEMPLATE).flat().keys() < whole.flat().keys()
     assert {"parasitic.damping_ratio", "drive.ripple", "rail.first_harmonic", "cable.drag"} <= whole.flat().keys()
     assert whole.floor is not None
@@ -261,8 +261,8 @@ def test_violations_tell_cells_apart(rig: Stage) -> None:
         "friction.coulomb": np.array([1.0, 1.0, 4.0, 1.0]),
         "parasitic.mass": 0.5,
     }
-    found = {why: np.broadcast_to(where, 4).tolist() for where, why in violations(rig.flat(swept))}
-    assert found == {
+    result = {why: np.broadcast_to(where, 4).tolist() for where, why in violations(rig.flat(swept))}
+    assert result == {
         "masses.cart must be greater than 0": [False, True, False, True],
         "friction.coulomb, friction.static: expected Coulomb friction no larger than static friction": [
             False,

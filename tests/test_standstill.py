@@ -168,22 +168,22 @@ def test_what_is_said_of_hunting_is_what_a_long_run_does(name: str) -> None:
                 "standstill": {"standstill_window": "20 um", "standstill_factor": 0.5},
                 "push": {"stiction_push": "0.3 N", "stiction_push_window": "20 um"}}[name]  # fmt: skip
     chosen = machine(settings, duration="40 s")
-    found = hunting_of(chosen)
+    hunting = hunting_of(chosen)
     run = friso.simulate(chosen, 1e-8, 1e-3)["position"]
     last = run.sel(time=slice(30, 40)).values
     swing = (last.max() - last.min()) / 2
     if name.startswith("wide"):
         assert swing < 1e-7
-        assert (found.attracting, found.observed, found.certain) == ((), (), True)
+        assert (hunting.attracting, hunting.observed, hunting.certain) == ((), (), True)
         return
-    sizes = [cycle.amplitude for cycle in found.attracting] + [swung.amplitude for swung in found.observed]
+    sizes = [cycle.amplitude for cycle in hunting.attracting] + [swung.amplitude for swung in hunting.observed]
     assert min(abs(size / swing - 1) for size in sizes) < 5e-3
 
 
 def test_dither_leaves_the_answer_to_runs() -> None:
     chosen = machine(SETTINGS["dither"], duration="2 s")
-    found = hunting_of(chosen)
-    assert (found.cycles, found.certain, found.reason) == ((), False, DITHERS)
+    hunting = hunting_of(chosen)
+    assert (hunting.cycles, hunting.certain, hunting.reason) == ((), False, DITHERS)
     with pytest.raises(InputError, match="dither"):
         friso.boundary(chosen, {"controller.ki": "1e4 N/(m*s)..3e4 N/(m*s)"})
 

@@ -188,8 +188,8 @@ class Bounce:
         before, behind = self.stages.take(np.zeros(2, np.int64)).rates(states)
         normal = np.zeros(self.start.size)
         normal[[self.place("position"), self.place("cart_position")]] = 1.0, -1.0
-        found = np.eye(self.start.size) + np.outer(behind - before, normal) / (normal @ before)
-        return found * self.stages.scales[0] / self.stages.scales[0][:, None]
+        result = np.eye(self.start.size) + np.outer(behind - before, normal) / (normal @ before)
+        return result * self.stages.scales[0] / self.stages.scales[0][:, None]
 
 
 @pytest.fixture(scope="module")
@@ -236,10 +236,10 @@ def test_deviations_follow_the_linearised_equations(name: str) -> None:
     model, whole = declared(name)
     n = len(model.states)
     assert whole.states[:n] == model.states
-    small = [each.symbol for each in whole.states[n:]]
+    small = [state.symbol for state in whole.states[n:]]
     assert [str(symbol) for symbol in small] == [f"{PREFIX}{symbol}" for symbol in model.symbols]
     expected = sp.Matrix(model.rhs).jacobian(sp.Matrix(model.symbols)) * sp.Matrix(small)
-    assert sp.expand(sp.Matrix([each.derivative for each in whole.states[n:]]) - expected) == sp.zeros(n, 1)
+    assert sp.expand(sp.Matrix([state.derivative for state in whole.states[n:]]) - expected) == sp.zeros(n, 1)
 
 
 @pytest.mark.xdist_group("rigid")
@@ -272,7 +272,7 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
     """A state drawn at random, one of its numbers then chosen to lie on the surface; `crossed` if met from beyond."""
     flat = VARIANTS[name].flat()
     _, whole = declared(name)
-    symbols = [whole.symbols, [each.beyond for each in whole.kinks], TIME, REFERENCE, whole.parameters]
+    symbols = [whole.symbols, [item.beyond for item in whole.kinks], TIME, REFERENCE, whole.parameters]
     surfaces = sp.lambdify(symbols, [each.surface for each in whole.kinks])
     jumps = sp.lambdify(symbols, list(whole.jumps[kink].values()))
     size = flat.get("joint.stroke", 1e-2)
@@ -285,9 +285,9 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
         states[met] -= surfaces(states, sides, *held)[number] / slope
     sides = (np.array(surfaces(states, sides, *held)) > 0).astype(float)
     sides[number] = crossed
-    found = jumps(states, sides, *held)
+    result = jumps(states, sides, *held)
     values = zip(map(str, whole.symbols), map(float, states), strict=True)
-    return Meeting(dict(values), dict(zip(map(str, whole.jumps[kink]), map(float, found), strict=True)))
+    return Meeting(dict(values), dict(zip(map(str, whole.jumps[kink]), map(float, result), strict=True)))
 
 
 @pytest.mark.parametrize("name", VARIANTS)
@@ -302,9 +302,9 @@ def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
     assert limiters <= jumping <= limiters | bands
     rng = np.random.default_rng(0)
     for kink, crossed in product(jumping - limiters, (False, True)):
-        found = meeting(name, kink, crossed, rng)
-        size = max(abs(found.states[str(x)]) for x in whole.jumps[kink])
-        assert list(found.jumps.values()) == pytest.approx([0.0], abs=1e-9 * size)
+        point = meeting(name, kink, crossed, rng)
+        size = max(abs(point.states[str(x)]) for x in whole.jumps[kink])
+        assert list(point.jumps.values()) == pytest.approx([0.0], abs=1e-9 * size)
 
 
 @pytest.mark.parametrize(("side", "leaves"), list(product(("ahead", "behind"), (False, True))))
@@ -312,8 +312,10 @@ def test_jump_at_a_limiter_by_hand(side: str, leaves: bool) -> None:
     """The force of its damper, d_l times a speed, is shared over that speed: whatever it is, the velocities deviate by
     d_l/m times how far the deviation goes into the limiter; they get it back where it is left."""
     _, whole = declared(FREE_RIG)
-    kink = next(each for each in whole.kinks if each.name == f"stroke_{side}")
-    found = meeting(FREE_RIG, kink, leaves, np.random.default_rng(1))
-    into = found.states["small_position"] - found.states["small_cart_position"]
-    given = 100.0 * into * (-1 if leaves else 1)
-    assert found.jumps == pytest.approx({"small_velocity": -given / 0.25, "small_cart_velocity": given / 1.2}, rel=1e-6)
+    kink = next(item for item in whole.kinks if item.name == f"stroke_{side}")
+    point = meeting(FREE_RIG, kink, leaves, np.random.default_rng(1))
+    into = point.states["small_position"] - point.states["small_cart_position"]
+    inputs = 100.0 * into * (-1 if leaves else 1)
+    assert point.jumps == pytest.approx(
+        {"small_velocity": -inputs / 0.25, "small_cart_velocity": inputs / 1.2}, rel=1e-6
+    )
