@@ -76,7 +76,7 @@ def thesis_loops() -> bytes:
     """The open loop at prescribed speeds of the cart."""
     drive = {"drive.sample_time": "50 us", "drive.delay": "100 us"}
     figures = friso.bode(rig(), set=drive).figures()
-    return image(next(figure for figure in figures if "loop" in figure.name), "png")
+    return image(next(figure for figure in figures if "speeds" in figure.name), "png")
 
 
 def thesis_map() -> bytes:

@@ -154,7 +154,7 @@ def check(
     >>> import friso
     >>> answer = friso.check(friso.example("lugre_stick_slip"))
     >>> answer.verdict
-    'hunts'
+    'transient'
     >>> print(answer.data["peak_to_peak"].attrs["units"])
     m
     """
