@@ -31,6 +31,7 @@ from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
 from friso.views.tune.document import tune_document
+from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
 from friso.views.tune.words import answer, changes, failing, rows
@@ -163,6 +164,15 @@ def test_the_answer_names_what_to_change(tuning: Advice) -> None:
     assert change in answer(tuning)[1]
     assert len(rows(tuning)) == 3
     assert [line.split(":")[0] for line in failing(tuning)] == ["gains"]
+
+
+def test_gains_are_told_in_the_terms_of_drives(tuning: Advice) -> None:
+    """k_p = m omega^2 sqrt(alpha) of van Dijk's rules, at the crossover that was found."""
+    (found,) = tuning.working
+    assert found.stage is not None
+    flat = found.stage.flat()
+    gain = flat["controller.tuned_mass"] * (2 * np.pi * flat["controller.crossover"]) ** 2 * 0.1**0.5
+    assert f"k_p = {gain:.6g} N/m" in gain_lines(tuning)[0]
 
 
 def test_the_answer_as_files(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,6 +9,7 @@ from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
 from friso.views.tune.figures import figures as tune_figures
+from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.sensitivity_words import sensitivity_sentences
 from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
 
@@ -39,7 +40,13 @@ def page(tuning: Advice, figures: Sequence[Figure]) -> str:
         tuning.stage,
         figures,
         sentences=answer(tuning),
-        notes=[*failing(tuning), *window_lines(tuning), *sensitivity_sentences(tuning), *assumptions(tuning)],
+        notes=[
+            *failing(tuning),
+            *gain_lines(tuning),
+            *window_lines(tuning),
+            *sensitivity_sentences(tuning),
+            *assumptions(tuning),
+        ],
         columns=COLUMNS,
         rows=rows(tuning),
         computed=f", seed {tuning.seed}",
