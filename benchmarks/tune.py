@@ -82,7 +82,7 @@ def axes() -> Iterator[tuple[str, Stage]]:
                 yield f"{name}, friction x {level:g}", stage
                 continue
             joint = {"locked": True, "limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
-            mode = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": "0.01"}
+            mode = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": 0.01}
             yield f"{name}, friction x {level:g}, mode", stage.replace({"joint": joint, "parasitic": mode})
 
 

@@ -50,11 +50,13 @@ class TuneAnswer(Answer):
         return [AnswerTable(self.result.stage.name, COLUMNS, rows(self.result))]
 
     def details(self) -> Sequence[str]:
-        """How far the numbers may be off, and what is assumed."""
+        """Gains in the terms of drives, how far the numbers may be off, and what is assumed."""
+        from friso.views.tune.gain_words import gain_lines
         from friso.views.tune.sensitivity_words import sensitivity_sentences
         from friso.views.tune.words import assumptions, window_lines
 
-        return [*window_lines(self.result), *sensitivity_sentences(self.result), *assumptions(self.result)]
+        found = self.result
+        return [*gain_lines(found), *window_lines(found), *sensitivity_sentences(found), *assumptions(found)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """The design of leaf springs for an isolator."""
