@@ -64,7 +64,7 @@ class AxisKind:
 _TURNED = re.compile(r"rad|N[*· ]m|kg[*· ]m")
 _PARTS = re.compile(r"(?<![A-Za-zµ^])(?P<prefix>[numµkM]??)(?P<base>kg|N|m)(?![A-Za-z])")
 _BELOW = re.compile(r"(?<=/)(N\*m|kg\*m\^2)")
-_NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z])(?:/m?s)?")
+_NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z]|[*·]m)(?:/m?s)?")
 _SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
 _IN_KEYS: Mapping[str, str] = {"m": "rad", "n": "n_m", "ns": "n_m_s", "kg": "kg_m2"}
 

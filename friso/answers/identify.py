@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import Changes, StageLike, stage_of
 from friso.answers.logs import LogFiles, options_of, paths_of
-from friso.axis import speak_of
+from friso.axis import LINEAR, AxisKind, speak_of
 from friso.errors import InputError
 from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
-from friso.identification.method import Identification, Prediction, check_predictions
+from friso.identification.method import Identification, Prediction, axis_of_all, check_predictions
 from friso.identification.sources import LogFile, read_all
 from friso.intervals import Span
 from friso.progress import Progress, silent
@@ -36,10 +36,15 @@ class IdentifyAnswer(Answer):
 
     command = "identify"
 
-    def __init__(self, result: Identification, inputs: Sequence[LogFile], predictions: Sequence[Prediction]) -> None:
+    def __init__(
+        self,
+        result: Identification,
+        inputs: Sequence[LogFile],
+        predictions: Sequence[Prediction],
+        axis_kind: AxisKind = LINEAR,
+    ) -> None:
         self.result, self.inputs, self.predictions = result, tuple(inputs), tuple(predictions)
-        if result.stage is not None:
-            self.axis_kind = result.stage.axis_kind
+        self.axis_kind = axis_kind
 
     @property
     def failure(self) -> str:
@@ -101,6 +106,7 @@ def identify(
     unit: Changes = None,
     scale: Changes = None,
     dt: str | float | None = None,
+    axis: str | None = None,
     predict: LogFiles = (),
     bandwidth: str | float | None = None,
     band: str | None = None,
@@ -125,6 +131,8 @@ def identify(
         Roles and their channels, channels and their units, roles and their scales, as in `friso.logs`.
     dt : str or float, optional
         Sample time, "1 ms" or a number [s], if a file does not contain it.
+    axis : str, optional
+        "rotary" for angles, torques and moments of inertia; a stage tells it, too.
     predict : path or list of paths, optional
         Other logs, simulated with the identified stage.
     bandwidth : str or float, optional
@@ -159,12 +167,14 @@ def identify(
         first = next(iter(f"{key}={value}" for key, value in set.items()) if hasattr(set, "items") else iter(set))
         raise InputError("set", str(first), "a stage whose keys to override", "stage=stage.toml")
     assumed = None if stage is None else stage_of(stage, set)
-    if assumed is not None:
-        speak_of(assumed.axis_kind)
-    settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_)
+    if axis is None and assumed is not None and assumed.axis_kind != LINEAR:
+        axis = assumed.axis_kind.name
+    settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
     inputs = read_all([*paths, *other_paths], options, folder)
     keep({file.path: file.mapping for file in inputs})
+    axis_kind = axis_of_all([file.source for file in inputs], assumed)
+    speak_of(axis_kind)
     sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
     others = _others(inputs[len(paths) :])
     check_predictions(sources, others, assumed)
@@ -172,7 +182,8 @@ def identify(
     from friso.identification.method import predict as predicted
 
     result = identification(sources, assumed, settings, progress)
-    return IdentifyAnswer(result, inputs, [predicted(result, log, settings, assumed) for log in others])
+    predictions = [predicted(result, log, settings, assumed) for log in others]
+    return IdentifyAnswer(result, inputs, predictions, axis_kind)
 
 
 def _settings(bandwidth: str | float | None, band: str | None, period: str | float | None) -> AnalysisSettings:

@@ -72,13 +72,20 @@ class LogsAnswer(Answer):
         return logs_files(self.result) if self.result else {}
 
 
-def options_of(map: Changes, unit: Changes, scale: Changes, dt: str | float | None, kind: str | None = None) -> Any:
+def options_of(
+    map: Changes,
+    unit: Changes,
+    scale: Changes,
+    dt: str | float | None,
+    kind: str | None = None,
+    axis: str | None = None,
+) -> Any:
     """What is said of channels, from dictionaries or texts. Raises LogError."""
     texts = [
         [f"{key}={text}" for key, text in item.items()] if hasattr(item, "items") else item or ()
         for item in (map, unit, scale)
     ]  # type: ignore[union-attr]
-    return from_options(*texts, dt if dt is None or isinstance(dt, str) else f"{dt!r} s", kind)
+    return from_options(*texts, dt if dt is None or isinstance(dt, str) else f"{dt!r} s", kind, axis)
 
 
 def paths_of(logs: LogFiles) -> list[Path]:
@@ -94,6 +101,7 @@ def logs(
     unit: Changes = None,
     scale: Changes = None,
     dt: str | float | None = None,
+    axis: str | None = None,
     folder: Path | None = None,
     partly: bool = False,
     progress: Progress = silent,
@@ -112,6 +120,8 @@ def logs(
         Roles and their scales: ``{"force": "35.15 N/V"}``.
     dt : str or float, optional
         Sample time, "1 ms" or a number [s], if a file does not contain it.
+    axis : str, optional
+        "rotary" for angles, torques and moments of inertia.
     folder : Path, optional
         Where what was said of channels is kept, if not beside the logs.
     partly : bool
@@ -134,7 +144,7 @@ def logs(
     >>> import friso
     >>> friso.logs("log.csv", map={"position": "ActPos"})  # doctest: +SKIP
     """
-    options, files = options_of(map, unit, scale, dt), paths_of(logs)
+    options, files = options_of(map, unit, scale, dt, axis=axis), paths_of(logs)
     contents: list[LogContent] = []
     wrong: list[InputError] = []
     for number, path in enumerate(files):

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.identification.combine import combined, correlations
 from friso.identification.estimate import Estimate
@@ -100,6 +101,19 @@ def identify(
         failed,
         origins(fitted, fits.estimates, fits.follows, base is not None),
     )
+
+
+def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
+    """The kind of axis of logs and of what is known of the machine. Raises InputError where they differ."""
+    kinds = {source.name: source.axis for source in sources if isinstance(source, Log)}
+    if base is not None:
+        kinds = {base.name: base.axis_kind, **kinds}
+    first = next(iter(kinds.values()), LINEAR)
+    for name, kind in kinds.items():
+        if kind != first:
+            actual = f"a {kind.name} axis, beside a {first.name} one"
+            raise InputError("--axis", actual, "one kind of axis throughout", f"--axis {first.name}", name)
+    return first
 
 
 def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log], base: Stage | None) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.axis import LINEAR
 from friso.equations.controllers.van_dijk import table
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import SMOOTH, InverseModel, motion
@@ -15,7 +16,8 @@ from friso.identification.logs.log import Log
 from friso.stage import Stage
 
 BENDING, STRIBECK_VELOCITY = 5e-6, 1e-3
-"""Length [m] by which bristles bend and Stribeck velocity [m/s] of a stage made up around a log: our choice."""
+"""Length [m] (or angle [rad]) by which bristles bend and Stribeck velocity [m/s] of a stage made up around a log: our
+choice."""
 
 DIGITS = 2
 """Significant digits of an uncertainty, and so of its value."""
@@ -31,39 +33,42 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
     mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
     viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / BENDING
     parts = [motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth) for part in log.segments]
+    axis = log.axis
     top = max(float(np.abs(part.velocity).max()) for part in parts)
     brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
     time = max(top / brisk, log.sample_time)
     back = max(2.0, 3 * time)
     tables: dict[str, Any] = {
-        "masses": {"cart": f"{mass:.6g} kg"},
+        "masses": {"cart": f"{mass:.6g} {axis.mass}"},
         "friction": {
             "model": "lugre",
-            "static": f"{coulomb:.6g} N",
-            "coulomb": f"{coulomb:.6g} N",
-            "stribeck_velocity": f"{STRIBECK_VELOCITY:g} m/s",
+            "static": f"{coulomb:.6g} {axis.force}",
+            "coulomb": f"{coulomb:.6g} {axis.force}",
+            "stribeck_velocity": f"{STRIBECK_VELOCITY:g} {axis.length}/s",
             "stribeck_exponent": 2,
-            "bristle_stiffness": f"{stiffness:.6g} N/m",
-            "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} N*s/m",
-            "viscous": f"{viscous:.6g} N*s/m",
+            "bristle_stiffness": f"{stiffness:.6g} {axis.unit('N/m')}",
+            "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} {axis.unit('N*s/m')}",
+            "viscous": f"{viscous:.6g} {axis.unit('N*s/m')}",
         },
         "controller": table("10 Hz"),
         "motion": {
             "kind": "there_and_back",
-            "acceleration": f"{brisk:.4g} m/s^2",
+            "acceleration": f"{brisk:.4g} {axis.length}/s^2",
             "acceleration_time": f"{time:.4g} s",
             "return_at": f"{back:.4g} s",
             "duration": f"{2.5 * back:.4g} s",
         },
     }
+    if axis != LINEAR:
+        tables["axis"] = {"kind": axis.name}
     return Stage(name=log.name, source=OUR_CHOICE, **tables)
 
 
 def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
     """The stage with the estimates of its keys, as values with 95 % intervals or as ranges.
 
-    A stiffness that follows from a [flexure] stays as it follows. Raises InputError where they do not fit together,
-    which those of `fitting` do.
+    Their units are those of the stage's kind of axis. A stiffness that follows from a [flexure] stays as it follows.
+    Raises InputError where they do not fit together, which those of `fitting` do.
     """
     changes: dict[str, object] = {}
     for estimate in estimates:

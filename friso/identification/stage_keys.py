@@ -37,8 +37,9 @@ class Fitting:
 
 
 def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
-    """What of the estimates, one per key, the stage file can take."""
+    """What of the estimates, one per key, the stage file can take: in the units of its kind of axis."""
     flat, notes = stage.flat(), []
+    estimates = [replace(estimate, unit=stage.axis_kind.unit(estimate.unit)) for estimate in estimates]
     fields = numeric_keys({**flat, "bias.cart": 0.0})
     accepted: dict[str, Estimate] = {}
     for estimate in estimates:

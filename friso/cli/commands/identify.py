@@ -14,7 +14,7 @@ from friso.axis import speak_of
 from friso.cli.asking import Details, named_as_options, show
 from friso.cli.command import MACHINE, Choices, Command
 from friso.cli.common import AsJson, Overrides
-from friso.cli.log_options import Logs, Maps, SampleTime, Scales, Units
+from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import DefaultFolder, Overwrite
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
@@ -47,6 +47,7 @@ def identify(
     units: Units = None,
     scales: Scales = None,
     dt: SampleTime = None,
+    axis: AxisOption = None,
     predict: Annotated[
         list[Path] | None,
         typer.Option("--predict", metavar="LOG", help="Another log, simulated with the identified stage."),
@@ -79,7 +80,7 @@ def identify(
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
     options = {"stage": stage, "set": overrides, "as_": kind, "map": maps, "unit": units, "scale": scales, "dt": dt}
-    options |= {"predict": predict or [], "bandwidth": bandwidth, "band": band, "period": period}
+    options |= {"axis": axis, "predict": predict or [], "bandwidth": bandwidth, "band": band, "period": period}
     with ProgressBar(lines=PIPED) as progress, named_as_options(options):
         try:
             answer = question(

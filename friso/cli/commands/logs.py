@@ -7,7 +7,7 @@ from pathlib import Path
 from friso.cli.asking import named_as_options, show
 from friso.cli.command import MACHINE, Command
 from friso.cli.common import AsJson
-from friso.cli.log_options import Logs, Maps, SampleTime, Scales, Units
+from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import OutFolder, Overwrite
 from friso.cli.progress import ProgressBar
 
@@ -18,6 +18,7 @@ def logs(
     units: Units = None,
     scales: Scales = None,
     dt: SampleTime = None,
+    axis: AxisOption = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -31,7 +32,7 @@ def logs(
     from friso.answers.output_folder import output_folder
 
     target = output_folder("logs", out, overwrite, logs)
-    options = {"map": maps, "unit": units, "scale": scales, "dt": dt}
+    options = {"map": maps, "unit": units, "scale": scales, "dt": dt, "axis": axis}
     files: list[Path] = []
     with ProgressBar("reading") as progress, named_as_options(options):
         answer = question(logs, **options, folder=out, partly=True, progress=progress)

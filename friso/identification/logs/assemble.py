@@ -67,7 +67,7 @@ def read_log(
     notes.read.append(_spans(base))
     return Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
-        tuple(notes.read), tuple(notes.warnings), dict(mapping.setup),
+        tuple(notes.read), tuple(notes.warnings), dict(mapping.setup), mapping.axis_kind,
     )  # fmt: skip
 
 

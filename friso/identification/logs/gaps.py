@@ -6,13 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from friso.axis import FORCE, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import option
 from friso.identification.logs.roles import AssignedRole, Proposal, listing, role_of, words
-from friso.identification.logs.signals import Notes, Reading, instants, no_time, unit_gap
-from friso.identification.logs.units import OTHERS, factor
+from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
+from friso.identification.logs.units import OTHERS, factor, in_si
 from friso.quantities import quoted
 
 OPTIONAL = ("velocity", "acceleration")
@@ -73,10 +74,23 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
     reference = proposal.chosen.get("reference")
     if units.get("position") and reference is not None and not reference.channel.unit and "reference" not in units:
         units["reference"] = unit_gap(reference, reading)
-    gaps += [gap for gap in units.values() if gap is not None]
+    gaps += _of_units(units, chosen)
     if gaps:
         proposed = {role: choice.channel.name for role, choice in chosen.items() if role not in proposal.chosen}
         raise GapsError(gaps, proposed)
+
+
+def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, AssignedRole]) -> list[LogError]:
+    """The gaps of units by role; where an axis turns, a torque needs no scale to newtons."""
+    gaps = {role: gap for role, gap in units.items() if gap is not None}
+    if any(gap.example == TURNS for gap in gaps.values()):
+        turned = ROTARY.unit(FORCE)
+        gaps = {
+            role: gap
+            for role, gap in gaps.items()
+            if role not in chosen or in_si(chosen[role].channel.unit, turned)[1] != turned
+        }
+    return list(gaps.values())
 
 
 def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Channel | None:
@@ -96,7 +110,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool]:
     """How well a channel fits a role: whether it changes, its unit, its first letter."""
     finite = channel.values[np.isfinite(channel.values)]
     changes = bool(finite.size and np.ptp(finite) > 0)
-    kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))
+    kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))  # those of a rotary axis among them
     unit = 1 if not channel.unit else 2 if any(factor(channel.unit, kind) is not None for kind in kinds) else 0
     first = next(iter(words(channel.name)), " ")[0]
     return changes, unit, first in _INITIALS.get(role, "")

@@ -15,7 +15,8 @@ SAME = 1e-3
 def joinable(one: Log, other: Log) -> bool:
     """Whether two logs have the same roles in the same units, sample time and set-up."""
     same = one.signals.keys() == other.signals.keys() and dict(one.units) == dict(other.units)
-    return same and dict(one.setup) == dict(other.setup) and abs(one.sample_time / other.sample_time - 1) <= SAME
+    same = same and dict(one.setup) == dict(other.setup) and one.axis == other.axis
+    return same and abs(one.sample_time / other.sample_time - 1) <= SAME
 
 
 def joined(logs: Sequence[Log]) -> Log:
@@ -38,6 +39,7 @@ def joined(logs: Sequence[Log]) -> Log:
         tuple(dict.fromkeys(line for log in logs for line in log.read)),
         tuple(dict.fromkeys(line for log in logs for line in log.warnings)),
         first.setup,
+        first.axis,
     )
 
 

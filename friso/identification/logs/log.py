@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from friso.axis import LINEAR, AxisKind
+
 ROLES: Mapping[str, str] = {
     "reference": "m",
     "position": "m",
@@ -17,15 +19,17 @@ ROLES: Mapping[str, str] = {
     "cart_position": "m",
     "relative_position": "m",
 }
-"""Roles a channel can have, and the SI unit of each. `position` and `velocity` are the stage's (the body that is
-controlled), `cart_position` the other's; `relative_position` is position minus cart position; `force` is the
-actuator's, from a current or a voltage by a scale, with any `disturbance` that is added to the controller's output
+"""Roles a channel can have, and the SI unit of each on a linear axis. `position` and `velocity` are the stage's (the
+body that is controlled), `cart_position` the other's; `relative_position` is position minus cart position; `force` is
+the actuator's, from a current or a voltage by a scale, with any `disturbance` that is added to the controller's output
 contained in it."""
 
 
 @dataclass(frozen=True)
 class Log:
     """Signals by role (see `ROLES`), all of shape (n,), SI, at `time` [s], shape (n,).
+
+    On a rotary `axis` angles stand for lengths and torques for forces, under the units of a linear axis.
 
     Samples are `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds, for
     a role whose channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle
@@ -44,6 +48,7 @@ class Log:
     read: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     setup: Mapping[str, str] = field(default_factory=dict)
+    axis: AxisKind = LINEAR
 
     def __contains__(self, role: str) -> bool:
         return role in self.signals
@@ -57,5 +62,5 @@ class Log:
         return max(self.segments, key=lambda part: part.stop - part.start)
 
     def unit(self, role: str) -> str:
-        """The unit in which a role stands."""
+        """The unit in which a role stands, that of a linear axis where it is the role's."""
         return self.units.get(role, ROLES[role])

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.quantities import Bound, Quantity, as_toml, quoted
@@ -28,15 +29,21 @@ _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 @dataclass(frozen=True)
 class Mapping:
     """Roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time [s]
-    where the file states none, and the kind of experiment where the user named it; and how the stage was set up for
-    this log, otherwise than in its file ({dotted key: "8 mm"})."""
+    where the file states none, the kind of experiment and of axis where the user named them; and how the stage was set
+    up for this log, otherwise than in its file ({dotted key: "8 mm"})."""
 
     roles: Table[str, str] = field(default_factory=dict)
     units: Table[str, str] = field(default_factory=dict)
     scales: Table[str, str] = field(default_factory=dict)
     sample_time: float | None = None
     experiment: str | None = None
+    axis: str | None = None
     setup: Table[str, str] = field(default_factory=dict)
+
+    @property
+    def axis_kind(self) -> AxisKind:
+        """Linear unless the user said otherwise."""
+        return LINEAR if self.axis is None else KINDS[self.axis]
 
     def over(self, older: Mapping) -> Mapping:
         """This mapping, and what an older one says where this one is silent."""
@@ -46,6 +53,7 @@ class Mapping:
             {**older.scales, **self.scales},
             older.sample_time if self.sample_time is None else self.sample_time,
             older.experiment if self.experiment is None else self.experiment,
+            older.axis if self.axis is None else self.axis,
             {**older.setup, **self.setup},
         )
 
@@ -56,9 +64,10 @@ def from_options(
     scales: Iterable[str] = (),
     dt: str | None = None,
     experiment: str | None = None,
+    axis: str | None = None,
 ) -> Mapping:
-    """From the texts of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`.
-    Raises LogError."""
+    """From the texts of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`,
+    `--axis rotary`. Raises LogError."""
     roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
     channel_units = dict(_pair(text, "--unit", 'Axis1.ActPos="mm"', last=True) for text in units)
     factors = dict(_pair(text, "--scale", 'force="35.1507 N/V"', tuple(ROLES)) for text in scales)
@@ -66,7 +75,9 @@ def from_options(
         sample_time = None if dt is None else float(_SAMPLE_TIME.read(dt))
     except InputError as error:
         raise error.found_in("--dt") from None
-    return Mapping(roles, channel_units, factors, sample_time, experiment)
+    if axis is not None and axis not in KINDS:
+        raise LogError("--axis", quoted(axis), f"one of {', '.join(KINDS)}", f"--axis {ROTARY.name}")
+    return Mapping(roles, channel_units, factors, sample_time, experiment, axis)
 
 
 def _pair(
@@ -104,6 +115,8 @@ def mapping_text(mapping: Mapping) -> str:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
     if mapping.experiment is not None:
         lines.append(f"experiment = {as_toml(mapping.experiment)}")
+    if mapping.axis is not None:
+        lines.append(f"axis = {as_toml(mapping.axis)}")
     for name in TABLES:
         table = getattr(mapping, name)
         rows = [f"{as_toml(key)} = {as_toml(value)}" for key, value in table.items()]
@@ -137,16 +150,18 @@ def _parsed(place: Path) -> Mapping:
         document = parsed(text_of(place, _KEPT), _KEPT)
     except InputError as error:
         raise LogError("", error.actual, _KEPT, "", str(place)) from None
-    experiment = document.get("experiment")
-    if not isinstance(experiment, str | None):
-        raise LogError("experiment", quoted(experiment), "the name of a kind of experiment", "", str(place))
+    for key, expected in (("experiment", "the name of a kind of experiment"), ("axis", f"one of {', '.join(KINDS)}")):
+        if not isinstance(document.get(key), str | None):
+            raise LogError(key, quoted(document[key]), expected, "", str(place))
     names = {entry.name for entry in fields(Mapping)}
     for key, value in document.items():
         if key not in names or (key in TABLES) != isinstance(value, dict):
-            raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
+            raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time, axis", "", str(place))
     texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:
-        options = from_options(dt=document.get("sample_time"), experiment=experiment)
+        options = from_options(
+            dt=document.get("sample_time"), experiment=document.get("experiment"), axis=document.get("axis")
+        )
         for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
             for key in texts[group]:
                 if key not in allowed:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from friso.axis import LENGTH, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.checks import unwrapped
@@ -18,6 +19,9 @@ from friso.identification.logs.roles import AssignedRole, find
 from friso.identification.logs.text import with_times
 from friso.identification.logs.units import FOREIGN, factor, in_si, is_unit, read_scale
 from friso.quantities import quoted
+
+TURNS = f"--axis {ROTARY.name}"
+"""The option that tells a rotary axis."""
 
 LARGEST = 1e30
 """No instrument measures more in any unit; beyond it, squares of squares overflow."""
@@ -45,9 +49,13 @@ class Reading:
     origin: str
     foreign: tuple[str, ...] = ()
 
+    def unit(self, role: str) -> str:
+        """The SI unit of a role on the axis that was logged."""
+        return self.mapping.axis_kind.unit(ROLES[role])
+
     def takes(self, role: str, si: str) -> bool:
         """Whether a signal of a role may stand in a unit that is not the role's."""
-        return si == ROLES[role] or not self.strict or (role in self.foreign and si in FOREIGN)
+        return si == self.unit(role) or not self.strict or (role in self.foreign and si in FOREIGN)
 
 
 def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
@@ -78,17 +86,17 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     scale = reading.mapping.scales.get(role)
     unit = channel.unit
     if scale is not None:
-        value, implied = _scaled(role, scale, unit, reading.origin)
+        value, implied = _scaled(role, scale, unit, reading)
         line = f"{scale}" + ("" if unit else f", its values taken to be in {implied} as the scale implies")
     elif _taken_as_si(choice, reading):
-        value, line = 1.0, f"no unit in the file: assumed to be in {ROLES[role]}"
+        value, line = 1.0, f"no unit in the file: assumed to be in {reading.unit(role)}"
         notes.warnings.append(
-            f"{role}: {channel.name} has no unit (this format has none): assumed to be in {ROLES[role]}"
+            f"{role}: {channel.name} has no unit (this format has none): assumed to be in {reading.unit(role)}"
         )
     else:
-        value, si = in_si(unit, ROLES[role])
+        value, si = in_si(unit, reading.unit(role))
         line = f"in {unit}" if unit else "without a unit"
-        if si != ROLES[role]:
+        if si != reading.unit(role):
             if not reading.takes(role, si):
                 raise _wrong_unit(choice, unit, si, reading)
             notes.units[role] = si
@@ -97,25 +105,25 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     if most > LARGEST:
-        actual = f"values up to {most:.3g} {notes.units.get(role, ROLES[role])}"
+        actual = f"values up to {most:.3g} {notes.units.get(role, reading.unit(role))}"
         raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values
 
 
-def _scaled(role: str, scale: str, unit: str, origin: str) -> tuple[float, str]:
+def _scaled(role: str, scale: str, unit: str, reading: Reading) -> tuple[float, str]:
     try:
-        return read_scale(role, scale, unit)
+        return read_scale(role, scale, unit, reading.mapping.axis_kind)
     except InputError as error:
-        raise error.found_in(origin) from None
+        raise error.found_in(reading.origin) from None
 
 
 def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
     """What has to be told of the unit of a channel before it has that of its role; None for nothing. Raises LogError
     for a scale that does not fit."""
-    si = in_si(choice.channel.unit, ROLES[choice.role])[1]
+    si = in_si(choice.channel.unit, reading.unit(choice.role))[1]
     scale = reading.mapping.scales.get(choice.role)
     if scale is not None:
-        _scaled(choice.role, scale, choice.channel.unit, reading.origin)
+        _scaled(choice.role, scale, choice.channel.unit, reading)
     if scale is not None or reading.takes(choice.role, si) or _taken_as_si(choice, reading):
         return None
     return _wrong_unit(choice, choice.channel.unit, si, reading)
@@ -128,18 +136,20 @@ def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
 
 def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> LogError:
     """The error for a channel whose unit is none of the role's kind, or that has none."""
-    role, name = choice.role, choice.channel.name
+    role, name, wanted = choice.role, choice.channel.name, reading.unit(choice.role)
     if not unit:
-        usual = _likely_length(choice.channel) if ROLES[role] == "m" else ROLES[role]
+        usual = _likely_length(choice.channel) if wanted == LENGTH else wanted
         actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
-        expected = f"a unit convertible to {ROLES[role]}"
+        expected = f"a unit convertible to {wanted}"
         if role == "force":
-            expected += f", or a scale such as {option('--scale', role, '35 N/V')}"
+            expected += f", or a scale such as {option('--scale', role, f'35 {wanted}/V')}"
         return LogError(role, actual, expected, option("--unit", name, usual), reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "1.5"
-    scale = f"{ROLES[role]}/{si}"
-    expected = f'a scale to {ROLES[role]}, such as --scale {role}="{number} {scale}"'
+    scale = f"{wanted}/{si}"
+    expected = f'a scale to {wanted}, such as --scale {role}="{number} {scale}"'
     example = f'--scale {role}="NUMBER {scale}"'  # nobody should copy one that is made up
+    if si == ROTARY.unit(wanted) and LENGTH in ROLES[role]:
+        expected, example = f"{expected}; or {TURNS} for an axis that turns", TURNS
     return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
 
 

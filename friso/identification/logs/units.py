@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
+from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.quantities import Quantity, any_sign, quoted
@@ -16,8 +17,13 @@ OTHERS = {
     "m/s": ("rad/s",),
     "m/s^2": ("rad/s^2",),
     "N": ("A", "V", "N*m"),
+    "rad": ("m",),
+    "rad/s": ("m/s",),
+    "rad/s^2": ("m/s^2",),
+    "N*m": ("A", "V", "N"),
 }
-"""What may stand in place of the SI unit of a role where the caller allows it: turned into these units."""
+"""What may stand in place of the SI unit of a role, on a linear or a rotary axis, where the caller allows it: turned
+into these units."""
 FOREIGN = (*OTHERS["N"], "count")
 """Units in which a force may stand where estimates per such a unit are an answer."""
 _SPELLINGS = {
@@ -143,11 +149,13 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
     return 1.0, "count" if text.lower() in COUNTS else text or "1"
 
 
-def read_scale(role: str, text: str, channel_unit: str) -> tuple[float, str]:
-    """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role; and what was
-    taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises LogError."""
+def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR) -> tuple[float, str]:
+    """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role on that axis; and
+    what was taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises
+    LogError."""
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*([^/]+)\s*", text)
-    role_unit, example = ROLES[role], f'--scale {role}="35.1507 {ROLES[role]}/V"'
+    role_unit = axis.unit(ROLES[role])
+    example = f'--scale {role}="35.1507 {role_unit}/V"'
     if match is None:
         raise LogError("scale", quoted(text), f"number and unit, {role_unit} over the unit of the channel", example)
     below = spelled(match[3].strip("() "))

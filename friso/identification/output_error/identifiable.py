@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
-from friso.identification.output_error.parameters import LONGEST, MASS, RATIO, SHARE
+from friso.identification.output_error.parameters import MASS, RATIO, SHARE, bends
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import Profile, profile
 from friso.identification.readings.common import low_pass
@@ -156,7 +156,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     if name in STRIBECK:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
-        return covered.shows_length(min(LONGEST, float(np.ptp(problem.inputs.reference))))
+        return covered.shows_length(min(bends(problem.flat)[1], float(np.ptp(problem.inputs.reference))))
     return parameter.unit != "" or name == SHARE
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.axis import LINEAR, axis_of
 from friso.errors import InputError
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
@@ -21,6 +22,9 @@ FITTED = ("lugre", "dahl", "stribeck", "elasto_plastic", "rolling")
 
 SHORTEST, LONGEST = 5e-8, 3e-4
 """Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
+
+RADII = 5e-3, 0.5
+"""Radii [m] between which bearings that turn are believed to be: their bristles bend by an angle [rad]."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,14 @@ class FitParameter:
     def outer(self, inner: Any) -> Any:
         """The SI value."""
         return np.exp(inner) if self.logarithmic else inner
+
+
+def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
+    """Lengths [m], or angles [rad] on a rotary axis, by which bristles bend at least and at most before they slip."""
+    if axis_of(flat) == LINEAR:
+        return SHORTEST, LONGEST
+    smallest, largest = RADII
+    return SHORTEST / largest, LONGEST / smallest
 
 
 def is_free(flat: Mapping[str, Any]) -> bool:
@@ -99,7 +111,8 @@ def _friction(
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, speed),
         ]
     if "friction.bristle_stiffness" in flat:
-        softest, stiffest = coulomb / min(LONGEST, travel / 10), coulomb / SHORTEST
+        shortest, longest = bends(flat)
+        softest, stiffest = coulomb / min(longest, travel / 10), coulomb / shortest
         parameters.append(_slow("friction.bristle_stiffness", "N/m", flat, softest, stiffest))
     if "friction.bristle_damping" in flat:
         critical = 2 * np.sqrt(flat["friction.bristle_stiffness"] * levels["mass"])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from friso.axis import axis_shown, unit_shown
 from friso.identification.kind import Source
 from friso.identification.logs.log import Log
 from friso.identification.method import Experiment, Identification, Prediction
@@ -30,8 +31,8 @@ def identify_document(
             for prediction in predictions
         ],
         "failed": identification.failed,
-        "doubts": list(identification.doubts),
-        "warnings": list(identification.warnings),
+        "doubts": [axis_shown().text(doubt) for doubt in identification.doubts],
+        "warnings": [axis_shown().text(warning) for warning in identification.warnings],
     }
     return plain_json(document)
 
@@ -52,7 +53,7 @@ def _content(source: Source) -> dict[str, Any]:
     if not isinstance(source, Log):
         return {"roles": {}, "lines": len(source.frequency), "unit": source.unit, "warnings": []}
     return {
-        "roles": {role: source.unit(role) for role in source.signals},
+        "roles": {role: unit_shown(source.unit(role)) for role in source.signals},
         "samples": len(source.time),
         "sample_time_s": source.sample_time,
         "segments": len(source.segments),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from friso.axis import axis_shown, unit_shown
 from friso.identification.estimate import Estimate
 from friso.identification.stage_file import written
 
@@ -16,11 +18,11 @@ def ends_document(estimate: Estimate) -> dict[str, Any]:
 
 def estimate_document(estimate: Estimate) -> dict[str, Any]:
     about = {
-        "unit": estimate.unit,
+        "unit": unit_shown(estimate.unit),
         **ends_document(estimate),
         "shown": estimate.determined,
-        "method": estimate.method,
-        "reason": estimate.reason or None,
+        "method": axis_shown().text(estimate.method),
+        "reason": axis_shown().text(estimate.reason) or None,
     }
     return {"name": estimate.name, **about}
 
@@ -28,7 +30,6 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
 def key_document(estimate: Estimate) -> dict[str, Any]:
     """An estimate of a key of the stage file, with the text that stands there."""
     document = estimate_document(estimate)
-    text = (
-        written(estimate) if np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low else None
-    )
+    stands = np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low
+    text = written(replace(estimate, unit=unit_shown(estimate.unit))) if stands else None
     return {"key": document.pop("name"), **document, "written": text}

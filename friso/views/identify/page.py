@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from friso.axis import axis_shown
 from friso.identification.method import Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import with_origins
@@ -63,6 +64,6 @@ def identify_html(
         files=read_rows(files),
         parts=summaries(identification),
         predicted=[prediction_line(prediction) for prediction in predictions],
-        warnings=identification.warnings,
+        warnings=[axis_shown().text(warning) for warning in identification.warnings],
         opening=opening,
     ).html()

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from friso.axis import axis_shown, unit_shown
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
@@ -29,7 +30,7 @@ NO_STAGE = (
     "identified values replace those in it."
 )
 
-NO_NEWTONS = "No stage file is written: its keys are in newtons."
+NO_NEWTONS = "No stage file is written: its keys need the force in {}."
 """Where the force of the only moves is in another unit."""
 
 NOTHING_HOLDS = "No stage file is written, since nothing in it would be identified."
@@ -60,6 +61,10 @@ class EstimateRow:
 
 def headline(identification: Identification) -> list[tuple[str, str]]:
     """What is identified, and what is not and why; each sentence with its colour."""
+    return [(colour, axis_shown().text(sentence)) for colour, sentence in _headline(identification)]
+
+
+def _headline(identification: Identification) -> list[tuple[str, str]]:
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
     effects = [estimate for estimate in visible if not _absent(estimate)]
@@ -89,7 +94,7 @@ def _why_no_stage(identification: Identification) -> str:
         return NOTHING_HOLDS
     logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
     around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
-    return NO_NEWTONS if around and any("force" in log.units for log in logs) else NO_STAGE
+    return NO_NEWTONS.format(unit_shown("N")) if around and any("force" in log.units for log in logs) else NO_STAGE
 
 
 ABSENT = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
@@ -164,10 +169,8 @@ def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
 
 def _row(estimate: Estimate) -> EstimateRow:
     value = value_text(estimate) if estimate.determined else LEFT
-    return EstimateRow(
-        estimate.determined,
-        (name_of(estimate.name), value, interval_text(estimate), estimate.reason or estimate.method),
-    )
+    why = axis_shown().text(estimate.reason or estimate.method)
+    return EstimateRow(estimate.determined, (name_of(estimate.name), value, interval_text(estimate), why))
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
@@ -177,13 +180,14 @@ def summaries(identification: Identification) -> list[ExperimentSummary]:
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
-    view, result = view_of(experiment.kind), experiment.result
+    view, result, axis = view_of(experiment.kind), experiment.result, axis_shown()
+    facts = tuple((name, axis.text(fact)) for name, fact in view.facts(result))
     return ExperimentSummary(
         label,
         f"{view.title}: {', '.join(log.name for log in experiment.logs)}",
-        view.sentences(result),
-        (*view.facts(result), *(_used(experiment.logs) if view.longest else ())),
-        view.warnings(result),
+        tuple(map(axis.text, view.sentences(result))),
+        (*facts, *(_used(experiment.logs) if view.longest else ())),
+        tuple(map(axis.text, view.warnings(result))),
     )
 
 
@@ -228,7 +232,7 @@ def sentences(identification: Identification, predictions: Sequence[Prediction])
     """The answer, how well other logs are predicted, and notes."""
     lines = [sentence for _, sentence in headline(identification)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
-    return lines + [f"note: {warning}" for warning in identification.warnings]
+    return lines + [f"note: {axis_shown().text(warning)}" for warning in identification.warnings]
 
 
 def details(identification: Identification, files: Sequence[LogFile]) -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from friso.axis import unit_shown
+from friso.axis import LINEAR, unit_shown
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog
@@ -24,7 +24,9 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
     csv = partial(write_csv, interval=log.interval)
     files: dict[str, Content] = {name: partial(csv, signals=log.logged, heading=heading)}
     if log.kind is not None:
-        files[sidecar(Path(name)).name] = mapping_text(Mapping(experiment=log.kind, setup=_setup(log.stage, stage)))
+        axis = None if stage.axis_kind == LINEAR else stage.axis_kind.name
+        mapping = Mapping(experiment=log.kind, axis=axis, setup=_setup(log.stage, stage))
+        files[sidecar(Path(name)).name] = mapping_text(mapping)
     files[f"truth/{name}"] = partial(csv, signals=log.true, heading=f"{heading}: the truth behind {name}")
     files[f"truth/{log.name}.toml"] = stage_text(log.stage, log.seed)
     return files

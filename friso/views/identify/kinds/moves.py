@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from friso.axis import axis_shown, unit_shown
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
@@ -73,7 +74,7 @@ def _inverse_text(model: InverseModel) -> str:
 def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
     low, high = moves.covered.gap
     parameters = {
-        parameter.name: {"unit": parameter.unit, "value": moves.fit.value(parameter.name)}
+        parameter.name: {"unit": unit_shown(parameter.unit), "value": moves.fit.value(parameter.name)}
         for parameter in moves.fit.problem.parameters
     }
     fitted = [moves.fit.problem.parameters[number].name for number in moves.fit.free]
@@ -90,7 +91,9 @@ def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
             "profiles": {name: _profile_numbers(profile) for name, profile in moves.profiles.items()},
         },
         "not_shown": [
-            {"key": estimate.name, "reason": estimate.reason} for estimate in moves.estimates if not estimate.determined
+            {"key": estimate.name, "reason": axis_shown().text(estimate.reason)}
+            for estimate in moves.estimates
+            if not estimate.determined
         ],
         "no_steady_motion_m_per_s": [low, high],
         "samples_used": moves.part.stop - moves.part.start,
@@ -133,8 +136,8 @@ def _headline(moves: IdentifiedMoves) -> str:
         return ""
     values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in moves.correlated)
     return (
-        f"Identified, the force being in {moves.force_unit}: {values}. What needs newtons, such as a stage file, needs "
-        f'--scale force="NUMBER N/{moves.force_unit}".'
+        f"Identified, the force being in {moves.force_unit}: {values}. A stage file needs "
+        f'--scale force="NUMBER {unit_shown("N")}/{moves.force_unit}".'
     )
 
 

@@ -1,0 +1,101 @@
+"""Logs of an axis that turns: the numbers of a linear one in SI, in kg m^2, N m and rad, told once."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from inside import friso_inside
+from refusals import Refused
+from test_identify_experiments import LUGRE, ramps
+from test_identify_records import axis, csv
+from test_rotary_axis import LENGTHS, texts
+
+import friso
+from friso.axis import LINEAR, ROTARY
+from friso.identification.inverse_model import inverse_model
+from friso.identification.logs.assemble import read_log
+from friso.identification.logs.gaps import GapsError
+from friso.identification.logs.mapping import Mapping, load, mapping_text, sidecar
+from friso.identification.method import axis_of_all
+from friso.identification.output_error.parameters import LONGEST, SHORTEST, bends
+from friso.identification.stage_file import made_up
+
+TURNING = Mapping(axis="rotary")
+
+
+@pytest.fixture(scope="module")
+def break_away(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Ramps of a torque, the same numbers as of a linear axis whose static friction is known."""
+    log, folder = ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3)), tmp_path_factory.mktemp("turning")
+    step = log.sample_time
+    time = np.concatenate([np.arange(part.stop - part.start) * step + 100 * i for i, part in enumerate(log.segments)])
+    csv(folder / "linear.csv", "time [s],position [m],force [N]", time, log["position"], log["force"])
+    csv(
+        folder / "turned.csv",
+        "time [s],angle [deg],torque [mN*m]",
+        time,
+        np.rad2deg(log["position"]),
+        1e3 * log["force"],
+    )
+    return folder
+
+
+def test_angles_and_torques_are_in_si_under_the_units_of_a_linear_axis(break_away: Path) -> None:
+    linear, turned = read_log(break_away / "linear.csv"), read_log(break_away / "turned.csv", TURNING)
+    assert (linear.axis, turned.axis) == (LINEAR, ROTARY)
+    for role in ("position", "force"):
+        assert turned[role] == pytest.approx(linear[role], rel=1e-7, abs=1e-15)
+        assert turned.unit(role) == linear.unit(role)
+
+
+def test_a_log_of_angles_asks_for_the_kind_of_axis_alone(break_away: Path) -> None:
+    with pytest.raises(GapsError) as open_questions:
+        read_log(break_away / "turned.csv", needed=("position", "force"))
+    assert open_questions.value.options == ("--axis rotary",)
+
+
+def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -> None:
+    """Static friction, in every number as that of the linear axis; the option is kept beside the log."""
+    told = friso_inside(break_away, "identify", "turned.csv", "--as", "break-away", "--axis", "rotary", "--out", "a")
+    again, linear = (
+        friso_inside(break_away, "identify", f"{name}.csv", "--as", "break-away", "--out", name, "--json")
+        for name in ("turned", "linear")
+    )
+    assert (told.returncode, again.returncode, linear.returncode) == (0, 0, 0), told.stderr + again.stderr
+    assert load(break_away / "turned.csv") == Mapping(experiment="break-away", axis="rotary")
+    assert not LENGTHS.search(told.stdout)
+    (turned_static,), (static,) = (json.loads(answer.stdout)["estimates"] for answer in (again, linear))
+    assert turned_static["unit"] == "N*m"
+    assert turned_static["written"].count("N*m") == 2
+    assert turned_static["value"] == pytest.approx(static["value"], rel=1e-6)
+    assert not LENGTHS.search(" ".join(texts(json.loads(again.stdout))))
+
+
+def test_a_stage_around_a_rotary_log_is_one_of_a_rotary_axis() -> None:
+    log = axis()
+    linear, turned = (made_up(one, inverse_model(one, 5.0)) for one in (log, replace(log, axis=ROTARY)))
+    assert turned.axis_kind == ROTARY
+    assert {key: value for key, value in turned.flat().items() if key != "axis.kind"} == linear.flat()
+    assert bends(linear.flat()) == (SHORTEST, LONGEST)
+    assert bends(turned.flat())[1] > LONGEST
+
+
+def test_logs_and_stage_are_of_one_kind_of_axis(refused: Refused) -> None:
+    log = axis()
+    assert axis_of_all([replace(log, axis=ROTARY)], None) == ROTARY
+    with refused("--axis"):
+        axis_of_all([log, replace(log, name="other", axis=ROTARY)], None)
+    with refused("--axis"):
+        axis_of_all([replace(log, axis=ROTARY)], friso.load("examples/emps_axis.toml"))
+
+
+def test_a_kind_of_axis_that_is_none_is_refused(tmp_path: Path, refused: Refused) -> None:
+    log = tmp_path / "log.csv"
+    sidecar(log).write_text(mapping_text(Mapping(axis="round")))
+    with refused("--axis"), pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path)
+        load(Path("log.csv"))
