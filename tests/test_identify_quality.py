@@ -215,10 +215,86 @@ def test_an_interval_spans_what_the_log_says_with_and_without_a_delay() -> None:
     off = Estimate.normal("masses.cart", "kg", inverse.value("mass"), 0.01, "output error")
     quality = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
     (blind,) = all_with_model_error([off], inverse, flat, quality)
-    (fair,) = with_causes([blind], flat, replace(quality, without_cause=cause.without))
+    assert cause.without is not None
+    spoilt = replace(quality, without=(cause.without,), spoilt=True)
+    slow = Estimate.normal("friction.static", "N", 9.0, 0.1, "output error")
+    (fair, static), correlation = with_causes([blind, slow], np.eye(2), inverse, flat, spoilt)
+    assert correlation.shape == (1, 1)
+    assert not static.determined
     assert not blind.holds(MASS)
     assert fair.holds(MASS)
     assert fair.value == off.value
+
+
+def test_an_averaged_force_is_found_and_the_mass_behind_it(wording: Wording) -> None:
+    log = axis()
+    late = np.convolve(log["force"], np.full(65, 1 / 65), "full")[: len(log.time)]
+    filtered = replace(log, signals={**log.signals, "force": late})
+    inverse = inverse_model(filtered, 5.0)
+    cause = causes(filtered, inverse, 0.0)[0]
+    assert cause.without is not None
+    wording(cause.sentence)
+    assert abs(inverse.value("mass") - MASS) > 0.1
+    assert cause.without.value("mass") == pytest.approx(MASS, rel=0.02)
+
+
+def test_a_force_along_the_way_is_found(wording: Wording) -> None:
+    log = axis()
+    force = log["force"] + 8 * np.sin(2 * np.pi * log["position"] / 0.15)
+    uneven = replace(log, signals={**log.signals, "force": force})
+    (cause,) = causes(uneven, inverse_model(uneven, 5.0), 0.0)
+    wording(cause.sentence)
+    assert cause.without is not None
+    assert cause.without.value("coulomb") == pytest.approx(COULOMB, rel=0.1)
+
+
+def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording) -> None:
+    log = axis()
+    ahead = np.roll(log["position"], -20)
+    force = log["force"] - 4.0 * np.gradient(np.gradient(ahead, DT), DT)
+    lacking = replace(log, signals={**log.signals, "reference": ahead, "force": force})
+    inverse = inverse_model(lacking, 5.0)
+    cause = causes(lacking, inverse, 0.0)[0]
+    wording(cause.sentence)
+    assert cause.without is not None
+    assert inverse.value("mass") < 0.5 * MASS
+    assert cause.without.value("mass") == pytest.approx(MASS, rel=0.05)
+
+
+def test_a_force_that_is_cut_off_spoils_the_record(wording: Wording) -> None:
+    log = axis()
+    cut = replace(log, signals={**log.signals, "force": np.clip(log["force"], -15, 15)})
+    cause = causes(cut, inverse_model(cut, 5.0), 0.0)[-1]
+    wording(cause.sentence)
+    assert cause.spoils
+
+
+def test_much_that_nothing_explains_makes_intervals_wider() -> None:
+    log = axis()
+    inverse, flat = inverse_model(log, 5.0), {"masses.cart": MASS}
+    one = Estimate.normal("masses.cart", "kg", MASS, 0.1, "output error")
+    plain = Quality(0.05, 1.0, 0.05, inverse.error, inverse.error)
+    (same,), _ = with_causes([one], np.eye(1), inverse, flat, plain)
+    (wide,), _ = with_causes([one], np.eye(1), inverse, flat, replace(plain, spoilt=True, unsettled=True))
+    assert same == one
+    assert wide.half_width == pytest.approx(2 * one.half_width)
+
+
+def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> None:
+    """The whole model leaves out the constant force there, which acts backward where a stage overshoots."""
+    log = axis()
+    inverse = inverse_model(log, 5.0)
+    (mass, viscous, coulomb, *rest) = inverse.estimates
+    unknown = Estimate.unknown("coulomb", "N", coulomb.method, "one way")
+    one_way = replace(inverse, estimates=(mass, viscous, unknown, *rest))
+    whole = Estimate.normal("friction.viscous", "N*s/m", VISCOUS, viscous.half_width / 100, "output error")
+    quality = Quality(0.05, 0.05, 0.01, inverse.error, inverse.error)
+    fair, narrow = (
+        all_with_model_error([whole], one, {"masses.cart": MASS}, replace(quality, left=0.01 * quality.left))[0]
+        for one in (one_way, inverse)
+    )
+    assert narrow.half_width < 0.5 * viscous.half_width
+    assert fair.half_width <= viscous.half_width
 
 
 def test_gravity_is_found(wording: Wording) -> None:

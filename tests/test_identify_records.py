@@ -124,7 +124,7 @@ def test_what_needs_newtons_is_not_written_and_says_so(volts: tuple[Path, Identi
     files = read_all([path], Mapping(roles={"force": "command"}, experiment="moves"), path.parent)
     lines = [text for _, text in headline(identification)]
     assert any("N/V" in line and "V·s²/m" in line.replace(" ", "·") for line in lines)
-    assert any("newtons" in line for line in lines)
+    assert any('--scale force="NUMBER N/V"' in line for line in lines)
     assert not any(" N " in line or line.endswith(" N") for line in answer(identification, files, []))
     document: dict[str, Any] = identify_document(identification, files, [])
     assert "mass_v_s2_per_m" in document["experiments"][0]["inverse_model"]
@@ -134,6 +134,17 @@ def test_a_stage_file_in_newtons_needs_a_scale(volts: tuple[Path, Identification
     (experiment,) = volts[1].experiments
     with refused("force"):
         identify([(experiment.logs[0], "moves")], friso.load("examples/emps_axis.toml"))
+
+
+# --- a time in another unit -------------------------------------------------------------------------------------------
+
+
+def test_moves_that_end_before_a_stage_can_follow_them_are_refused(refused: Refused) -> None:
+    """Milliseconds taken for seconds."""
+    log = axis()
+    hasty = record("hasty", 1e-3 * DT, position=log["position"], force=log["force"])
+    with refused("position"):
+        identify([(hasty, "moves")])
 
 
 # --- what following the log costs -------------------------------------------------------------------------------------

@@ -19,6 +19,9 @@ NOISY = 10.0
 POOR = 0.3
 """Relative error of the force from which on a model does not describe the record."""
 
+UNSETTLED = 0.1
+"""Share of the force that a fit and the best explanation of what it leaves may both leave unexplained."""
+
 CONTRADICTS, FINE = 1.5, 0.01
 """A whole model whose steady friction leaves so many times what the inverse model leaves contradicts the record, unless
 that is less than this share of the force."""
@@ -47,6 +50,7 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         doubts.append(
             f"The whole model contradicts the record: on the moves it leaves {100 * plain.whole_error:.3g} % of the "
             f"force, a plain mass with friction {100 * inverse.error:.3g} %. What follows is from the latter alone"
+            f"{''.join(f'; {cause.sentence}' for cause in reasons)}"
         )
     if poor:
         why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN
@@ -64,6 +68,16 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
     for name, first, second in halves(inverse) if plain.ratio > NOISY else ():
         of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == name)
         doubts.append(f"The halves of the record differ in {WORDS[name]}: {first:.4g} and {second:.4g} {of_it}")
-    without = next((cause.without for cause in reasons if cause.without), None)
-    failed = poor and plain.whole_error > POOR
-    return replace(plain, doubts=tuple(doubts), rejected=rejected, failed=failed, without_cause=without)
+    without = tuple(cause.without for cause in reasons if cause.without)
+    force = float(np.sqrt(np.mean(log["force"][log.longest] ** 2)))
+    best = min([inverse.error, *(model.error for model in without)])
+    unsettled = plain.ratio > NOISY and min(left / force, best) > UNSETTLED
+    return replace(
+        plain,
+        doubts=tuple(doubts),
+        rejected=rejected,
+        failed=poor and plain.whole_error > POOR,
+        without=without,
+        spoilt=unsettled or any(cause.spoils for cause in reasons),
+        unsettled=unsettled,
+    )

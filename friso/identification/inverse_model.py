@@ -12,9 +12,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from scipy.interpolate import make_interp_spline
+from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
@@ -53,6 +55,8 @@ LEAST = 20
 """Rows that a fit needs at least."""
 
 METHOD = "least squares on the inverse model"
+
+NO_COLUMNS: Mapping[str, np.ndarray] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -129,20 +133,28 @@ def directions(position: np.ndarray) -> tuple[bool, bool]:
 
 
 def inverse_model(
-    log: Log, bandwidth: float | None = None, by_direction: bool = False, cart_share: float = 0.0
+    log: Log,
+    bandwidth: float | None = None,
+    by_direction: bool = False,
+    cart_share: float = 0.0,
+    averaged: int = 1,
+    extra: Mapping[str, np.ndarray] = NO_COLUMNS,
 ) -> InverseModel:
     """Mass, viscous and Coulomb friction and offset of a log with position and force.
 
     With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
     distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, read off the log
     by default. Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does
-    friction. Raises InputError for a log too short."""
+    friction. `averaged`: samples over which the log's force is averaged, as then are the columns. `extra` columns by
+    name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
+    for a log too short."""
     band = bandwidth or bandwidth_of(log["position"], log.sample_time)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
         actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
         raise InputError("--bandwidth", actual, expected, '--bandwidth "20 Hz"', log.name)
-    parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
+    beside = np.stack(list(extra.values()), axis=1) if extra else np.zeros((len(log.time), 0))
+    parts = [_rows(log, part, band, by_direction, cart_share, averaged, beside[part]) for part in log.segments]
     time, columns, force, position = (np.concatenate([part[i] for part in parts]) for i in range(4))
     velocity = columns[:, 1] + columns[:, 3] if by_direction else columns[:, 1]
     speed = np.abs(velocity)
@@ -156,18 +168,22 @@ def inverse_model(
         columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
     solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     fitted = columns @ solution
-    covariance = spread_of(columns, force - fitted, groups_of(position, velocity, columns[:, 0]))
     names = _NAMES[by_direction]
+    own = len(names)
+    covariance = spread_of(columns, force - fitted, groups_of(position, velocity, columns[:, 0]))[:own, :own]
     estimates = tuple(
         _estimate(name, unit_of(unit, log), value, variance if both or name != "coulomb" else np.inf)
-        for (name, unit), value, variance in zip(names, solution, np.diag(covariance), strict=True)
+        for (name, unit), value, variance in zip(names, solution[:own], np.diag(covariance), strict=True)
     )
     if estimates[0].high < 0:
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
         actual = f"a mass of {solution[0]:.3g} {unit_of('kg', log)}"
         raise InputError("force", actual, expected, f'--scale force="{_other_sign(log)}"', log.name)
-    numbers = dict(zip((name for name, _ in names), map(float, solution), strict=True))
-    return InverseModel(estimates, numbers, columns, covariance, time, force, fitted, band)
+    numbers = dict(zip((*(name for name, _ in names), *extra), map(float, solution), strict=True))
+    explained = columns[:, own:] @ solution[own:]
+    return InverseModel(
+        estimates, numbers, columns[:, :own], covariance, time, force - explained, fitted - explained, band
+    )
 
 
 def _other_sign(log: Log) -> str:
@@ -215,11 +231,11 @@ _NAMES = {
 
 
 def _rows(
-    log: Log, part: slice, band: float, by_direction: bool, cart_share: float
+    log: Log, part: slice, band: float, by_direction: bool, cart_share: float, averaged: int, extra: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Times, columns of the inverse model, forces and positions of a segment, decimated."""
+    """Times, columns of the inverse model with the extra ones, forces and positions of a segment, decimated."""
     if part.stop - part.start < 2 * EDGE:
-        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]))), np.zeros(0), np.zeros(0)
+        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]) + extra.shape[1])), np.zeros(0), np.zeros(0)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * band)
     v, a = moved.velocity, moved.acceleration
     carried_position = cart(log) if cart_share else None
@@ -232,6 +248,9 @@ def _rows(
         columns = np.stack([a, v * forward, sign * forward, v * backward, sign * backward], axis=1)
     else:
         columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
+    if averaged > 1:
+        columns = uniform_filter1d(columns, averaged, axis=0)
+    columns = np.hstack([columns, extra])
     step = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
     arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part], moved.position)]
     time, position = (array[_first(len(array), step) :: step] for array in (arrays[0], arrays[3]))

@@ -18,7 +18,7 @@ from friso.identification.logs.log import Log
 from friso.identification.stage_file import identified, origins
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, share_of, silent
-from friso.stage import Stage
+from friso.stage import Stage, plausible
 from friso.stage.correlations import Correlations
 
 
@@ -91,6 +91,7 @@ def identify(
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified(stage, fits.estimates, [log.name for log, _ in logs])
+    doubts += _unusual(fitted, estimates)
     return Identification(
         fitted,
         _correlations(experiments, estimates, fits, fitted),
@@ -155,6 +156,13 @@ def _unpredictable(log: Log) -> InputError:
     needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
     expected = ", or ".join(needs)
     return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+
+
+def _unusual(stage: Stage, estimates: Sequence[Estimate]) -> tuple[str, ...]:
+    """A sentence on each identified value that no positioning stage has."""
+    keys = [estimate.name for estimate in estimates if estimate.determined]
+    sentences = [sentence for sentence in plausible.doubts(stage) if sentence.partition(" ")[0] in keys]
+    return tuple(f"{sentence}: a wrong unit or --scale of a channel?" for sentence in sentences)
 
 
 def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:

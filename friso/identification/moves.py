@@ -98,7 +98,7 @@ def identify_moves(
         estimates, correlation = of_inverse_model(inverse, flat, estimates)
     else:
         estimates = all_with_model_error(estimates, inverse, flat, quality)
-    estimates = with_causes(estimates, flat, quality)
+    estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
     simulated = (loop or follows).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,

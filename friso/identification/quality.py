@@ -22,8 +22,9 @@ class Quality:
     """`noise` [N] of the record's force; `left` [N], RMS of what the fit leaves of it where it counts, and what `noise`
     alone would leave there; relative errors of the force by the inverse model, and on its samples by the steady
     friction and mass of the whole model; sentences that say what is wrong (`doubts`); whether the whole model was
-    `rejected`, and whether nothing holds (`failed`); the inverse model `without_cause`, of a log rid of what may be
-    wrong with it."""
+    `rejected`, and whether nothing holds (`failed`); the inverse models `without` a cause, of a log rid of what may be
+    wrong with it; whether the record is `spoilt`, so that what is wrong with it passes for slow friction, and whether
+    much is left that is `unsettled`: for which no cause was found."""
 
     noise: float
     left: float
@@ -33,7 +34,9 @@ class Quality:
     doubts: tuple[str, ...] = ()
     rejected: bool = False
     failed: bool = False
-    without_cause: InverseModel | None = None
+    without: tuple[InverseModel, ...] = ()
+    spoilt: bool = False
+    unsettled: bool = False
 
     @property
     def ratio(self) -> float:

@@ -6,8 +6,9 @@ import numpy as np
 
 from friso.errors import LogError
 
-CLIPPED = 1e-3
-"""Share of the samples in flat tops above which a signal is reported as clipped."""
+CLIPPED, REPEATED = 1e-3, 0.01
+"""Share of the samples in flat tops above which a signal is reported as clipped, and of those that repeat the one
+before up to which it hardly ever repeats a value."""
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -65,16 +66,19 @@ def constant(name: str, values: np.ndarray) -> bool:
 
 
 def clipped_share(values: np.ndarray) -> float:
-    """Share of the samples in flat tops at the extremes that the signal enters with a kink, as it does when it is
-    clipped: at least 3 equal extreme samples, the step before at least a fifth of the largest step."""
+    """Share of the samples in flat tops at the extremes, of at least 3 equal samples, that show that the signal is
+    clipped: it enters them with a kink, the step before being at least a fifth of the largest step, or it hardly ever
+    repeats a value elsewhere."""
     steps = np.abs(np.diff(values))
     if values.size < 5 or steps.max() == 0:
         return 0.0
-    count = 0
+    count, inside = 0, (values[1:] > values.min()) & (values[1:] < values.max())
+    repeats = np.count_nonzero(steps[inside] == 0) > REPEATED * np.count_nonzero(inside)
     for extreme in (values.max(), values.min()):
         edges = np.flatnonzero(np.diff(np.r_[False, values == extreme, False].astype(np.int8)))
         for start, stop in zip(edges[::2], edges[1::2], strict=True):
-            if stop - start >= 3 and start >= 2 and steps[start - 2] >= 0.2 * steps.max():
+            kink = start >= 2 and steps[start - 2] >= 0.2 * steps.max()
+            if stop - start >= 3 and (kink or not repeats):
                 count += int(stop - start)
     return count / values.size
 

@@ -17,6 +17,7 @@ from friso.equations.controllers.pid_gains import KD, KP, proportional_derivativ
 from friso.equations.driven import HELD_FORCE, Driven
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
+from friso.errors import InputError
 from friso.identification.inverse_model import SMOOTH, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
@@ -228,6 +229,11 @@ def tracking(
         motion(log["position"][part], log.sample_time, cutoff * bandwidth).position for cutoff in (SMOOTH, 2 * SMOOTH)
     )
     inputs = Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log))
+    counted = _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega)
+    if not counted.any():
+        actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {SETTLED / omega:.2g} s on end"
+        expected = "moves that last longer: is the time, or the position, in another unit?"
+        raise InputError("position", actual, expected, '--unit TIME="ms"', log.name)
     mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
     held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
@@ -239,7 +245,7 @@ def tracking(
         tuple(parameters),
         False,
         _start(log, part),
-        _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega),
+        counted,
         (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper)),
     )
 

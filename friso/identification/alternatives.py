@@ -1,0 +1,163 @@
+"""The inverse model of a log rid of what may be wrong with it: a delay or averaging between force and motion, a force
+that depends on the place or drifts, a feed-forward that is not part of the force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.ndimage import uniform_filter1d
+
+from friso.errors import InputError
+from friso.identification.inverse_model import SMOOTH, InverseModel, inverse_model, motion, unit_of
+from friso.identification.logs.log import Log
+
+BETTER = 0.7
+"""Share of the error that is left once a cause is taken away that counts as found."""
+
+RIVAL = 1.5
+"""How many times the error of the best alternative another one may leave and still count."""
+
+LATEST, LONGEST = 0.25, 1.0
+"""Periods of the motion's bandwidth by which the force is moved at most in the search for a delay, and over which force
+or motion are averaged at most in that for a filter: each twice as far as the one before, and then in between."""
+
+PLACES, ROWS = 40, 20
+"""Places along the way at which a force may differ, and samples at least for each of them."""
+
+FEWEST = 20
+"""Samples of a segment at least, for the motion of its reference."""
+
+TIME, PLACE, ACCELERATION, DIRECTION = "drift", "place {}", "reference acceleration", "reference direction"
+"""Names of further columns of the inverse model."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A sentence about what may be wrong with a log, and the inverse model of the log without it."""
+
+    sentence: str
+    model: InverseModel
+
+
+def alternatives(log: Log, inverse: InverseModel, cart_share: float) -> list[Alternative]:
+    """Those that fit much better than the inverse model, the best first; none that leaves half as much again."""
+    candidates = [*_timing(log, inverse, cart_share), *_with_columns(log, inverse, cart_share)]
+    candidates = [one for one in candidates if one.model.error < BETTER * inverse.error]
+    candidates.sort(key=lambda one: one.model.error)
+    return [one for one in candidates if one.model.error <= RIVAL * candidates[0].model.error]
+
+
+def _timing(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alternative]:
+    """The force moved in time, and what of force and motion the other one has to be averaged like, that fit best."""
+    fits: dict[tuple[int, int], InverseModel] = {(0, 1): inverse}
+
+    def best(tried: Iterable[tuple[int, int]]) -> tuple[int, int]:
+        for lag, width in tried:
+            with suppress(InputError):
+                fits[lag, width] = _moved(log, inverse, cart_share, lag, width)
+        return min(fits, key=lambda choice: fits[choice].error)
+
+    period = 1 / (inverse.bandwidth * log.sample_time)
+    lag, _ = best((way * lag, 1) for lag in _doubling(LATEST * period) for way in (1, -1))
+    lag, _ = plain = best((lag + more, 1) for more in (-abs(lag) // 4, abs(lag) // 4) if more)
+    _, width = best((lag, way * (2 * half + 1)) for half in _doubling(LONGEST * period / 2) for way in (1, -1))
+    wider = abs(width) // 2 | 1
+    lag, width = best((lag, (1 if width > 0 else -1) * (abs(width) + way * (wider - 1))) for way in (-1, 1))
+    lag, width = filtered = best((lag + more, width) for more in (-max(abs(lag) // 4, 1), max(abs(lag) // 4, 1)))
+    believed = fits[filtered].error < BETTER * min(fits[plain].error, _alike(log, inverse, cart_share, *filtered))
+    choice = filtered if believed else plain
+    if choice != (0, 1):
+        yield Alternative(_timing_sentence(*choice, log.sample_time), fits[choice])
+
+
+def _doubling(most: float) -> list[int]:
+    """1, 2, 4 and so on, up to a number."""
+    return [2**power for power in range(int(np.log2(most)) + 1)] if most >= 1 else []
+
+
+def _moved(log: Log, inverse: InverseModel, cart_share: float, lag: int, width: int) -> InverseModel:
+    """The inverse model with the force so many samples later, and the motion averaged over so many; of a negative
+    `width` the force instead."""
+    moved = _force_moved(log, lag, max(-width, 1))
+    return inverse_model(moved, inverse.bandwidth, False, cart_share, averaged=max(width, 1))
+
+
+def _alike(log: Log, inverse: InverseModel, cart_share: float, lag: int, width: int) -> float:
+    """The error with both averaged alike, where the force is averaged: that alone takes what is fast out of it."""
+    if width >= 0:
+        return np.inf
+    return inverse_model(_force_moved(log, lag, -width), inverse.bandwidth, False, cart_share, averaged=-width).error
+
+
+def _force_moved(log: Log, lag: int, width: int) -> Log:
+    """The log with its force so many samples later, averaged over so many."""
+    force = uniform_filter1d(np.roll(log["force"], lag), width)
+    return replace(log, signals={**log.signals, "force": force})
+
+
+def _timing_sentence(lag: int, width: int, step: float) -> str:
+    how = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
+    if width == 1:
+        return f"a force {how} fits much better: a delay between the channels?"
+    also = f" and a force {how}" if lag else ""
+    span = f"{abs(width) * step * 1e3:.3g} ms"
+    if width > 0:
+        return f"motion averaged over {span}{also} fits much better: a force that is averaged or filtered?"
+    also = f", {how}," if lag else ""
+    return f"a force averaged over {span}{also} fits much better: a position that is filtered, or not measured?"
+
+
+def _with_columns(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alternative]:
+    """What a force that drifts, one that depends on the place, and one that the reference prescribes explain."""
+    time = log.time - log.time.mean()
+    every = [{TIME: time}, _places(log, len(inverse.measured)), _of_reference(log, inverse.bandwidth)]
+    for extra, words in zip(every, (_drift, _along, _feed_forward), strict=True):
+        if extra:
+            with suppress(InputError):
+                model = inverse_model(log, inverse.bandwidth, False, cart_share, extra=extra)
+                yield Alternative(words(model, log), model)
+
+
+def _places(log: Log, rows: int) -> dict[str, np.ndarray]:
+    """Columns that tell places along the way apart, each of shape (n,), without the first one's."""
+    position, count = log["position"], min(PLACES, rows // ROWS)
+    if count < 3:
+        return {}
+    nodes = np.linspace(position.min(), position.max(), count)
+    near = 1 - np.abs(position - nodes[:, None]) / (nodes[1] - nodes[0])
+    return {PLACE.format(i): np.maximum(row, 0.0) for i, row in enumerate(near) if i}
+
+
+def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
+    """Acceleration [m/s^2] of the reference and its direction, of shape (n,)."""
+    if "reference" not in log:
+        return {}
+    columns = {name: np.zeros(len(log.time)) for name in (ACCELERATION, DIRECTION)}
+    for part in log.segments:
+        if part.stop - part.start > FEWEST:
+            reference = motion(log["reference"][part], log.sample_time, SMOOTH * bandwidth)
+            columns[ACCELERATION][part] = reference.acceleration
+            columns[DIRECTION][part] = np.sign(np.gradient(log["reference"][part]))
+    return columns
+
+
+def _drift(model: InverseModel, log: Log) -> str:
+    return f"a force that drifts by {model.value(TIME):.2g} {log.unit('force')}/s explains most of it"
+
+
+def _along(model: InverseModel, log: Log) -> str:
+    levels = [value for name, value in model.solution.items() if name.startswith(PLACE.format(""))]
+    size = f"{np.ptp([0.0, *levels]):.2g} {log.unit('force')}"
+    return f"a force that differs along the way, by {size}, explains most of it"
+
+
+def _feed_forward(model: InverseModel, log: Log) -> str:
+    mass = f"{-model.value(ACCELERATION):.2g} {unit_of('kg', log)}"
+    coulomb = f"{-model.value(DIRECTION):.2g} {log.unit('force')}"
+    return (
+        f"{mass} times the acceleration of the reference and {coulomb} in its direction are missing: a feed-forward "
+        "that is not part of this force?"
+    )
