@@ -99,22 +99,22 @@ def _force_moved(log: Log, lag: int, width: int) -> Log:
 
 
 def _timing_sentence(lag: int, width: int, step: float) -> str:
-    how = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
+    shift = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
     if width == 1:
-        return f"a force {how} fits much better: a delay between the channels?"
-    also = f" and a force {how}" if lag else ""
+        return f"a force {shift} fits much better: a delay between the channels?"
+    also = f" and a force {shift}" if lag else ""
     span = f"{abs(width) * step * 1e3:.3g} ms"
     if width > 0:
         return f"motion averaged over {span}{also} fits much better: a force that is averaged or filtered?"
-    also = f", {how}," if lag else ""
+    also = f", {shift}," if lag else ""
     return f"a force averaged over {span}{also} fits much better: a position that is filtered, or not measured?"
 
 
 def _with_columns(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alternative]:
     """What a force that drifts, one that depends on the place, and one that the reference prescribes explain."""
     time = log.time - log.time.mean()
-    every = [{TIME: time}, _places(log, len(inverse.measured)), _of_reference(log, inverse.bandwidth)]
-    for extra, words in zip(every, (_drift, _along, _feed_forward), strict=True):
+    sets = [{TIME: time}, _places(log, len(inverse.measured)), _of_reference(log, inverse.bandwidth)]
+    for extra, words in zip(sets, (_drift, _along, _feed_forward), strict=True):
         if extra:
             with suppress(InputError):
                 model = inverse_model(log, inverse.bandwidth, False, cart_share, extra=extra)

@@ -21,8 +21,9 @@ FOLLOWED = 0.05
 """Share by which static friction may be off where the stage follows the log instead of its reference: it comes out too
 high, by 3 to 6 % in those of 21 machines of known truth that a narrower interval missed (docs/identify.md)."""
 
-MOST = 1.0
-"""Half of a 95 % interval, of the logarithm, from which on a record does not bound a quantity."""
+MOST = 0.7
+"""Half of a 95 % interval, of the logarithm, from which on a record does not bound a quantity: beyond a factor of two,
+intervals of a linearised fit do not hold (Stribeck velocity under a noise of a fifth of the force)."""
 
 
 def estimates_of(identified: Identified, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
