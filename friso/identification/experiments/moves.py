@@ -11,6 +11,7 @@ from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
+from friso.identification.logs.excerpt import excerpt
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
@@ -25,6 +26,9 @@ WITHOUT_CONTROLLER = (
     "without the machine's own controller the simulated stage follows the logged position; with it (--stage) the "
     "intervals are narrower, and more is identified"
 )
+
+MOST = 40_000
+"""Samples of a log that are used: more of the same moves would take longer and show little more (our choice)."""
 
 RESTS = 0.1
 """Share of the time for which the position rests from which on what repeats is taken for moves."""
@@ -48,10 +52,11 @@ def _claims(course: Course) -> str | None:
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
     """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
-    (log,) = logs
-    assert isinstance(log, Log)
+    (whole,) = logs
+    assert isinstance(whole, Log)
     if prior.from_user:
-        check_roles(log, ("force",))
+        check_roles(whole, ("force",))
+    log = excerpt(whole, MOST)
     flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
     return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
@@ -63,7 +68,8 @@ def _in_newtons(log: Log) -> bool:
 
 def _around(log: Log) -> Stage | None:
     """A stage around a log whose force is in newtons."""
-    return made_up(log, inverse_model(log)) if _in_newtons(log) else None
+    part = excerpt(log, MOST)
+    return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 
 def _estimates(result: IdentifiedMoves, stage: Stage | None) -> tuple[Estimate, ...]:
@@ -81,10 +87,16 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
+    long = [result.log for result in results if len(result.log.time) == MOST]
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER] if followed else []),
+        *(f"{log.name}: of a log this long {MOST} samples are used, {_span(log)}, where it moves most" for log in long),
     ]
+
+
+def _span(log: Log) -> str:
+    return f"{log.time[0]:.6g} to {log.time[-1]:.6g} s"
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
