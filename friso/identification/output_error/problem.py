@@ -223,7 +223,8 @@ def tracking(
 ) -> Problem:
     """The stage under the log's force, held to the log's smoothed position by a slow controller; `bandwidth` [Hz] is
     that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest. A log tells
-    neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was."""
+    neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was.
+    Raises InputError for a log that never moves for long enough to count."""
     omega = 2 * np.pi * min(bandwidth, SLOW)
     smooth, sharper = (
         motion(log["position"][part], log.sample_time, cutoff * bandwidth).position for cutoff in (SMOOTH, 2 * SMOOTH)
