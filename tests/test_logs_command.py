@@ -44,8 +44,8 @@ def test_channels_ranges_rates_and_roles(tmp_path: Path) -> None:
 def test_the_course_of_a_channel(tmp_path: Path) -> None:
     ramp = np.arange(1200.0)
     path = log_files.write_text(tmp_path / "a.csv", ["time [s]", "position [mm]"], [M["time"], ramp])
-    course = content_of(path, Mapping()).channels[1].course(12)
-    assert course == pytest.approx(100 * np.arange(12) + 49.5)
+    course = content_of(path, Mapping()).channels[1].course()
+    assert course == pytest.approx(50 * np.arange(24) + 24.5)
     assert sparkline(course)[0] == "▁"
     assert sparkline(course)[-1] == "█"
     assert sparkline(np.array([1.0, np.nan, 1.0])) == "▁ ▁"
