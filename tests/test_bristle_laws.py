@@ -34,6 +34,7 @@ from friso.frequency.members import member
 from friso.frequency.parts import plant
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
+from friso.identification.output_error.parameters import parameters_of
 from friso.stage.tables import friction_law
 from friso.virtual_rig.run import failures, run
 from friso.virtual_rig.task import own_motion
@@ -158,3 +159,13 @@ def test_bristles_that_would_not_slip_are_refused() -> None:
 
 def test_imposed_motion_takes_every_law() -> None:
     assert {imposed_form(each.flat()).friction for each in HUNTING.values()} == {*LAWS}
+
+
+def test_what_of_them_is_fitted() -> None:
+    """Of rolling friction what LuGre has, its exponent as given; elasto-plastic friction is refused, not ignored: its
+    stiffness is bounded by its break-away deflection."""
+    levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
+    names = {each.name for each in parameters_of(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
+    assert {"friction.bristle_stiffness", "friction.bristle_damping", "friction.stribeck_velocity"} <= names
+    with pytest.raises(InputError, match="elasto_plastic"):
+        parameters_of(HUNTING["elasto_plastic"].flat(), levels, 0.1, 0.1, True)

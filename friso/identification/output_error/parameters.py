@@ -17,7 +17,7 @@ MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
 HIGHEST_RATIO = 4.0
 """Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
 
-FITTED = ("lugre", "dahl", "stribeck", "elasto_plastic", "rolling")
+FITTED = ("lugre", "dahl", "stribeck", "rolling")
 """Friction laws whose parameters are fitted."""
 
 SHORTEST, LONGEST = 5e-8, 3e-4
