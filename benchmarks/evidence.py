@@ -191,7 +191,6 @@ LONG: Mapping[str, Callable[[], Values]] = {
     "rig.slow-cycles": rig_slow_cycles,
     "compare.thesis-rig": compare_thesis_rig,
     "guideline.minutes": lambda: {"rough": minutes("guideline", "--samples", "64")},
-    "reproduce.minutes": lambda: {"all": minutes("reproduce")},
 }
 
 BY_HAND = ("rig.loop", "identify.known-truth", "hunting.limiter", "hunting.supercritical")
