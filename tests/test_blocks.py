@@ -37,7 +37,7 @@ def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
     blocks = Sampled(3)
     signal = BLOCKS[name](blocks, measured(GOING, sp.S.One, sp.S.One).position)
     _, held = blocks.finished(Demand({}, signal, signal, signal), None, Rest())
-    now = {each.symbol: each.settled for each in held}
+    now = {entry.symbol: entry.settled for entry in held}
     later = {POSITION: POSITION + VELOCITY * SAMPLE_TIME}
     for item in held:
         assert sp.simplify(item.update.xreplace(now) - item.settled.xreplace(later)) == 0

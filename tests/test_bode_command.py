@@ -114,8 +114,8 @@ def test_the_document_has_the_agreed_keys(written: tuple[dict, Path]) -> None:
         assert document[name].keys() == MARGINS | {"at"}
         assert document[name]["at"].keys() == {"bias_n", "speed_m_per_s", "limiter", "forward"}
     assert document["limits"].keys() == {"locked", "free"}
-    for known in document["limits"].values():
-        assert known.keys() == {
+    for expected in document["limits"].values():
+        assert expected.keys() == {
             *("highest_stable_crossover_hz", "still_stable_there", "stable_hz", "modulus_margin_above_half_hz"),
             "searched_hz",
         }
@@ -155,22 +155,22 @@ def test_the_highest_stable_crossover_is_that_of_the_joint_as_given(rig: Stage) 
 
 
 def test_series_adds_the_thesis_formula_beside(rig: Stage) -> None:
-    found = bode(rig, (1.0, 100.0), series=True)
-    cases = bode_document(found)["cases"]
+    loops = bode(rig, (1.0, 100.0), series=True)
+    cases = bode_document(loops)["cases"]
     added = {"stuck-touched-series", "sliding-touched-series"}
     assert added <= cases.keys()
-    plant = bode_figures(found)[0].panels[0]
+    plant = bode_figures(loops)[0].panels[0]
     dashed = {line.label for line in plant.series if line.dash == "dashed"}
     assert {"Stuck, limiter in series", "Sliding, limiter in series"} <= dashed
     (line,) = (line for line in plant.series if line.label == "Stuck, limiter in series")
-    assert line.y == pytest.approx(np.abs(found.cases["stuck-touched-series"].plant))
+    assert line.y == pytest.approx(np.abs(loops.cases["stuck-touched-series"].plant))
 
 
 def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode) -> None:
     document = bode_document(emps)
     assert document["highest_stable_crossover_hz"] is None
-    known = document["limits"]["given"]
-    assert known == {
+    expected = document["limits"]["given"]
+    assert expected == {
         "highest_stable_crossover_factor": 1000.0,
         "still_stable_there": True,
         "stable_factor": [[0.01, 1000.0]],
@@ -190,8 +190,8 @@ def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> N
     assert document["worst"]["at"] == {"bias_n": 0.0, "speed_m_per_s": 0.0, "limiter": None, "forward": True}
     assert document["limits"].keys() == {"given"}
     assert [item.label for item in shown_states(rigid)] == ["As given"]
-    (said,) = stability(rigid)
-    assert "0.73" in said
+    (texts,) = stability(rigid)
+    assert "0.73" in texts
 
 
 def test_an_unstable_loop_is_a_plain_statement(unstable: Bode) -> None:
@@ -220,7 +220,7 @@ def test_the_table_says_where_there_is_no_limit_and_no_margin(found: Bode) -> No
 
 
 def test_friction_that_rises_is_not_blamed(found: Bode) -> None:
-    assert all(each.falling for each in found.unstable)
+    assert all(item.falling for item in found.unstable)
     risen = replace(found, unstable=(Unstable(1e-2, 1.0, False, True, falling=False),))
     assert not any("Stribeck" in sentence for sentence in stability(risen))
     assert any("Stribeck" in sentence for sentence in stability(found))
@@ -237,10 +237,10 @@ def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode, snapshots: 
 
 def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
     """Tuned for too light a mass, the loop of a sliding cart is too slow for its integral action."""
-    said = crossovers(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
+    text = crossovers(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
     for joint, highest in (("locked", "8.41 Hz"), ("free", "5.92 Hz")):
-        assert said[joint].count(highest) == 2
-        assert "sliding at 1.6" in said[joint].partition(highest)[2]
+        assert text[joint].count(highest) == 2
+        assert "sliding at 1.6" in text[joint].partition(highest)[2]
 
 
 def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage, snapshots: Snapshots) -> None:
@@ -252,10 +252,10 @@ def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage, snapshots: 
 
 
 def test_words_of_a_controller_by_gains(emps: Bode, snapshots: Snapshots) -> None:
-    said = sentences(emps)
-    assert "20.4 N" in " ".join(said)
-    assert "crossover" not in " ".join(said)
-    snapshots.check("bode", "gains", "\n".join(said))
+    texts = sentences(emps)
+    assert "20.4 N" in " ".join(texts)
+    assert "crossover" not in " ".join(texts)
+    snapshots.check("bode", "gains", "\n".join(texts))
 
 
 def test_no_texts_but_json_on_standard_output(capsys: pytest.CaptureFixture) -> None:

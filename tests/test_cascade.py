@@ -312,8 +312,8 @@ def test_what_is_wrong_is_told(changes: dict[str, Any], parts: list[str]) -> Non
 def test_boundary_and_map_agree_on_where_hunting_ends() -> None:
     """In the integral time of the velocity loop."""
     machine = rigid(PI)
-    found = friso.boundary(machine, {INTEGRAL_TIME: "20 ms..200 ms"})
-    ends = np.array([found.value(point.point.place) for points in found.special for point in points])
+    traced = friso.boundary(machine, {INTEGRAL_TIME: "20 ms..200 ms"})
+    ends = np.array([traced.value(point.point.place) for points in traced.special for point in points])
     beside = np.outer(ends, [0.97, 1.03])
     runs = sweep(machine, {INTEGRAL_TIME: (np.sort(beside.ravel()), "s")}, metrics=["multiplier"])
     attracts = np.abs(runs["multiplier"].sel({INTEGRAL_TIME: beside.ravel()}).values.reshape(beside.shape)) < 1
@@ -356,9 +356,9 @@ def test_rig_hunting(whole: Stage) -> None:
 
 def test_compare(whole: Stage) -> None:
     with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
-        found = compare(whole, 20, 1)
-    assert {"a", "c", "d", "e", "f"} <= {result.option.letter for result in found.results}
-    assert all(comparison_sentences(found))
+        comparison = compare(whole, 20, 1)
+    assert {"a", "c", "d", "e", "f"} <= {result.option.letter for result in comparison.results}
+    assert all(comparison_sentences(comparison))
 
 
 def test_identify_in_its_own_loop(whole: Stage) -> None:

@@ -92,10 +92,10 @@ def test_signs_have_random_numbers_of_their_own(machines: Machines) -> None:
 
 
 def test_machines_as_uncertain_as_the_file(built: Stage) -> None:
-    told = {"friction.static": "3 N +/- 0.1 N", "joint.stroke": "0.9 mm .. 1 mm", "masses.cart": "1.2 kg +/- 1e-6 %"}
+    labels = {"friction.static": "3 N +/- 0.1 N", "joint.stroke": "0.9 mm .. 1 mm", "masses.cart": "1.2 kg +/- 1e-6 %"}
     held = {"controller.crossover": "8 Hz +/- 1 Hz", "drive.delay": "200 us .. 300 us"}
-    machines = draw_machines(built.replace(told | held), Correlations(), 200, 3)
-    assert {*machines.from_file} == {*told}
+    machines = draw_machines(built.replace(labels | held), Correlations(), 200, 3)
+    assert {*machines.from_file} == {*labels}
     assert np.std(machines.keys["friction.static"]) == pytest.approx(0.051, rel=0.05)
     assert machines.keys["masses.cart"] == pytest.approx(1.2, rel=1e-7)
     assert not {*held} & {*machines.keys}
@@ -120,7 +120,7 @@ def test_a_drive_without_a_clock_gets_one(built: Stage, wording: Wording) -> Non
 
 
 def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
-    stages = {each.letter: each.stage.flat() for each in every.options}
+    stages = {option.letter: option.stage.flat() for option in every.options}
     assert "".join(stages) == "abcdefg"
     assert [letter for letter, flat in stages.items() if not flat["joint.locked"]] == ["c", "g"]
     assert stages["d"]["drive.integrator_deadband"] == pytest.approx(DEADBAND * 1e-6)
@@ -134,7 +134,7 @@ def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
 
 @pytest.mark.parametrize("letter", ["b", "g"])
 def test_faster_up_to_the_margin(every: CompareOptions, letter: str) -> None:
-    option = next(each for each in every.options if each.letter == letter)
+    option = next(item for item in every.options if item.letter == letter)
     assert option.factor > 1.2
     assert option.stage.flat()["controller.crossover"] == pytest.approx(8 * option.factor)
     own = linear_flat(option.stage, option.stage.flat())
@@ -178,8 +178,10 @@ def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, str] 
 
 def test_a_weak_motor_leaves_room_for_bandwidth(built: Stage) -> None:
     weak = built.replace(RIGID | {"drive.motor_constant_ratio": 0.8})
-    known, other = (options(draw_machines(each, Correlations(), 20, 1), 1e-6) for each in (built.replace(RIGID), weak))
-    assert other.options[1].factor > 1.02 * known.options[1].factor
+    expected, other = (
+        options(draw_machines(item, Correlations(), 20, 1), 1e-6) for item in (built.replace(RIGID), weak)
+    )
+    assert other.options[1].factor > 1.02 * expected.options[1].factor
 
 
 def test_unstable_loops_are_told(machines: Machines, every: CompareOptions) -> None:
@@ -191,18 +193,18 @@ def test_unstable_loops_are_told(machines: Machines, every: CompareOptions) -> N
 
 
 def test_without_a_joint_it_is_said(built: Stage, snapshots: Snapshots) -> None:
-    found = options(draw_machines(built.replace(RIGID), Correlations(), 20, 1), 1e-6)
-    assert [each.letter for each in found.options] == ["a", "b", "d", "e", "f"]
-    assert {*found.left_out} == {*"cg"}
-    snapshots.check("compare", "no joint", found.left_out["c"])
+    choices = options(draw_machines(built.replace(RIGID), Correlations(), 20, 1), 1e-6)
+    assert [option.letter for option in choices.options] == ["a", "b", "d", "e", "f"]
+    assert {*choices.left_out} == {*"cg"}
+    snapshots.check("compare", "no joint", choices.left_out["c"])
 
 
 def test_gains_instead_of_rules(built: Stage, snapshots: Snapshots) -> None:
     gains = {"kind": "pid", "kp": "2000 N/m", "kd": "60 N*s/m", "tau": "2 ms"}
-    found = options(draw_machines(built.replace(RIGID | {"controller": gains}), Correlations(), 20, 1), 1e-6)
-    assert {*"de"} <= {*found.left_out}
-    snapshots.check("compare", "no integral action", "\n".join(found.left_out[letter] for letter in "de"))
-    faster = found.options[1]
+    choices = options(draw_machines(built.replace(RIGID | {"controller": gains}), Correlations(), 20, 1), 1e-6)
+    assert {*"de"} <= {*choices.left_out}
+    snapshots.check("compare", "no integral action", "\n".join(choices.left_out[letter] for letter in "de"))
+    faster = choices.options[1]
     assert faster.stage.flat()["controller.kp"] == pytest.approx(2000 * faster.factor**2)
 
 
@@ -215,9 +217,9 @@ def test_without_friction_nothing_to_feed_forward(built: Stage, snapshots: Snaps
 
 def test_no_room_above(built: Stage, snapshots: Snapshots) -> None:
     fast = built.replace(RIGID | {"controller.crossover": "90 Hz"})
-    found = options(draw_machines(fast, Correlations(), 20, 1), 1e-6)
-    assert {*found.left_out} == {*"bcg"}
-    snapshots.check("compare", "no room above", found.left_out["b"])
+    choices = options(draw_machines(fast, Correlations(), 20, 1), 1e-6)
+    assert {*choices.left_out} == {*"bcg"}
+    snapshots.check("compare", "no room above", choices.left_out["b"])
 
 
 TIME = np.arange(0, 20, 0.01)
@@ -259,18 +261,18 @@ def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> 
 @settings(max_examples=40, deadline=None)
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(np.inf), min_size=20, max_size=200))
 def test_medians_with_infinite_values(values: list[float]) -> None:
-    found, array = median(np.array(values)), np.array(values)
-    assert found.low <= found.value <= found.high
-    assert np.mean(array <= found.value) >= 0.5
-    assert np.mean(array >= found.value) >= 0.5
-    assert median(np.append(array, np.nan)) == found
-    assert {found.low, found.high} <= {*values}
+    result, array = median(np.array(values)), np.array(values)
+    assert result.low <= result.value <= result.high
+    assert np.mean(array <= result.value) >= 0.5
+    assert np.mean(array >= result.value) >= 0.5
+    assert median(np.append(array, np.nan)) == result
+    assert {result.low, result.high} <= {*values}
 
 
 def test_intervals_of_medians_hold() -> None:
     rng = np.random.default_rng(5)
-    known = [median(np.exp(rng.standard_normal(50))) for _ in range(2000)]
-    held = np.mean([each.low <= 1 <= each.high for each in known])
+    expected = [median(np.exp(rng.standard_normal(50))) for _ in range(2000)]
+    held = np.mean([item.low <= 1 <= item.high for item in expected])
     assert 0.95 - 0.015 < held < 0.985
 
 
@@ -303,7 +305,7 @@ def test_runs_that_fail_count_either_way() -> None:
 
 def test_the_isolator_and_bandwidth_stop_what_swings(comparison: Comparison) -> None:
     """Thesis, Sec. 4.3: the locked rig hunts at 8 Hz and not above 15 Hz; the isolated one does not at 8 Hz."""
-    results = {each.letter: each for each in comparison.results}
+    results = {result.letter: result for result in comparison.results}
     assert results["a"].swinging.probability > 0.2
     assert results["b"].option.stage.flat()["controller.crossover"] > 15
     for letter in "bcg":
@@ -410,13 +412,15 @@ def _shaken(comparison: Comparison) -> Comparison:
 
 def test_sooner_later_and_alike(made_up: Comparison) -> None:
     pair = made_up.paired(made_up.results[1])
-    assert [each.probability for each in (pair.sooner, pair.later, pair.alike)] == [0.6, 0.15, 0.25]
+    assert [item.probability for item in (pair.sooner, pair.later, pair.alike)] == [0.6, 0.15, 0.25]
     assert [text.split(" (")[0] for text in paired_rows(made_up)[0][1][1:4]] == ["60.0 %", "15.0 %", "25.0 %"]
     assert compare_document(made_up)["options"]["c"]["against_a"]["later"]["probability"] == 0.15
 
 
 def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
-    settled = [replace(each, measures=replace(each.measures, settling=np.ones(COUNT))) for each in made_up.results]
+    settled = [
+        replace(result, measures=replace(result.measures, settling=np.ones(COUNT))) for result in made_up.results
+    ]
     quiet = replace(made_up, results=tuple(settled))
     shaken = _shaken(quiet)
     assert "nm RMS" not in " ".join(sentences(quiet))
@@ -424,13 +428,13 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
     assert "1.00 nm RMS" in " ".join(sentences(shaken))
     assert "[floor]" not in " ".join(sentences(shaken))
     assert [paired_rows(each)[0][1][4] for each in (quiet, shaken)] == ["no [floor]", "0.5 (0.5 to 0.5)"]
-    for each, compared in ((quiet, False), (shaken, True)):
-        known, text = compare_document(each), Page(page(each, [])).text
-        ratio = known["options"]["c"]["against_a"]["in_position_rms"]
-        assert (known["standstill_compared"], ratio is not None) == (compared, compared)
-        assert any("no [floor]" in note for note in known["notes"]) is not compared
+    for item, compared in ((quiet, False), (shaken, True)):
+        expected, text = compare_document(item), Page(page(item, [])).text
+        ratio = expected["options"]["c"]["against_a"]["in_position_rms"]
+        assert (expected["standstill_compared"], ratio is not None) == (compared, compared)
+        assert any("no [floor]" in note for note in expected["notes"]) is not compared
         assert ("not how still they would stand" in text) is not compared
-        assert ("No floor vibration is included" in figures(each)[0].caption) is not compared
+        assert ("No floor vibration is included" in figures(item)[0].caption) is not compared
 
 
 def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:
@@ -441,15 +445,15 @@ def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:
 def test_command_writes_page_and_figures(
     tmp_path: Path, comparison: Comparison, monkeypatch: pytest.MonkeyPatch, snapshots: Snapshots
 ) -> None:
-    monkeypatch.setattr(study, "compare", lambda *given: comparison)
+    monkeypatch.setattr(study, "compare", lambda *inputs: comparison)
     done = friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out", "--json")
     assert done.returncode == 0
     document = json.loads(done.stdout)
     assert [*document["options"]] == [*"abcdefg"]
-    for each in document["options"].values():
-        assert each["swings"]["low"] <= each["swings"]["probability"] <= each["swings"]["high"]
+    for option in document["options"].values():
+        assert option["swings"]["low"] <= option["swings"]["probability"] <= option["swings"]["high"]
     assert document["options"]["d"]["settling_time_s"]["high"] is None
-    assert {each.name for each in (tmp_path / "out").iterdir()} == {
+    assert {item.name for item in (tmp_path / "out").iterdir()} == {
         MARKER, "compare.html", "compare.pdf", "compare.png", "compare.svg",
     }  # fmt: skip
     page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
@@ -464,7 +468,7 @@ def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, m
     with monkeypatch.context() as patch:
         patch.setattr(study, "compare", stop)
         assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
-    monkeypatch.setattr(study, "compare", lambda *given: comparison)
+    monkeypatch.setattr(study, "compare", lambda *inputs: comparison)
     monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", stop)
     assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
     assert not [*tmp_path.iterdir()]

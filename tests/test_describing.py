@@ -197,7 +197,7 @@ def test_loose_tolerance_still_finds_the_periodic_state(rtol: float) -> None:
 def test_sampled_harmonics_converge_with_the_square_of_the_samples() -> None:
     many = np.array([1024, 4096, 16384])
     result = [describing(rigid(LAWS["lugre"]), [0.1], [100.0], 9, int(samples)) for samples in many]
-    errors = np.array([float(each["aliasing"].item()) for each in result])
+    errors = np.array([float(entry["aliasing"].item()) for entry in result])
     assert errors[-1] < 2e-5
     assert order(errors, many) == pytest.approx(2.0, abs=0.1)
     third = [item["force"].values[0, 0, 3] for item in result]

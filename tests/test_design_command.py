@@ -90,16 +90,16 @@ def found(rig: Stage, spec: Path, small: None) -> Design:
 @pytest.fixture(scope="module")
 def finished(found: Design) -> Iterator[list[str]]:
     """The command finds this design; what it tells of its progress is kept."""
-    told: list[str] = []
+    labels: list[str] = []
 
     def design(stage: Stage, spec: Spec, progress: Progress) -> Design:
         progress(0, 1, "leaf springs")
-        told.append(stage.name)
+        labels.append(stage.name)
         return found
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(method, "design", design)
-        yield told
+        yield labels
 
 
 @pytest.fixture(scope="module")
@@ -198,13 +198,13 @@ def test_the_document_has_the_agreed_keys(
     assert joint["least_static_friction_n"] == 1.0
     assert joint["highest_edge_hz"] < document["without"]["highest_edge_hz"]
     assert leaves["drive_stiffness_n_per_m"] == joint["stiffness_n_per_m"]
-    assert [each["key"] for each in leaves["requirements"]][-1] == "safety.parasitic"
-    assert all(each["excess"] <= 1 for each in leaves["requirements"])
+    assert [requirement["key"] for requirement in leaves["requirements"]][-1] == "safety.parasitic"
+    assert all(requirement["excess"] <= 1 for requirement in leaves["requirements"])
 
 
 def test_the_document_tells_front_controller_and_moves(found: Design) -> None:
     document = design_document(found)
-    asked = [each for each in document["front"] if each["beams_hz"] is not None]
+    asked = [item for item in document["front"] if item["beams_hz"] is not None]
     assert len(document["front"]) == len(found.candidates)
     assert 0 < len(asked) <= 3
     tuned = document["controller"]
@@ -232,19 +232,19 @@ def test_what_is_not_finite_is_null(found: Design) -> None:
 
 
 def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snapshots) -> None:
-    folder, said = written
-    snapshots.check("design", "run", said)
+    folder, text = written
+    snapshots.check("design", "run", text)
     snapshots.check("design", "page", Page((folder / "design.html").read_text(encoding="utf-8")).lines)
-    assert said.rstrip().endswith(f"next: friso check {folder / 'design.toml'}")
-    sentences = [line for line in said.split("\nwrote")[0].splitlines() if not line[:1].isdigit()]
+    assert text.rstrip().endswith(f"next: friso check {folder / 'design.toml'}")
+    sentences = [line for line in text.split("\nwrote")[0].splitlines() if not line[:1].isdigit()]
     assert max(map(len, sentences)) <= shutil.get_terminal_size().columns
 
 
 def test_an_isolator_that_is_not_needed_is_weighed(found: Design, snapshots: Snapshots) -> None:
     (_, first), *_ = headline(found)
-    said = isolator_step(found).sentences
-    assert any("0.3 to 0.85 N" in sentence for sentence in said)
-    snapshots.check("design", "isolator not needed", "\n".join([first, *said]))
+    text = isolator_step(found).sentences
+    assert any("0.3 to 0.85 N" in sentence for sentence in text)
+    snapshots.check("design", "isolator not needed", "\n".join([first, *text]))
 
 
 def test_an_isolator_that_is_needed_says_why(found: Design, snapshots: Snapshots) -> None:
@@ -258,10 +258,10 @@ def test_an_isolator_that_is_needed_says_why(found: Design, snapshots: Snapshots
 
 
 def test_the_joint_is_held_below_the_static_friction(found: Design, wording: Wording) -> None:
-    said = " ".join(joint_step(found).sentences)
+    text = " ".join(joint_step(found).sentences)
     allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
     for fact in ("no less than 1 N", "factor of 1.1", "error of 10%", f"{allowed:.3g} N", "stroke of 1 mm"):
-        assert fact in said
+        assert fact in text
     unknown = replace(found.edges, unknown=2)
     wording(" ".join(joint_step(replace(found, edges=unknown)).sentences))
 
@@ -280,11 +280,11 @@ def test_leaves_and_what_binds_them(found: Design, wording: Wording) -> None:
     excess = np.array([0.985, 0.2, 0.1, 0.6, 0.99])
     tight = replace(found.fitted.choice, excess=excess)
     found = replace(found, fitted=replace(found.fitted, choice=tight))
-    said = " ".join(leaves_step(found).sentences)
+    text = " ".join(leaves_step(found).sentences)
     rows = requirement_rows(found)
     for name, *_, spare in rows:
-        assert (name in said) == spare.endswith("binds")
-    assert f"{len(found.candidates)} geometries" in said
+        assert (name in text) == spare.endswith("binds")
+    assert f"{len(found.candidates)} geometries" in text
     broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
     other = replace(found, confirmed=(broken, *found.confirmed[1:]))
     wording(" ".join(leaves_step(other).sentences))
@@ -297,13 +297,13 @@ def test_leaves_and_what_binds_them(found: Design, wording: Wording) -> None:
 
 def test_the_window_of_the_crossover(found: Design) -> None:
     above, below = upper(found), lower(found)
-    assert [each.value for each in above] == sorted(each.value for each in above)
+    assert [item.value for item in above] == sorted(item.value for item in above)
     assert {48.0, stiffest(found)} <= {each.value for each in above}
     assert 1.2 * found.edges.highest in {each.value for each in below}
     assert below[0].value < found.controller.crossover <= above[0].value
-    said = " ".join(controller_step(found).sentences)
+    text = " ".join(controller_step(found).sentences)
     for bound in (*above, *below):
-        assert f"{hertz(bound.value)} ({bound.reason})" in said
+        assert f"{hertz(bound.value)} ({bound.reason})" in text
 
 
 def test_damping_that_is_worth_adding_or_not(found: Design, snapshots: Snapshots) -> None:
@@ -334,8 +334,8 @@ def test_moves_that_swing_or_take_too_long(found: Design, snapshots: Snapshots) 
     other = replace(found, verification=replace(found.verification, free=free))
     step = moves_step(other)
     assert [fact for fact in ("64 moves", "2 do not", "1 swing", "1 creep") if fact not in step.title] == []
-    said = " ".join(step.sentences)
-    assert [fact for fact in ("95 %", "1.00 s", "Not met", "1 mm") if fact not in said] == []
+    text = " ".join(step.sentences)
+    assert [fact for fact in ("95 %", "1.00 s", "Not met", "1 mm") if fact not in text] == []
     snapshots.check("design", "moves that swing", "\n".join([*step.sentences, headline(other)[-1][1]]))
     lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
     step = moves_step(replace(found, verification=replace(found.verification, free=lost)))
@@ -346,10 +346,10 @@ def test_moves_of_a_locked_joint_that_swings(found: Design, snapshots: Snapshots
     off = np.arange(64) < 20
     locked = replace(found.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
     other = replace(found, verification=replace(found.verification, locked=locked))
-    said = " ".join(moves_step(other).sentences)
-    assert [fact for fact in ("3.00 s", "95 %", "20 do not") if fact not in said] == []
+    text = " ".join(moves_step(other).sentences)
+    assert [fact for fact in ("3.00 s", "95 %", "20 do not") if fact not in text] == []
     wording(headline(other)[-1][1])
-    snapshots.check("design", "moves of a locked joint", "\n".join([said, headline(other)[-1][1]]))
+    snapshots.check("design", "moves of a locked joint", "\n".join([text, headline(other)[-1][1]]))
     never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
     assert not re.search(r"\d", settling(never))
     assert "never" in brings(replace(found, verification=replace(found.verification, locked=never)))
@@ -389,7 +389,7 @@ def test_front_with_chosen_and_failed_points(found: Design) -> None:
     broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
     other = replace(found, confirmed=(broken, *found.confirmed[1:]))
     (panel,) = _figures(other)["design_front"].panels
-    by_label = {each.label: each for each in panel.markers}
+    by_label = {marker.label: marker for marker in panel.markers}
     assert [*by_label] == ["by beams", "beams failed", "chosen, by the beam model"]
     assert by_label["beams failed"].y == pytest.approx([broken.candidate.frequency])
     assert by_label["chosen, by the beam model"].x == pytest.approx(found.fitted.choice.beams.drive[:1] / 1e3)
@@ -542,8 +542,8 @@ def test_exit_status(
     monkeypatch.setattr(method, "design", interrupt)
     bad = tmp_path / "bad.toml"
     bad.write_text(SPEC.read_text().replace("stainless 1.4310", "stainles"))
-    given = {"specification": [str(RIG), str(bad)], "interrupt": [str(RIG), str(SPEC)], "argument": [str(RIG)]}
-    monkeypatch.setattr(sys, "argv", ["friso", "design", *given[broken], "--out", str(tmp_path / "out")])
+    inputs = {"specification": [str(RIG), str(bad)], "interrupt": [str(RIG), str(SPEC)], "argument": [str(RIG)]}
+    monkeypatch.setattr(sys, "argv", ["friso", "design", *inputs[broken], "--out", str(tmp_path / "out")])
     with pytest.raises(SystemExit) as left:
         main()
     shown = capsys.readouterr()

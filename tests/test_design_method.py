@@ -155,7 +155,7 @@ def test_a_geometry_at_which_beams_fail_is_marked(
     monkeypatch.setattr(choice_module, "beams", sometimes)
     result = list(confirmed(task, candidates))
     assert {item.failure for item in result} == {"", "The beams gave up."}
-    assert all(np.isnan(each.frequency) == bool(each.failure) for each in result)
+    assert all(np.isnan(entry.frequency) == bool(entry.failure) for entry in result)
     calls.clear()
     choice = chosen(replace(task, crossover=35.0), candidates)
     assert choice is not None

@@ -187,5 +187,5 @@ def test_rounded_sizes_stay_in_the_space() -> None:
     spec = load_spec(SPEC)
     near = rounded(spec, Geometry(69.97e-3, 15.02e-3, 40.04e-3, sheets(spec)[0]), 1e-4)
     assert {round(item.length * 1e3, 3) for item in near} == {69.9, 70.0}
-    assert {round(each.width * 1e3, 3) for each in near} == {15.0, 15.1}
+    assert {round(entry.width * 1e3, 3) for entry in near} == {15.0, 15.1}
     assert len(near) == 8

@@ -42,8 +42,8 @@ def cluster() -> Iterator[LocalCluster]:
 def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster) -> None:
     with connected(cluster.scheduler_address) as crew:
         assert crew.size == 2
-        (found,) = run_in_memory([Request(rig, AXES).study()], crew)
-    xr.testing.assert_identical(found, sweep(rig, AXES))
+        (result,) = run_in_memory([Request(rig, AXES).study()], crew)
+    xr.testing.assert_identical(result, sweep(rig, AXES))
 
 
 def authority(folder: Path) -> dict[str, str]:
@@ -133,13 +133,13 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
         run_in_store(study, path, crew, 0.0, kill_after_two)
     with Store.opened(path, study) as store:
         assert list(store.missing()) == []
-        found = store.read().load()
+        stage = store.read().load()
     assert computed == sorted({*computed})  # every block was handed over once
     assert computed[-1] == study.cells
     whole = sweep(rig, AXES, rtol=1e-9)
     for name in ("outcome", "status"):
-        found[name] = found[name].astype(object)
-    xr.testing.assert_identical(found, whole)
+        stage[name] = stage[name].astype(object)
+    xr.testing.assert_identical(stage, whole)
 
 
 def test_a_worker_with_another_friso_is_refused(
@@ -210,5 +210,5 @@ def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None
     with connected(cluster.scheduler_address) as crew:
         with pytest.raises(KeyboardInterrupt):
             run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, interrupt)
-        (found,) = run_in_memory([Request(rig, AXES).study()], crew)
-    assert (found.outcome != "").all()
+        (result,) = run_in_memory([Request(rig, AXES).study()], crew)
+    assert (result.outcome != "").all()

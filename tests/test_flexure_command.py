@@ -150,21 +150,21 @@ def test_the_document_has_the_agreed_keys(path: Path, capsys: pytest.CaptureFixt
 @pytest.mark.parametrize("model", ["beams", "closed forms"])
 def test_the_document_tells_what_textbooks_and_shells_say(found: BothModels, model: str) -> None:
     document = flexure_document(found)
-    known = document if model == "beams" else document["closed_forms"]
-    assert known["model"] == model
-    assert known["drive_stiffness_n_per_m"] == pytest.approx(2540, rel=0.01)  # shells; a beam has 2362.5
-    support = known["support_stiffness_n_per_m"]
+    expected = document if model == "beams" else document["closed_forms"]
+    assert expected["model"] == model
+    assert expected["drive_stiffness_n_per_m"] == pytest.approx(2540, rel=0.01)  # shells; a beam has 2362.5
+    support = expected["support_stiffness_n_per_m"]
     assert support["x"]["zero"] == pytest.approx(96.0e6, rel=2e-3)  # shells; a rod has 94.5
     assert support["x"]["full"] == pytest.approx(84.9e6, rel=0.01)  # shells
     assert support["y"]["zero"] == pytest.approx(17.58e6, rel=5e-3)  # shells; a beam has 17.06
-    assert known["max_stress_pa"] == pytest.approx(51.8e6, rel=0.02)  # shells, at mid-width
-    assert known["clamp_stress_pa"] == pytest.approx(1.5 * known["max_stress_pa"])
-    assert known["yield_margin"] == pytest.approx(1.1e9 / known["clamp_stress_pa"])
-    assert known["shortening_m"] == pytest.approx(3 * 1e-3**2 / (5 * 0.07), rel=5e-3)
-    assert known["buckling_load_n"] == 2 * known["buckling_load_per_leaf_n"]
-    assert known["buckling_margin"] == pytest.approx(known["buckling_load_n"] / (0.5 * 9.80665))
-    assert known["eigenfrequencies_hz"][0] == pytest.approx(11.3, rel=0.01)
-    assert known["forces_n"][-1] == pytest.approx(known["drive_stiffness_n_per_m"] * 1e-3, rel=5e-3)
+    assert expected["max_stress_pa"] == pytest.approx(51.8e6, rel=0.02)  # shells, at mid-width
+    assert expected["clamp_stress_pa"] == pytest.approx(1.5 * expected["max_stress_pa"])
+    assert expected["yield_margin"] == pytest.approx(1.1e9 / expected["clamp_stress_pa"])
+    assert expected["shortening_m"] == pytest.approx(3 * 1e-3**2 / (5 * 0.07), rel=5e-3)
+    assert expected["buckling_load_n"] == 2 * expected["buckling_load_per_leaf_n"]
+    assert expected["buckling_margin"] == pytest.approx(expected["buckling_load_n"] / (0.5 * 9.80665))
+    assert expected["eigenfrequencies_hz"][0] == pytest.approx(11.3, rel=0.01)
+    assert expected["forces_n"][-1] == pytest.approx(expected["drive_stiffness_n_per_m"] * 1e-3, rel=5e-3)
 
 
 def test_modes_that_interfere_with_control_are_told_from_the_drive(found: BothModels) -> None:
@@ -196,9 +196,9 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
     assert document["failure"] in " ".join(shown.err.split())
     with pytest.raises(typer.Exit):
         command(path)
-    said = " ".join(capsys.readouterr().out.split())
-    assert document["failure"] in said
-    assert (BEAMS in said, CLOSED in said) == (False, True)
+    text = " ".join(capsys.readouterr().out.split())
+    assert document["failure"] in text
+    assert (BEAMS in text, CLOSED in text) == (False, True)
 
 
 # ---------------------------------------------------------------- what is said
@@ -217,10 +217,10 @@ def test_the_table_has_a_row_for_each_mode_by_name(found: BothModels) -> None:
 
 
 def test_a_sound_joint_has_no_warnings_and_a_largest_stroke(stage: Stage) -> None:
-    found = evaluated(of_material(stage, "stainless 1.4310"))
-    assert warnings(found) == []
-    largest = found.best.fatigue_margin  # of a stroke of 1 mm
-    assert f"{largest:.2f} mm" in " ".join(findings(found))
+    evaluation = evaluated(of_material(stage, "stainless 1.4310"))
+    assert warnings(evaluation) == []
+    largest = evaluation.best.fatigue_margin  # of a stroke of 1 mm
+    assert f"{largest:.2f} mm" in " ".join(findings(evaluation))
 
 
 @pytest.mark.parametrize(
@@ -235,16 +235,16 @@ def test_a_sound_joint_has_no_warnings_and_a_largest_stroke(stage: Stage) -> Non
 def test_what_the_leaves_do_not_bear_is_a_warning(
     stage: Stage, changes: dict[str, Any], stroke: float, warning: str
 ) -> None:
-    assert any(warning in said for said in warnings(evaluated(stage.replace(changes), stroke)))
+    assert any(warning in text for text in warnings(evaluated(stage.replace(changes), stroke)))
 
 
 def test_models_that_differ_are_a_warning(found: BothModels) -> None:
     assert not any("differ" in said for said in warnings(found))
     assert found.beams is not None
     other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
-    (said,) = (said for said in warnings(other) if "differ" in said)
-    assert "-50 %" in said
-    assert "+2" in said
+    (text,) = (said for said in warnings(other) if "differ" in said)
+    assert "-50 %" in text
+    assert "+2" in text
 
 
 def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: Stage, wording: Wording) -> None:
@@ -254,22 +254,22 @@ def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: S
         evaluated(stage.replace({**sound, **across, "flexure.sensor_y": place})) for place in ("20 mm", "-20 mm")
     )
     assert warnings(alike) == []
-    (said,) = warnings(against)
+    (texts,) = warnings(against)
     modes = [mode for mode in against.best.modes[1:] if mode.interferes and mode.actuator * mode.sensor < 0]
     assert "stage about x" in [mode.name for mode in modes]
     named = " and ".join(f"{mode.name} ({mode.frequency / 1e3:.2f} kHz)" for mode in modes)
-    assert named in said
-    assert "[parasitic]" in said
+    assert named in texts
+    assert "[parasitic]" in texts
     wording(" ".join(assumptions(against.stage)))
 
 
 def test_only_what_is_left_out_is_assumed(stage: Stage, wording: Wording) -> None:
-    given = {f"flexure.{name}_x": "30 mm" for name in ("centre", "actuation", "sensor")} | {"flexure.load": "0 N"}
+    inputs = {f"flexure.{name}_x": "30 mm" for name in ("centre", "actuation", "sensor")} | {"flexure.load": "0 N"}
     inertia = {f"flexure.inertia_{axis}": "2e-4 kg*m^2" for axis in "xyz"}
-    assert assumptions(stage.replace({**given, **inertia})) == []
-    (said,) = assumptions(stage.replace(given))
-    wording(said)
-    assert "0.5 kg" in said
+    assert assumptions(stage.replace({**inputs, **inertia})) == []
+    (texts,) = assumptions(stage.replace(inputs))
+    wording(texts)
+    assert "0.5 kg" in texts
 
 
 def test_without_a_mode_that_interferes_there_is_no_limit(found: BothModels, snapshots: Snapshots) -> None:
@@ -382,12 +382,12 @@ SHAPES = [
 @pytest.mark.parametrize("changes", SHAPES)
 @pytest.mark.parametrize("stroke", [1e-5, 1e-3, 7e-3])
 def test_the_drawing_is_xml_with_all_dimensions(stage: Stage, changes: dict[str, Any], stroke: float) -> None:
-    it = Mechanism.of(stage.replace(changes).flat())
-    svg = drawing_svg(it, stroke, title="A & B <c>", material="steel")
+    value = Mechanism.of(stage.replace(changes).flat())
+    svg = drawing_svg(value, stroke, title="A & B <c>", material="steel")
     texts = _texts(svg)
-    for dimension in (it.length, it.width, it.spacing):
+    for dimension in (value.length, value.width, value.spacing):
         assert f"{1e3 * dimension:.4g}" in texts
-    assert f"{it.leaves:g} leaves, thickness {1e3 * it.thickness:.4g}" in texts
+    assert f"{value.leaves:g} leaves, thickness {1e3 * value.thickness:.4g}" in texts
     assert f"±{1e3 * stroke:.4g} stroke, gap to the limiter" in texts
     assert {"A & B <c>", "Material: steel", "cart", "stage", "x", "y", "z"} <= set(texts)
     places = _places(svg)
@@ -408,10 +408,10 @@ def test_the_drawing_is_to_scale(stage: Stage) -> None:
 
 
 def test_the_block_of_the_stage_has_its_moments_of_inertia(stage: Stage) -> None:
-    it = Mechanism.of(stage.flat())
-    x, y, z = block_size(it)
+    value = Mechanism.of(stage.flat())
+    x, y, z = block_size(value)
     assert (x, y, z) == pytest.approx(((0.5 / 2700) ** (1 / 3),) * 3)
-    flat = replace(it, body=replace(it.body, inertia=(1e-4, 1e-4, 2e-4)))
+    flat = replace(value, body=replace(value.body, inertia=(1e-4, 1e-4, 2e-4)))
     assert block_size(flat)[2] == pytest.approx(0, abs=1e-9)
     ElementTree.fromstring(drawing_svg(flat, 1e-3))
 
@@ -492,7 +492,10 @@ def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path) -> None:
 
 
 def test_interfering_modes_are_those_of_the_evaluation(found: BothModels) -> None:
-    for it in found.models.values():
-        first = next((mode for mode in it.modes[1:] if mode.interferes), None)
-        assert first is it.interfering
-        assert [it.interferes(mode) for mode in it.modes] == [False, *(mode.interferes for mode in it.modes[1:])]
+    for model in found.models.values():
+        first = next((mode for mode in model.modes[1:] if mode.interferes), None)
+        assert first is model.interfering
+        assert [model.interferes(mode) for mode in model.modes] == [
+            False,
+            *(mode.interferes for mode in model.modes[1:]),
+        ]

@@ -44,9 +44,9 @@ def refused(table: str) -> InputError:
 
 def test_stiffness_and_parasitic_mode_follow(stage: Stage) -> None:
     flat = stage.flat()
-    it = Mechanism.of(flat)
-    frequency, share = parasitic_mode(it)
-    assert flat["joint.stiffness"] == pytest.approx(closed_forms.drive_stiffness(it), rel=1e-12)
+    value = Mechanism.of(flat)
+    frequency, share = parasitic_mode(value)
+    assert flat["joint.stiffness"] == pytest.approx(closed_forms.drive_stiffness(value), rel=1e-12)
     assert flat["joint.stiffness"] == pytest.approx(2540 * 195 / 210, rel=5e-3)
     assert flat["parasitic.frequency"] == pytest.approx(frequency, rel=1e-12)
     assert flat["parasitic.mass"] == pytest.approx(0.5 * share / (1 + share), rel=1e-12)
@@ -78,7 +78,7 @@ def test_the_plant_resonates_as_the_beams_do(stage: Stage, changes: dict[str, st
     """In the mode that stands highest, with its frequency and residue."""
     changed = stage.replace(changes)
     modes = beams(Mechanism.of(changed.flat()), 1e-3).modes[1:]
-    mode = max(modes, key=lambda each: abs(each.actuator * each.sensor) / each.frequency**2)
+    mode = max(modes, key=lambda item: abs(item.actuator * item.sensor) / item.frequency**2)
     assert mode.name == kind
     frequencies, residues = resonances(changed)
     assert frequencies[-1] == pytest.approx(mode.frequency, rel=0.05)
@@ -96,45 +96,47 @@ def test_a_mode_of_another_sign_counts_by_its_size(stage: Stage) -> None:
 
 def test_defaults_are_the_stated_ones(stage: Stage) -> None:
     """Stage: an aluminium cube at the leaf ends; actuator and sensor at its centre of mass."""
-    it = Mechanism.of(stage.flat())
+    value = Mechanism.of(stage.flat())
     edge = (0.5 / 2700) ** (1 / 3)
-    assert it.body.inertia == pytest.approx((0.5 / 6 * edge**2,) * 3, rel=1e-12)
-    assert it.body.centre == (0.07, 0.0, 0.0)
-    assert it.actuation == it.sensor == (0.07, 0.0, 0.0)
-    assert it.stress_concentration == 1.5
-    given = stage.replace(
+    assert value.body.inertia == pytest.approx((0.5 / 6 * edge**2,) * 3, rel=1e-12)
+    assert value.body.centre == (0.07, 0.0, 0.0)
+    assert value.actuation == value.sensor == (0.07, 0.0, 0.0)
+    assert value.stress_concentration == 1.5
+    changed = stage.replace(
         {"flexure.centre_z": "-5 mm", "flexure.actuation_y": "8 mm", "flexure.inertia_z": "2e-4 kg*m^2"}
     )
-    moved = Mechanism.of(given.flat())
+    moved = Mechanism.of(changed.flat())
     assert moved.body.centre == pytest.approx((0.07, 0.0, -0.005))
     assert moved.actuation == moved.sensor == pytest.approx((0.07, 0.008, -0.005))
     assert moved.body.inertia[2] == 2e-4
-    elsewhere = Mechanism.of(given.replace({"flexure.sensor_y": "-1 mm"}).flat())
+    elsewhere = Mechanism.of(changed.replace({"flexure.sensor_y": "-1 mm"}).flat())
     assert (elsewhere.actuation[1], elsewhere.sensor[1]) == pytest.approx((0.008, -0.001))
 
 
 def test_a_material_is_its_numbers(stage: Stage) -> None:
-    known = materials()["stainless 1.4310"]
-    own = {"young": known.young.text, "poisson": known.poisson, "density": known.density.text}
-    own |= {"yield": known.yield_strength.text, "fatigue": known.fatigue.text}
+    expected = materials()["stainless 1.4310"]
+    own = {"young": expected.young.text, "poisson": expected.poisson, "density": expected.density.text}
+    own |= {"yield": expected.yield_strength.text, "fatigue": expected.fatigue.text}
     written = stage.replace({"flexure.material": None, **{f"flexure.{key}": value for key, value in own.items()}})
     with_name = stage.flat()
-    assert with_name.pop("flexure.material") == known.name
+    assert with_name.pop("flexure.material") == expected.name
     assert {key: value for key, value in written.flat().items() if value != ""} == with_name
 
 
 def test_all_materials_have_sources_and_plausible_numbers() -> None:
     assert len(materials()) >= 5
-    for name, it in materials().items():
-        assert it.name == name
-        assert len(it.source) > 20
-        assert len(it.grade) > 3
-        assert 60e9 < it.young < 220e9
-        assert 0.25 < it.poisson < 0.4
-        assert 2500 < it.density < 9000
-        assert 400e6 < it.yield_strength < 1500e6
-        assert 0.2 * it.yield_strength < it.fatigue < 0.7 * it.yield_strength
-        assert 4500 < np.sqrt(it.young / it.density) < 5300 or name == "beryllium copper"  # speed of sound in metals
+    for name, material in materials().items():
+        assert material.name == name
+        assert len(material.source) > 20
+        assert len(material.grade) > 3
+        assert 60e9 < material.young < 220e9
+        assert 0.25 < material.poisson < 0.4
+        assert 2500 < material.density < 9000
+        assert 400e6 < material.yield_strength < 1500e6
+        assert 0.2 * material.yield_strength < material.fatigue < 0.7 * material.yield_strength
+        assert (
+            4500 < np.sqrt(material.young / material.density) < 5300 or name == "beryllium copper"
+        )  # speed of sound in metals
 
 
 @pytest.mark.parametrize("share", [-1.0, -0.3, 0.3, 0.6, 0.9])
@@ -156,11 +158,11 @@ def test_leaves_that_buckle(stage: Stage, refused: Refused) -> None:
 
 def test_saved_and_loaded_again(stage: Stage, tmp_path: Path) -> None:
     numbers = loads(text_with(LEAVES + NUMBERS + '\ncentre_x = "72 mm"\nfatigue = "400 MPa"'))
-    for k, each in enumerate((stage, numbers)):
+    for k, item in enumerate((stage, numbers)):
         file = tmp_path / f"{k}.toml"
-        save(each, file)
-        assert load(file).flat() == each.flat()
-        assert load(file).to_toml() == each.to_toml()
+        save(item, file)
+        assert load(file).flat() == item.flat()
+        assert load(file).to_toml() == item.to_toml()
 
 
 def test_the_same_numbers_written_as_a_joint(stage: Stage) -> None:
@@ -171,17 +173,17 @@ def test_the_same_numbers_written_as_a_joint(stage: Stage) -> None:
     joint = stage.replace({"flexure": None} | numbers)
     assert joint.flexure is None
     assert joint.flat() == {key: value for key, value in flat.items() if not key.startswith("flexure.")}
-    for name, each in stage.variants().items():
-        own = {key: value for key, value in each.flat().items() if not key.startswith("flexure.")}
+    for name, variant in stage.variants().items():
+        own = {key: value for key, value in variant.flat().items() if not key.startswith("flexure.")}
         assert joint.variants()[name].flat() == own
 
 
 def test_a_sweep_is_one_by_one(stage: Stage) -> None:
     thickness = np.array([0.2e-3, 0.35e-3, 0.5e-3, 0.9e-3])
     many = stage.flat({"flexure.thickness": thickness})
-    for k, each in enumerate(thickness):
-        alone = stage.flat({"flexure.thickness": each})
-        written = stage.replace({"flexure.thickness": f"{float(each)!r} m"}).flat()
+    for k, item in enumerate(thickness):
+        alone = stage.flat({"flexure.thickness": item})
+        written = stage.replace({"flexure.thickness": f"{float(item)!r} m"}).flat()
         for key in FOLLOWS:
             assert np.broadcast_to(many[key], thickness.shape)[k] == pytest.approx(alone[key], rel=1e-9)
             assert written[key] == pytest.approx(alone[key], rel=1e-9)
@@ -257,7 +259,7 @@ def test_unknown_material(name: str, near: str) -> None:
     assert "unknown" in error.actual
     if near:
         assert f"did you mean {near}?" in error.actual
-    assert all(each in error.expected for each in materials())
+    assert all(material in error.expected for material in materials())
 
 
 def _changed(key: str, value: str) -> str:

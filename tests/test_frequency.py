@@ -180,7 +180,7 @@ def test_scan_finds_what_exact_margins_find(rig: Stage, stage: dict, drive: dict
     scanned = scan(flat, members)
     exact = [margins(flat, members[k]) for k in range(len(members))]
     assert scanned.stable.tolist() == [item.stable for item in exact]
-    distance = np.array([each.modulus_margin for each in exact])
+    distance = np.array([entry.modulus_margin for entry in exact])
     stable = scanned.stable
     assert scanned.distance[stable] == pytest.approx(distance[stable], rel=0.03)
     assert scanned.distance[scanned.worst(stable)] == pytest.approx(np.nanmin(distance), rel=1e-6)

@@ -58,8 +58,8 @@ def free_rig() -> Stage:
 
 
 def multiplier(flat: dict[str, Any]) -> float:
-    (found,) = hunting_cycles(Ensemble.held(flat, 1)).multiplier
-    return float(found)
+    (result,) = hunting_cycles(Ensemble.held(flat, 1)).multiplier
+    return float(result)
 
 
 UNSCALED, SCALED = GroupScale(1.7, 1e5, 3.0), GroupScale(30.0, 2e7, 11.0)
@@ -148,11 +148,11 @@ def edge_of(chosen: Stage, low: float, high: float, points: int) -> Edges:
 @RIGID
 def test_edge_of_the_rigid_mass() -> None:
     """9.77 Hz (references.md), where it flips; and what is said where the grid does not hold it."""
-    found = edge_of(rigid(), 5, 20, 6)
-    assert found.crossover[0] == pytest.approx(9.770, abs=2e-3)
-    assert found.kind[0] == FLIP
-    assert -1 < found.inside[0] < -0.99
-    assert -1.01 < found.outside[0] < -1
+    edge = edge_of(rigid(), 5, 20, 6)
+    assert edge.crossover[0] == pytest.approx(9.770, abs=2e-3)
+    assert edge.kind[0] == FLIP
+    assert -1 < edge.inside[0] < -0.99
+    assert -1.01 < edge.outside[0] < -1
     assert edge_of(rigid(), 3, 8, 3).kind[0] == ABOVE
     assert edge_of(rigid(), 18, 30, 3).kind[0] == BELOW
     assert not edge_of(rigid(), 18, 30, 3).located[0]
@@ -161,17 +161,19 @@ def test_edge_of_the_rigid_mass() -> None:
 @FREE_RIG
 def test_edge_of_the_free_rig() -> None:
     """5.60 Hz (docs/hunting.md); 0.05 for the limiter that chatters."""
-    found = edge_of(free_rig(), 4, 9, 5)
-    assert found.crossover[0] == pytest.approx(5.60, abs=0.05)
+    edge = edge_of(free_rig(), 4, 9, 5)
+    assert edge.crossover[0] == pytest.approx(5.60, abs=0.05)
 
 
 @RIGID
 def test_simulation_agrees_where_hunting_ends() -> None:
     """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz."""
     flat = rigid().flat()
-    found, known = swings_from_any_distance(Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2))
-    assert found.tolist() == [True, False]
-    assert known.all()
+    swinging, expected = swings_from_any_distance(
+        Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2)
+    )
+    assert swinging.tolist() == [True, False]
+    assert expected.all()
 
 
 def sample(*values: float) -> dict[str, np.ndarray]:
@@ -207,7 +209,7 @@ def test_simulation_sees_small_cycles() -> None:
     cycles = hunting_cycles(stages)
     assert cycles.attracting[0]
     assert 0.005 < cycles.amplitude[0] / stages.length[0] < 0.05
-    assert [each[0] for each in swings_from_any_distance(stages)] == [True, True]
+    assert [item[0] for item in swings_from_any_distance(stages)] == [True, True]
 
 
 @RIGID
@@ -216,26 +218,26 @@ def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPat
         return np.zeros(stages.count, bool), np.arange(stages.count) > 0
 
     monkeypatch.setattr(persistence, "still_swings", failing)
-    assert [each.tolist() for each in swings_from_any_distance(at(JUMPS, 0.1))] == [[False], [False]]
-    found = swept(FAR_FLIP)
-    assert found.kind[0] == UNKNOWN
-    assert not found.located[0]
+    assert [item.tolist() for item in swings_from_any_distance(at(JUMPS, 0.1))] == [[False], [False]]
+    runs = swept(FAR_FLIP)
+    assert runs.kind[0] == UNKNOWN
+    assert not runs.located[0]
 
 
 @RIGID
 def test_edge_stays_where_simulations_settle_above() -> None:
     """A cycle that repels far above does not tell of the edge."""
-    found = swept(FAR_FLIP)
-    assert found.kind[0] == LOST
-    assert found.crossover[0] == pytest.approx(0.0985, abs=3e-4)
+    runs = swept(FAR_FLIP)
+    assert runs.kind[0] == LOST
+    assert runs.crossover[0] == pytest.approx(0.0985, abs=3e-4)
 
 
 @RIGID
 def test_jump_is_told_apart_and_followed() -> None:
-    found = swept(JUMPS)
-    assert found.kind[0] == JUMP
-    assert found.crossover[0] == pytest.approx(0.0740, abs=2e-4)
-    assert (found.inside[0] > -0.9) or (found.outside[0] < -1.1)
+    runs = swept(JUMPS)
+    assert runs.kind[0] == JUMP
+    assert runs.crossover[0] == pytest.approx(0.0740, abs=2e-4)
+    assert (runs.inside[0] > -0.9) or (runs.outside[0] < -1.1)
     followed = swept(FOLLOWED)
     assert followed.kind[0] == JUMP
     assert 0.0775 < followed.crossover[0] < 0.083
@@ -298,11 +300,11 @@ def studied(edge: Any, kind: str = FLIP) -> worked.Worked:
     """Worked steps of invented computed edges: `edge` gives that of the flat keys of the rig."""
     flat = plain("joint")
     studies = {
-        name: tuple(worked.ThesisCase(each, 9.0, edge(name, flat | dict(each)), kind) for each in changes)
+        name: tuple(worked.ThesisCase(change, 9.0, edge(name, flat | dict(change)), kind) for change in changes)
         for name, (changes, _) in worked._studies().items()  # pyright: ignore[reportPrivateUsage]
     }
     friction = tuple(
-        worked.ThesisCase(each, 9.0, edge("friction", flat | each), kind) for each in worked.friction_range()
+        worked.ThesisCase(item, 9.0, edge("friction", flat | item), kind) for item in worked.friction_range()
     )
     machines = tuple(worked.WorkedMachine(name, 9.0, value) for name, value in (("", 9.8), ("", 9.7), ("", 5.4)))
     return worked.Worked({}, machines, friction, 13.0, 1.1, (), (), studies)
@@ -324,11 +326,11 @@ def as_claimed(name: str, flat: dict[str, Any]) -> float:
 
 def test_claims_hold_differ_or_are_unknown() -> None:
     holds = claims(studied(as_claimed))
-    assert [each.judgement for each in holds] == ["holds"] * 6
+    assert [hold.judgement for hold in holds] == ["holds"] * 6
     differs = claims(studied(lambda name, flat: 30.0 if name in ("share", "friction") else as_claimed(name, flat)))
-    assert [each.judgement for each in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
+    assert [differ.judgement for differ in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
     lost = claims(studied(lambda name, flat: np.nan, UNKNOWN))
-    assert {each.judgement for each in lost} == {"unknown"}
+    assert {item.judgement for item in lost} == {"unknown"}
     assert all("unknown" in each.result for each in lost)
 
 
@@ -350,8 +352,8 @@ def test_least_gap_that_hunts(static: float, low: float, high: float) -> None:
     """Found, above all that were tried, and below all."""
     gaps = static * np.linspace(0.1, 0.85, 11)
     cases = [worked.ThesisCase({"friction.static": static, "friction.coulomb": static - g}, 9.0, 8 * g) for g in gaps]
-    found = least_gap(cases, static)
-    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-6)
+    result = least_gap(cases, static)
+    assert (result.low, result.high) == pytest.approx((low, high), rel=1e-6)
 
 
 def test_range_of_crossovers_is_that_about_the_own_one() -> None:
@@ -395,9 +397,11 @@ def shown(laws: Any, safe_locked: float, safe_free: float) -> worked.Worked:
     patch = pytest.MonkeyPatch()
 
     def by_law(laws: Any, changes: Any, free: bool) -> list[worked.ThesisCase]:
-        own = [plain("joint") | {k: v for k, v in each.items() if not k.startswith("parasitic")} for each in changes]
+        own = [
+            plain("joint") | {k: v for k, v in change.items() if not k.startswith("parasitic")} for change in changes
+        ]
         edges = [float((laws.free_edge if free else laws.locked_edge)(flat)[0]) for flat in own]
-        return [worked.ThesisCase(each, edge, edge) for each, edge in zip(changes, edges, strict=True)]
+        return [worked.ThesisCase(change, edge, edge) for change, edge in zip(changes, edges, strict=True)]
 
     patch.setattr(worked, "cases", by_law)
     patch.setattr(worked, "direct", lambda stage: 9.77)
@@ -419,7 +423,7 @@ def test_guideline_counts_what_it_leaves_out(quick: compute.Guideline) -> None:
 def test_parasitic_rows_say_what_the_page_says_of_them(quick: compute.Guideline) -> None:
     """At 300 Hz: damped a little it does no harm with the joint locked; hardly damped it has to be 15 times above."""
     damped, light = quick.parasitic
-    assert [(each.frequency, each.damping_ratio) for each in (damped, light)] == [(300, 0.01), (300, 0.001)]
+    assert [(item.frequency, item.damping_ratio) for item in (damped, light)] == [(300, 0.01), (300, 0.001)]
     assert damped.locked is not None
     assert damped.locked[1] == pytest.approx(69.9, rel=0.01)
     assert damped.free == pytest.approx((3.82, 14.2), rel=0.01)
@@ -443,7 +447,7 @@ def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path, 
     table = files["guideline_edges.csv"].read_text().splitlines()
     assert table[0].endswith("locked edge,edge,law,kind,multiplier inside,outside,windows")
     assert {line.count(",") for line in table} == {table[0].count(",")}
-    assert len(table) == 1 + sum(len(each.sweep.edge) for each in (quick.locked, quick.free))
+    assert len(table) == 1 + sum(len(item.sweep.edge) for item in (quick.locked, quick.free))
     document = json.loads(json.dumps(guideline_document(quick), allow_nan=False))
     assert document["laws"]["locked"]["rates"]["slip"]["factor"] == pytest.approx(1.5, rel=1e-3)
     assert document["laws"]["free"]["edges_of"].startswith("the symmetric cycle")

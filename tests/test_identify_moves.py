@@ -147,7 +147,7 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     assert inputs is not None
     exact = replace(inputs, target=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
     names = [item.name for item in inputs.parameters]
-    core = tuple(i for i, each in enumerate(inputs.parameters) if each.core)
+    core = tuple(i for i, entry in enumerate(inputs.parameters) if entry.core)
     kept = {"static friction ratio": flat["friction.static"] / flat["friction.coulomb"]}
     first = first_values(inputs.parameters)
     for i, parameter in enumerate(inputs.parameters):

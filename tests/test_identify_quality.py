@@ -128,8 +128,8 @@ def test_digits_count_as_noise() -> None:
 def test_a_stage_explains_what_its_own_inverse_model_does() -> None:
     log = axis()
     inverse = inverse_model(log, 5.0)
-    known = {"masses.cart": MASS, "friction.viscous": VISCOUS, "bias.cart": -OFFSET}
-    flat = {**made_up(log, inverse).flat(), **known, "friction.coulomb": COULOMB, "friction.static": COULOMB}
+    expected = {"masses.cart": MASS, "friction.viscous": VISCOUS, "bias.cart": -OFFSET}
+    flat = {**made_up(log, inverse).flat(), **expected, "friction.coulomb": COULOMB, "friction.static": COULOMB}
     assert whole_error(flat, inverse) == pytest.approx(inverse.error, rel=0.3)
     assert whole_error({**flat, "friction.coulomb": 2 * COULOMB}, inverse) > 5 * inverse.error
     assert whole_error({**flat, "friction.static": 30.0, "friction.stribeck_velocity": 1e-6}, inverse) < 0.1

@@ -368,7 +368,7 @@ def test_a_noisy_open_loop_crosses_once() -> None:
         passed.append(np.count_nonzero(np.diff(np.abs(loop.response) > 1)))
         result.append(crossovers(loop))
     assert np.mean(passed) > 1.5
-    assert [len(each) for each in result].count(1) >= 38
+    assert [len(entry) for entry in result].count(1) >= 38
     assert sum(item[0].holds(truth) for item in result) >= 36
 
 

@@ -51,8 +51,8 @@ def function_of(command: str) -> Any:
 def test_a_command_has_a_function_and_its_options_are_keywords(command: str) -> None:
     keywords = {name.strip("_") for name in inspect.signature(function_of(command)).parameters}
     options = {option for parameter in commands()[command].params for option in parameter.opts if option[:2] == "--"}
-    known = OF_THE_SHELL | {option for name, option in OTHERWISE if name == command}
-    missing = {option for option in options - known if option[2:].replace("-", "_") not in keywords}
+    expected = OF_THE_SHELL | {option for name, option in OTHERWISE if name == command}
+    missing = {option for option in options - expected if option[2:].replace("-", "_") not in keywords}
     assert missing == set()
 
 

@@ -230,8 +230,8 @@ def test_headings() -> None:
 def test_a_counter_that_overflows_is_unwrapped(bits: int, start: int, turns: int) -> None:
     size = 2**bits
     true = start + np.cumsum(np.full(200 * turns, size // 60 + 1))
-    values, found = unwrapped((true % size).astype(float))
-    assert found == bits
+    values, result = unwrapped((true % size).astype(float))
+    assert result == bits
     assert np.diff(values) == pytest.approx(np.diff(true))
 
 
@@ -252,7 +252,7 @@ def test_the_log_tells_of_the_counter(tmp_path: Path, wording: Wording) -> None:
 
 def test_gaps_split_and_are_not_bridged(tmp_path: Path) -> None:
     keep = np.r_[0:700, 760:2000]
-    log = log_of(tmp_path, NAMES, [each[keep] for each in columns()])
+    log = log_of(tmp_path, NAMES, [column[keep] for column in columns()])
     assert log.segments == (slice(0, 700), slice(700, 1940))
     assert log["position"] == pytest.approx(M["position"][keep])
     assert log.time == pytest.approx(M["time"][keep])
@@ -265,7 +265,7 @@ def test_nan_splits_and_is_counted(tmp_path: Path, wording: Wording) -> None:
     log = log_of(tmp_path, NAMES, values)
     assert log.segments == (slice(0, 500), slice(500, 1997))
     wording("\n".join(log.read))
-    assert all(np.isfinite(each).all() for each in log.signals.values())
+    assert all(np.isfinite(signal).all() for signal in log.signals.values())
     values[3][100:1400] = np.nan
     assert "1300 of 2000" in message(tmp_path, NAMES, values)
 
@@ -281,7 +281,7 @@ def test_decreasing_time(tmp_path: Path, wording: Wording) -> None:
 
 def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path, wording: Wording) -> None:
     again = np.sort(np.r_[0:2000, 300, 301])
-    log = log_of(tmp_path, NAMES, [each[again] for each in columns()])
+    log = log_of(tmp_path, NAMES, [column[again] for column in columns()])
     assert log.time.size == 2000
     wording("\n".join(log.read))
     text = message(tmp_path, NAMES, [np.round(M["time"], 2), *columns()[1:]])
@@ -309,7 +309,7 @@ def test_constant_signals(tmp_path: Path, column: int, said: str) -> None:
 
 
 def test_too_short(tmp_path: Path) -> None:
-    assert "30 samples" in message(tmp_path, NAMES, [each[:30] for each in columns()])
+    assert "30 samples" in message(tmp_path, NAMES, [column[:30] for column in columns()])
 
 
 def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
@@ -317,8 +317,8 @@ def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
     limit = 0.6 * np.abs(values[3]).max()
     share = np.mean(np.abs(values[3]) >= limit)
     log = log_of(tmp_path, NAMES, [*values[:3], np.clip(values[3], -limit, limit)])
-    found = next(line for line in log.warnings if "saturated" in line)
-    assert float(found.split()[1].rstrip("%")) / 100 == pytest.approx(share, rel=0.05)
+    item = next(line for line in log.warnings if "saturated" in line)
+    assert float(item.split()[1].rstrip("%")) / 100 == pytest.approx(share, rel=0.05)
     assert clipped_share(values[3]) == 0
 
 
@@ -366,9 +366,9 @@ def test_friction_is_no_delay(tmp_path: Path) -> None:
     force = M["force"] + 80 * M["velocity"] + 5 * np.sign(M["velocity"])
     assert not told(log_of(tmp_path, NAMES, [*columns()[:3], force]).warnings, "come after")
     late = np.r_[np.zeros(4), force[:-4]]
-    found = [line for line in log_of(tmp_path, NAMES, [*columns()[:3], late]).warnings if "come after" in line]
-    assert len(found) == 1
-    start, _, rest = found[0].partition(" by ")
+    result = [line for line in log_of(tmp_path, NAMES, [*columns()[:3], late]).warnings if "come after" in line]
+    assert len(result) == 1
+    start, _, rest = result[0].partition(" by ")
     assert start == "the force seems to come after motion"
     assert float(rest.split()[0]) == pytest.approx(4, abs=0.1)
 

@@ -36,8 +36,8 @@ def test_processes_of_its_own_verify_too_and_open_no_port(rig: Stage) -> None:
         assert not [connection for connection in own if connection.status == psutil.CONN_LISTEN]
 
     with processes(2) as crew:
-        (found,) = run_in_memory([Request(rig, AXES).study()], crew, 0.05, look)
-    xr.testing.assert_identical(found, sweep(rig, AXES, verify=0.05))
+        (result,) = run_in_memory([Request(rig, AXES).study()], crew, 0.05, look)
+    xr.testing.assert_identical(result, sweep(rig, AXES, verify=0.05))
     assert seen
     assert not [process for process in seen if process.is_running() and "spawn_main" in str(process.cmdline())]
 

@@ -91,7 +91,7 @@ def few_variants() -> Iterator[None]:
     """The linear analysis of each variant takes longer than all its maps, and the rig as built longer than both: its
     evidence is made up here. That all variants are stages is tried beside."""
     made = {LOOPS_BUILT: loops(), MOVES: moves((HUNTS, 0, 0, 0)), GRID: grid(1, 1, 0), ON_RAILS: rail_cycles()}
-    runs = {name: lambda stage, it=it: it for name, it in {**made, STANDSTILL: standstill()}.items()}
+    runs = {name: lambda stage, it=item: it for name, item in {**made, STANDSTILL: standstill()}.items()}
     reproducing = import_module("friso.studies.thesis.reproduce")
     experiments._experiment.cache_clear()  # what is made up is kept like any evidence, here and after this file
     with patched({reproducing: {"OPEN": FEW}, experiments: {"_RUNS": {**_RUNS, **runs}}}):
@@ -151,8 +151,8 @@ def test_every_claim_is_in_the_table() -> None:
 def test_what_simulation_alone_decides_has_a_judge() -> None:
     needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B"}
     assert needed | LINEAR | LEAVES | RULES | IDENTIFIED | BUILT == registered().keys()
-    known = STUDIES.keys() | {"locked", WIDE, NARROW} | NEEDS.keys() | EXPERIMENTS.keys()
-    assert all(entry.needs <= known for entry in registered().values())
+    expected = STUDIES.keys() | {"locked", WIDE, NARROW} | NEEDS.keys() | EXPERIMENTS.keys()
+    assert all(entry.needs <= expected for entry in registered().values())
 
 
 @pytest.mark.parametrize("variant", [*OPEN, *METHOD], ids=lambda v: f"{v.parameter} {v.value}")
@@ -339,11 +339,11 @@ def test_every_judge_of_maps_is_tried_both_ways() -> None:
 
 
 def finding(*holds: bool) -> Finding:
-    return Finding(tuple(Part(f"criterion {i}", each, f"number {i}") for i, each in enumerate(holds)))
+    return Finding(tuple(Part(f"criterion {i}", hold, f"number {i}") for i, hold in enumerate(holds)))
 
 
 def test_judgements_of_parts() -> None:
-    assert [finding(*each).judgement for each in ((True, True), (True, False), (False, False))] == [
+    assert [finding(*item).judgement for item in ((True, True), (True, False), (False, False))] == [
         "holds",
         "holds in part",
         "differs",
@@ -352,17 +352,17 @@ def test_judgements_of_parts() -> None:
 
 def test_what_a_judgement_depends_on() -> None:
     claim = claims()[0]
-    found = verdict(
+    judgement = verdict(
         claim,
         "5",
         finding(True, False),
         finding(True, False),
         [(OPEN[0], finding(True, True)), (OPEN[1], finding(True, False)), (METHOD[0], finding(True, False))],
     )
-    assert [str(each) for each in found.depends_on] == ["alpha 0.2: holds (number 1)"]
-    assert "unknown parameter (holds with alpha 0.2)" in found.reason
+    assert [str(item) for item in judgement.depends_on] == ["alpha 0.2: holds (number 1)"]
+    assert "unknown parameter (holds with alpha 0.2)" in judgement.reason
     varied = "Parameters left open by the thesis, varied one at a time "
-    assert found.dependence == f"{varied}(2 values): the judgement changes with alpha (0.2: holds)."
+    assert judgement.dependence == f"{varied}(2 values): the judgement changes with alpha (0.2: holds)."
     untouched = verdict(claim, "5", finding(True), finding(True), [(OPEN[0], finding(True))])
     assert untouched.dependence == f"{varied}(1 values): no judgement changes."
     assert verdict(claim, "5", finding(True), finding(True), []).dependence.startswith("No open parameter")
@@ -371,9 +371,9 @@ def test_what_a_judgement_depends_on() -> None:
 def test_a_variant_is_compared_with_the_baseline_alone() -> None:
     """What turns against the coarse grid alone, back to the baseline's, is none; what turns to the coarse one's is."""
     full, coarse = finding(False), finding(True)
-    found = verdict(claims()[0], "5", full, coarse, [(OPEN[0], finding(False)), (OPEN[1], finding(True))])
-    assert [each.variant for each in found.depends_on] == [OPEN[1]]
-    assert "every second value of each axis: holds" in found.reason
+    judgement = verdict(claims()[0], "5", full, coarse, [(OPEN[0], finding(False)), (OPEN[1], finding(True))])
+    assert [item.variant for item in judgement.depends_on] == [OPEN[1]]
+    assert "every second value of each axis: holds" in judgement.reason
 
 
 def test_the_coarser_grid_is_part_of_the_full_one() -> None:
@@ -388,8 +388,8 @@ def test_the_coarser_grid_is_part_of_the_full_one() -> None:
 def test_values_that_do_not_enter_are_not_counted(small: Reproduction) -> None:
     needs = {claim: entry.needs for claim, entry in registered().items()}
     tried = {claim: sum(_enters(variant, own) for variant in OPEN) for claim, own in needs.items()}
-    told = {each.claim.id: each.tried for each in small.verdicts if each.finding}
-    assert told == {claim: sum(_enters(variant, needs[claim]) for variant in FEW) for claim in told}
+    labels = {item.claim.id: item.tried for item in small.verdicts if item.finding}
+    assert labels == {claim: sum(_enters(variant, needs[claim]) for variant in FEW) for claim in labels}
     alpha_and_beta = 4
     own_path, own_joint = 3, 2
     assert tried["E1"] == tried["F7"] == len(OPEN) - alpha_and_beta - own_path
@@ -408,20 +408,20 @@ def test_values_that_do_not_enter_are_not_counted(small: Reproduction) -> None:
 
 
 def test_zero_rows_have_their_meaning() -> None:
-    found = reproduce(["path", "friction", "isolator-stiffness"], points=3, with_cycles=False).maps
-    still = found["path"]
+    result = reproduce(["path", "friction", "isolator-stiffness"], points=3, with_cycles=False).maps
+    still = result["path"]
     for key in ("motion.acceleration", "motion.acceleration_time"):
         assert still[key].values[0] == 0
         assert set(still.outcome.sel({key: 0.0}).values) == {"rests"}
         assert (still.largest_force.sel({key: 0.0}) == 0).all()
-    friction = found["friction"]
+    friction = result["friction"]
     for key in ("friction.static", "friction.coulomb"):
         assert set(friction.outcome.sel({key: 0.0}).values) == {"invalid"}
     assert all(
         "friction." in text for text in friction.status.where(friction.outcome == "invalid", "friction.").values.flat
     )
     assert np.isnan(friction.peaks.sel({"friction.coulomb": 0.0})).all()
-    none = found["isolator-stiffness"].sel({"joint.stroke": 0.0})
+    none = result["isolator-stiffness"].sel({"joint.stroke": 0.0})
     assert none.keeps_moving.all()
     assert set(none.outcome.values) == {"swings"}
 
@@ -442,10 +442,12 @@ def test_lasting_hunting() -> None:
 
 def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     steps: list[tuple[int, int, str]] = []
-    found = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
-    judged = {each.claim.id for each in found.verdicts if each.finding}
+    reproduction = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
+    judged = {item.claim.id for item in reproduction.verdicts if item.finding}
     assert judged == {"F5", "F12B", "F13"} | LINEAR | LEAVES | IDENTIFIED | BUILT
-    assert {each.reason for each in found.verdicts if each.claim.id == "F11A"} == {"not computed in this run: path"}
+    assert {each.reason for each in reproduction.verdicts if each.claim.id == "F11A"} == {
+        "not computed in this run: path"
+    }
     assert [step[0] for step in steps] == list(range(len(steps)))
     assert steps[-1][0] <= steps[-1][1] <= len(steps)
 
@@ -519,7 +521,7 @@ def test_a_count_unknown_at_both_tolerances_does_not_differ(small: Reproduction)
 
 
 def test_titles_say_what_is_drawn_whatever_was_found(small: Reproduction) -> None:
-    still = {name: Response(cell(0, 0.0, np.nan).cell, each.trace) for name, each in small.responses.items()}
+    still = {name: Response(cell(0, 0.0, np.nan).cell, response.trace) for name, response in small.responses.items()}
     for number, figure in reproduction_figures(replace(small, responses=still)).items():
         assert "hunt" not in figure.title, number
         assert "symmetric" not in figure.caption, number
@@ -537,12 +539,12 @@ def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction, monkeypatc
 
         with pytest.raises(ValueError, match="one already"):
             judges("F28", figure="28")
-        found = reproduce([], points=3)
+        reproduction = reproduce([], points=3)
     finally:
         _JUDGES.pop("F28", None)
-    (entry,) = (each for each in reproduce_document(found)["claims"] if each["id"] == "F28")
+    (entry,) = (claim for claim in reproduce_document(reproduction)["claims"] if claim["id"] == "F28")
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
-    page = reproduce_html(replace(small, verdicts=found.verdicts))
+    page = reproduce_html(replace(small, verdicts=reproduction.verdicts))
     assert "Figure 28" in page
     assert "&lt;b&gt;criterion&lt;/b&gt; &amp; more" in page
     assert "<script>alert(1)" not in page
@@ -560,13 +562,13 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     cells compared add up; the page shows curve and table."""
     study = STUDIES["system"]
     with patched({import_module("friso.studies.thesis.cycles"): {"NODES": 5}}):
-        found = cycles(study, small.maps["system"])
-    counted = found.comparison
+        cycles_ = cycles(study, small.maps["system"])
+    counted = cycles_.comparison
     assert counted.cells == 9
     assert counted.both + counted.neither + counted.counted_only + counted.attracted_only + counted.unknown == 9
     near = [
         (x, y)
-        for edge in found.edges
+        for edge in cycles_.edges
         if edge.kind == "flip" and edge.symmetric
         for x, y in zip(edge.x, edge.y, strict=True)
         if 1.2 < y < 2.2
@@ -575,7 +577,7 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     edge = margin(study.stage(), attracting=True)
     assert edge is not None
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
-    shown = replace(small, cycles={"system": found})
+    shown = replace(small, cycles={"system": cycles_})
     assert "Peaks counted, but no cycle attracts" in reproduce_html(shown)
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}

@@ -37,7 +37,7 @@ def spectrum(*points: tuple[float, float]) -> Floor:
     frequency, density = zip(*points, strict=True)
     return Floor(
         frequency=[f"{item!r} Hz" for item in frequency],  # pyright: ignore[reportArgumentType]
-        acceleration=[f"{each!r} m/s^2/Hz^0.5" for each in density],  # pyright: ignore[reportArgumentType]
+        acceleration=[f"{entry!r} m/s^2/Hz^0.5" for entry in density],  # pyright: ignore[reportArgumentType]
     )
 
 

@@ -87,15 +87,15 @@ def killed_and_resumed(folder: Path, *options: str) -> tuple[xr.Dataset, int]:
 
 
 def test_a_study_killed_several_times_is_as_if_it_never_was(rig: Stage, tmp_path: Path) -> None:
-    found, kills = killed_and_resumed(tmp_path)
+    resumed, kills = killed_and_resumed(tmp_path)
     assert kills >= 2
-    same(found, sweep(rig, AXES, rtol=1e-9))
+    same(resumed, sweep(rig, AXES, rtol=1e-9))
 
 
 def test_a_refined_study_too(rig: Stage, tmp_path: Path) -> None:
-    found, kills = killed_and_resumed(tmp_path, "--refine")
+    resumed, kills = killed_and_resumed(tmp_path, "--refine")
     assert kills >= 2
-    same(found, sweep(rig, AXES, rtol=1e-9, refine=True))
+    same(resumed, sweep(rig, AXES, rtol=1e-9, refine=True))
     assert not (tmp_path / "killed.zarr" / ".answers").exists()
 
 

@@ -33,8 +33,8 @@ pytestmark = pytest.mark.xdist_group("rig")
 
 def judged(stage: Stage, found: Measures) -> str:
     """The verdict of a check; of a stage whose motion ends in its cycle without what a check tells of that besides."""
-    known = hunting(stage)
-    if known.target and ends_in(stage.flat(), 1, known.target)[0][0]:
+    expected = hunting(stage)
+    if expected.target and ends_in(stage.flat(), 1, expected.target)[0][0]:
         return "hunts"
     return judge(stage, found, 1e-6).verdict
 
@@ -269,8 +269,8 @@ def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> N
     cycle = friso.check(locked)["given"].judgement.cycle
     assert cycle is not None
     alone = (cycle.multiplier, cycle.amplitude, cycle.period)
-    found = [runs[name].values[1, 0] for name in ("multiplier", "amplitude", "cycle_period")]
-    assert found == pytest.approx(alone, rel=1e-9)
+    result = [runs[name].values[1, 0] for name in ("multiplier", "amplitude", "cycle_period")]
+    assert result == pytest.approx(alone, rel=1e-9)
     assert runs.multiplier.attrs["units"] == "1"
     assert "multiplier" not in sweep(locked, {"controller.crossover": ["8 Hz"]})
 

@@ -254,10 +254,10 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
 
 def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
     """All motions shrink with it, so that no small share of it ends them."""
-    found = feeding(backlash_alone)
-    assert found is not None
-    assert (found.friction, found.backlash.needed, found.backlash.gone) == (None, True, 0.0)
-    (sentence,) = feeding_sentences(found)
+    result = feeding(backlash_alone)
+    assert result is not None
+    assert (result.friction, result.backlash.needed, result.backlash.gone) == (None, True, 0.0)
+    (sentence,) = feeding_sentences(result)
     assert sentence.startswith("The backlash feeds it")
 
 
@@ -266,8 +266,8 @@ def test_what_feeds_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(hunting_feeding, "SHARES", np.array([0.001]))
     keys = {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2}
     little = {**LUGRE, "static": "3 N", "coulomb": "2 N"}
-    found = feeding(machine(transmission=BELT, friction=little, motor_friction=None, controller=keys))
-    assert found == Feeding(Decline(0.001, None, True), Decline(1.0, 0.001, True))
+    result = feeding(machine(transmission=BELT, friction=little, motor_friction=None, controller=keys))
+    assert result == Feeding(Decline(0.001, None, True), Decline(1.0, 0.001, True))
 
 
 def test_what_feeds_it_is_told() -> None:
@@ -315,8 +315,8 @@ def test_bode_across_a_transmission() -> None:
 
 
 def test_what_bode_says_of_a_backlash() -> None:
-    said = " ".join(caveats(SimpleNamespace(stage=machine(), limits={})))  # type: ignore[arg-type]
-    assert "one flank" in said
+    text = " ".join(caveats(SimpleNamespace(stage=machine(), limits={})))  # type: ignore[arg-type]
+    assert "one flank" in text
     without = machine(transmission={**SCREW, "backlash": "0 um"})
     assert not caveats(SimpleNamespace(stage=without, limits={}))  # type: ignore[arg-type]
 

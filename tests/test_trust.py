@@ -157,12 +157,12 @@ def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:
     assert study.axes[0].values[::FINER] == pytest.approx(np.linspace(1, 40, 41))
     x, y = np.meshgrid(np.linspace(0, 1, 161), np.linspace(0, 1, 161), indexing="ij")
     hunts = (x - 0.3) ** 2 + (y - 0.4) ** 2 < 0.06 + 0.02 * np.sin(9 * x)
-    found, count = asked(study, np.where(hunts, "swings", "rests"))
+    result, count = asked(study, np.where(hunts, "swings", "rests"))
     assert count <= SHARE * study.cells
-    assert np.array_equal(found["outcome"].reshape(study.shape) == "swings", hunts)
-    guessed = np.char.startswith(found["status"].astype(str), "inferred")
+    assert np.array_equal(result["outcome"].reshape(study.shape) == "swings", hunts)
+    guessed = np.char.startswith(result["status"].astype(str), "inferred")
     assert guessed.sum() == study.cells - count
-    assert np.isnan(found["peaks"][guessed]).all()
+    assert np.isnan(result["peaks"][guessed]).all()
 
 
 def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:

@@ -139,16 +139,16 @@ def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal) -> None:
 
 def test_the_answer_does_not_hunt(tuning: Advice) -> None:
     """By what friso check says of it and the edge that it locates, a fifth of the bandwidth away at least."""
-    (found,) = tuning.working
-    case = found.case
-    assert found.stage is not None
+    (result,) = tuning.working
+    case = result.case
+    assert result.stage is not None
     assert case is not None
-    assert case.stage == found.stage
+    assert case.stage == result.stage
     edge = case.judgement.margin
     assert (case.verdict, case.judgement.hunting.certain) == ("settles", True)
     assert edge is not None
     assert edge.factor * tuning.goal.distance < 1
-    assert settled_margin(found.stage.flat()) >= tuning.goal.margin
+    assert settled_margin(result.stage.flat()) >= tuning.goal.margin
 
 
 def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Advice) -> None:
@@ -197,7 +197,7 @@ def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning:
 
 def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None:
     assert tuning.interrupted
-    assert [found.sure for found in tuning.answers] == ["works", "unsure"]
+    assert [result.sure for result in tuning.answers] == ["works", "unsure"]
     wording(answer(tuning)[0])
 
 

@@ -42,10 +42,10 @@ def test_centre_and_interval(rig: Stage, text: str, centre: float, low: float, h
     """The float is the centre, exactly; a normal distribution may reach beyond the bound of its key."""
     stage = uncertain(rig, coulomb=text)
     assert stage.flat()[COULOMB] == centre
-    (found,) = stage.uncertain().items()
-    assert found[0] == COULOMB
-    assert (found[1].low, found[1].high) == pytest.approx((low, high), rel=1e-12)
-    assert (found[1].form, found[1].text) == (form, text)
+    (result,) = stage.uncertain().items()
+    assert result[0] == COULOMB
+    assert (result[1].low, result[1].high) == pytest.approx((low, high), rel=1e-12)
+    assert (result[1].form, result[1].text) == (form, text)
 
 
 def test_a_plain_stage_is_not_uncertain(rig: Stage) -> None:
@@ -55,10 +55,10 @@ def test_a_plain_stage_is_not_uncertain(rig: Stage) -> None:
 
 def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
     """All keys that the rig gives, dimensionless ones as a text."""
-    given, known = rig.as_written(), numeric_keys(rig.flat())
-    keys = [key for key in known if key.split(".")[1] in given.get(key.split(".")[0], {})]
+    inputs, expected = rig.as_written(), numeric_keys(rig.flat())
+    keys = [key for key in expected if key.split(".")[1] in inputs.get(key.split(".")[0], {})]
     assert len(keys) == sum(isinstance(value, float) for value in rig.flat().values())
-    texts = {key: f"{given[key.split('.')[0]][key.split('.')[1]]} +/- 1 %" for key in keys}
+    texts = {key: f"{inputs[key.split('.')[0]][key.split('.')[1]]} +/- 1 %" for key in keys}
     stage = rig.replace(texts)
     assert set(stage.uncertain()) == set(keys)
     assert stage.flat() == rig.flat()
@@ -158,12 +158,12 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path, refused: 
     path = beside(tmp_path / "identified.toml")
     assert path.name == "identified.correlations.toml"
     path.write_text(correlations_text(pair(-0.8), stage))
-    found = read_correlations(path, stage)
-    assert found.keys == (COULOMB, VISCOUS)
-    assert np.array_equal(found.matrix, pair(-0.8).matrix)
-    assert found.among([VISCOUS]).keys == (VISCOUS,)
-    assert found.among([VISCOUS]).matrix.tolist() == [[1.0]]
-    assert found.among([]).over([COULOMB]).tolist() == [[1.0]]
+    correlations = read_correlations(path, stage)
+    assert correlations.keys == (COULOMB, VISCOUS)
+    assert np.array_equal(correlations.matrix, pair(-0.8).matrix)
+    assert correlations.among([VISCOUS]).keys == (VISCOUS,)
+    assert correlations.among([VISCOUS]).matrix.tolist() == [[1.0]]
+    assert correlations.among([]).over([COULOMB]).tolist() == [[1.0]]
 
 
 @pytest.mark.parametrize(
@@ -237,8 +237,8 @@ def test_what_reaches_beyond_the_bound_is_cut_off(rig: Stage) -> None:
     scale = 1 / COVERAGE
     share = norm.cdf(-0.5 / scale)
     assert drawn.beyond / (drawn.beyond + 2000) == pytest.approx(share, rel=0.05)
-    found = truncnorm(-0.5 / scale, np.inf, 0.5, scale)
-    assert kstest(drawn.keys[VISCOUS], found.cdf).statistic < 0.01
+    distribution = truncnorm(-0.5 / scale, np.inf, 0.5, scale)
+    assert kstest(drawn.keys[VISCOUS], distribution.cdf).statistic < 0.01
     assert drawn.broken == {}
 
 

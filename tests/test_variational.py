@@ -273,7 +273,7 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
     flat = VARIANTS[name].flat()
     _, whole = declared(name)
     symbols = [whole.symbols, [item.beyond for item in whole.kinks], TIME, REFERENCE, whole.parameters]
-    surfaces = sp.lambdify(symbols, [each.surface for each in whole.kinks])
+    surfaces = sp.lambdify(symbols, [entry.surface for entry in whole.kinks])
     jumps = sp.lambdify(symbols, list(whole.jumps[kink].values()))
     size = flat.get("joint.stroke", 1e-2)
     states, sides = size * rng.normal(size=len(whole.symbols)), np.zeros(len(whole.kinks))

@@ -107,9 +107,9 @@ def test_what_is_compared() -> None:
 def test_messages_are_those_of_tests_that_there_are() -> None:
     """None is kept of a test that is gone, and none is missing."""
     kept = {name.partition("[")[0].partition(" ")[0] for name in read(FOLDER / "messages.txt")}
-    found = set()
+    result = set()
     for path in Path(__file__).parent.glob("test_*.py"):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and "refused: Refused" in ast.unparse(node.args):
-                found.add(f"{path.name}::{node.name}")
-    assert kept == found
+                result.add(f"{path.name}::{node.name}")
+    assert kept == result
