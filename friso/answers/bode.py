@@ -112,9 +112,9 @@ def bode(
     return BodeAnswer(analysed(chosen, band, series))
 
 
-def _band(given: str | tuple[float, float], stage: Stage) -> tuple[float, float]:
+def _band(entry: str | tuple[float, float], stage: Stage) -> tuple[float, float]:
     """Both ends [Hz] of a range of frequencies that the drive knows. Raises InputError."""
-    text = given if isinstance(given, str) else f"{given[0]!r} Hz..{given[1]!r} Hz"
+    text = entry if isinstance(entry, str) else f"{entry[0]!r} Hz..{entry[1]!r} Hz"
     first, _, last = text.partition("..")
     if not (first.strip() and last.strip()):
         raise wrong("frequencies", quoted(text), "a range of frequencies, FIRST..LAST", EXAMPLE)

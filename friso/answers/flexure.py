@@ -121,21 +121,21 @@ def _mechanism(stage: Stage, origin: str) -> Mechanism:
     return Mechanism.of(stage.flat())
 
 
-def _stroke(given: str | float | None, stage: Stage, mechanism: Mechanism) -> float:
+def _stroke(entry: str | float | None, stage: Stage, mechanism: Mechanism) -> float:
     """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises InputError."""
-    if given is None:
+    if entry is None:
         stroke = stage.joint and stage.joint.stroke
         if stroke is None:
             raise wrong("stroke", "nothing", "the stroke, because the joint has none", '"1 mm"')
     else:
         try:
-            stroke = STROKE.read(given if isinstance(given, str) else f"{given!r} m")
+            stroke = STROKE.read(entry if isinstance(entry, str) else f"{entry!r} m")
         except InputError as error:
             raise wrong("stroke", error.actual, error.expected, '"1 mm"') from None
     if stroke > mechanism.length / 2:
         expected = f"at most half the length of the leaves, {1e3 * mechanism.length / 2:g} mm"
         actual = quoted(getattr(stroke, "text", stroke))
-        if given is None:
+        if entry is None:
             raise InputError("joint.stroke", actual, expected, 'stroke = "1 mm"')
         raise wrong("stroke", actual, expected, '"1 mm"')
     return float(stroke)

@@ -43,18 +43,18 @@ SCHEMAS: Mapping[str, Callable[[], Node]] = {"stage": stage_schema, "specificati
 """The schemas by what they are of."""
 
 
-def _document(cls: type[Section], title: str, told: Mapping[str, str]) -> Node:
-    return {"$schema": DIALECT, "title": title, "$comment": f"friso {VERSION}", **_table(cls, "", told)}
+def _document(cls: type[Section], title: str, described: Mapping[str, str]) -> Node:
+    return {"$schema": DIALECT, "title": title, "$comment": f"friso {VERSION}", **_table(cls, "", described)}
 
 
-def _table(cls: type[Section], place: str, told: Mapping[str, str]) -> Node:
-    """The schema of a table; `told` are comments on keys by their names with dots."""
+def _table(cls: type[Section], place: str, described: Mapping[str, str]) -> Node:
+    """The schema of a table; `described` are comments on keys by their names with dots."""
     documented = _attributes(cls)
     properties = {}
     for key, field in cls.model_fields.items():
         path = f"{place}.{key}".lstrip(".")
-        node = _key(field.annotation, field.metadata, path, told)
-        text = documented.get(key) or told.get(path, "")
+        node = _key(field.annotation, field.metadata, path, described)
+        text = documented.get(key) or described.get(path, "")
         expected = node.pop("description", "")
         node["description"] = " ".join(dict.fromkeys(part for part in (_sentence(text), _sentence(expected)) if part))
         properties[key] = {name: value for name, value in node.items() if value not in ("", None)}
@@ -64,13 +64,13 @@ def _table(cls: type[Section], place: str, told: Mapping[str, str]) -> Node:
     return {**head, "properties": properties, "required": required, "additionalProperties": False}
 
 
-def _key(annotation: Any, metadata: Iterable[Any], path: str, told: Mapping[str, str]) -> Node:
+def _key(annotation: Any, metadata: Iterable[Any], path: str, described: Mapping[str, str]) -> Node:
     """The schema of what a key takes."""
     for item in metadata:
         if isinstance(item, Table):
-            return _one_of(item.pick, path, told)
+            return _one_of(item.pick, path, described)
         if isinstance(item, TableArray):
-            return {"type": "array", "maxItems": item.most, "items": _one_of(item.variants.pick, path, told)}
+            return {"type": "array", "maxItems": item.most, "items": _one_of(item.variants.pick, path, described)}
         if isinstance(item, Quantity | Number | Several | Span | OneOrMany):
             return _numeric(item)
     types = [part for part in get_args(annotation) or (annotation,) if part is not NoneType]
@@ -104,12 +104,12 @@ def _numeric(item: Quantity | Number | Several | Span | OneOrMany) -> Node:
     return {"type": "string", "description": item.expected, "examples": [item.example], "x-unit": unit}
 
 
-def _one_of(pick: Any, path: str, told: Mapping[str, str]) -> Node:
+def _one_of(pick: Any, path: str, described: Mapping[str, str]) -> Node:
     """The schema of a table of one of several classes."""
-    tables = [_table(cls, path, told) for cls in _classes(pick)]
+    tables = [_table(cls, path, described) for cls in _classes(pick)]
     if len(tables) == 1:
-        return {**tables[0], "description": _sentence(told.get(path, "")) or tables[0].get("description", "")}
-    return {"type": "object", "anyOf": tables, "description": _sentence(told.get(path, ""))}
+        return {**tables[0], "description": _sentence(described.get(path, "")) or tables[0].get("description", "")}
+    return {"type": "object", "anyOf": tables, "description": _sentence(described.get(path, ""))}
 
 
 def _classes(pick: Any) -> list[type[Section]]:

@@ -76,8 +76,8 @@ class SweepAnswer(Answer):
         """Which share of the runs swings at its end, and where."""
         from friso.views.map.findings import sentences
 
-        told = sentences(self.result, self.study, self.metric)
-        return told if self.store is None else [*told, f"store: {self.store}"]
+        texts = sentences(self.result, self.study, self.metric)
+        return texts if self.store is None else [*texts, f"store: {self.store}"]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """How a cell is run by itself."""
@@ -238,10 +238,10 @@ def _another_study(store: Path) -> InputError:
     return InputError(str(store), problem, "the store alone: it contains its study", f"friso map {store}")
 
 
-def _chosen_rtol(given: str | float, study: Study, crew: Crew) -> float:
+def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     """The tolerance asked for; "auto" is chosen on a sample of the cells, and said."""
-    if given != "auto":
-        return tolerance_of(given)
+    if entry != "auto":
+        return tolerance_of(entry)
     rtol, shares, cells = loosest_rtol(study, crew)
     surviving = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {rtol_:g}" for rtol_, share in shares.items())
     if shares.get(rtol, 0.0) >= WANTED:

@@ -55,8 +55,8 @@ class TuneAnswer(Answer):
         from friso.views.tune.sensitivity_words import sensitivity_sentences
         from friso.views.tune.words import assumptions, window_lines
 
-        found = self.result
-        return [*gain_lines(found), *window_lines(found), *sensitivity_sentences(found), *assumptions(found)]
+        cure = self.result
+        return [*gain_lines(cure), *window_lines(cure), *sensitivity_sentences(cure), *assumptions(cure)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """The design of leaf springs for an isolator."""

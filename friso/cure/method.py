@@ -108,7 +108,7 @@ def tune(
             relaxed = relaxations(answers, goal, machines)
     except KeyboardInterrupt:
         interrupted = True
-        answers[-1:] = [_so_far(search, found) for search, found in zip(searches, answers[-1:], strict=True)]
+        answers[-1:] = [_so_far(search, cure) for search, cure in zip(searches, answers[-1:], strict=True)]
     return Advice(
         ideal,
         goal,
@@ -156,16 +156,16 @@ def _answer(search: Search, fresh: Fleet, drive: Stage, answers: list[Cure]) -> 
     return unsure or Cure(way, None, None, None, (), (), search.settings, search.attracted)
 
 
-def _so_far(search: Search, found: Cure) -> Cure:
+def _so_far(search: Search, cure: Cure) -> Cure:
     """What is known of a way whose search was interrupted: its best settings so far, not verified."""
-    if not found.interrupted or not search.tried:
-        return found
+    if not cure.interrupted or not search.tried:
+        return cure
     settings = search.settings
     best = int(settings.cost(search.goal).argmin())
     if any(broken[best] for broken in settings.broken(search.goal).values()):
-        return found
+        return cure
     shares = settings.shares[best]
-    return replace(found, stage=search.way.tuned(shares), settings=settings, shares=shares)
+    return replace(cure, stage=search.way.tuned(shares), settings=settings, shares=shares)
 
 
 def _moves(stage: Stage) -> None:

@@ -111,9 +111,9 @@ def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | 
     """
     flat = {**stage.flat(), **as_tuned(stage.flat())}
     names = _keys(flat) if keys is None else tuple(keys)
-    known = numeric_keys(flat)
+    numeric = numeric_keys(flat)
     for name in names:
-        if name not in known or name not in flat:
+        if name not in numeric or name not in flat:
             raise InputError("keys", name, "numeric keys of the stage", "friction.static")
     values = np.array([flat[name] for name in names])
     hunts = can_hunt(flat)

@@ -104,11 +104,11 @@ def _of_pid(key: Mapping[str, Any], turn: Turn, flat: Mapping[str, Any]) -> tupl
 def _of_van_dijk(flat: Mapping[str, Any], turn: Turn) -> tuple[Conversion, ...]:
     from friso.equations.controllers.van_dijk import numbers
 
-    found = numbers(flat)
+    values = numbers(flat)
     times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
     return (
-        _stiffness("gain k_p of Eq. 8", "k_p", found["k_p"], turn, flat),
-        *(_time(f"time constant of the {what}", name, found[name]) for name, what in times.items()),
+        _stiffness("gain k_p of Eq. 8", "k_p", values["k_p"], turn, flat),
+        *(_time(f"time constant of the {what}", name, values[name]) for name, what in times.items()),
         *_limits({name.removeprefix("controller."): v for name, v in flat.items()}, turn, flat),
     )
 

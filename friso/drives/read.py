@@ -35,17 +35,17 @@ class Drawn:
         return "\n".join([*lines, self.stage.to_toml()])
 
 
-def stage_from(path: Path, axis: str | None, told: Mapping[str, Any]) -> Drawn:
+def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) -> Drawn:
     """The stage of an axis in a parameter file, with what the user says of all that is not in it. Raises InputError for
     what cannot be read, and for all that is still open together."""
     kind, axes = read(path)
     chosen = _chosen(axes, axis, path)
     try:
-        answers = UserAnswers(told)
+        answers = UserAnswers(user_answers)
         asked = kind.questions(chosen, answers)
         refuse_open(asked, f"{path}, {chosen.name}")
         drawn = kind.stage(chosen, answers)
-        stage = _with_answers(drawn, kind, chosen, path, told)
+        stage = _with_answers(drawn, kind, chosen, path, user_answers)
     except InputError as error:
         raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None
     return Drawn(stage, path, kind, chosen.name, drawn.left_out)
@@ -87,7 +87,7 @@ def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> A
 
 
 def _with_answers(
-    drawn: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, told: Mapping[str, Any]
+    drawn: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
 ) -> Stage:
     """The stage of the tables with the answers laid over them: those with a dot are keys of the stage."""
     source = (
@@ -96,7 +96,7 @@ def _with_answers(
     )
     tables: dict[str, Any] = {"name": f"{path.stem}, {axis.name}", "source": source}
     tables |= {name: dict(table) for name, table in drawn.tables.items()}
-    for key, value in told.items():
+    for key, value in user_answers.items():
         table, dot, name = key.partition(".")
         if dot:
             tables.setdefault(table, {})[name] = value

@@ -243,7 +243,7 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
         raise lacks("a filter of the derivative", "no filter (tau = 0), which this component has not")
     scale = answers.value(FORCE, FORCE_FIELD.on(kind)) / unit
     on_error = flat["controller.derivative_on"] == "error"
-    found = {
+    settings = {
         "P": get("kp") / scale,
         "I": get("ki") / scale,
         "D": get("kd") / scale,
@@ -255,22 +255,22 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
         "MAX_OUTPUT": get("force_limit") / (scale * unit),
     }
     if "controller.integral_limit" in flat and get("ki"):
-        found["MAX_ERROR_I"] = get("integral_limit") / (get("ki") * unit)
-    return Parameters(found, HELD)
+        settings["MAX_ERROR_I"] = get("integral_limit") / (get("ki") * unit)
+    return Parameters(settings, HELD)
 
 
 def _of_cascade(flat: Flat, unit: float) -> Parameters:
     """Those whose output is the velocity that a drive follows."""
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
     ahead = flat["controller.velocity_feedforward"]
-    found = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0}
-    found["DEADBAND"] = flat.get("controller.error_deadband", 0.0) / unit
-    return Parameters(found, HELD_OF_CASCADE)
+    settings = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0}
+    settings["DEADBAND"] = flat.get("controller.error_deadband", 0.0) / unit
+    return Parameters(settings, HELD_OF_CASCADE)
 
 
-def text(found: Mapping[str, float]) -> str:
+def text(settings: Mapping[str, float]) -> str:
     """The lines of a section."""
-    lines = [f"{name} = {value:.12g}" for name, value in found.items()]
+    lines = [f"{name} = {value:.12g}" for name, value in settings.items()]
     return "\n".join(["[JOINT_0]", *lines, ""])
 
 

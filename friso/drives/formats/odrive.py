@@ -110,17 +110,17 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     names = sorted({key.split(".")[0] for key in values if key.startswith("axis") and f".{CONFIG}.pos_gain" in key})
     if not names:
         raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
-    found = tuple(
+    axes = tuple(
         AxisParameters(
             name, {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
         )
         for name in names
     )
-    for axis in found:
+    for axis in axes:
         if f"{MOTOR}.torque_constant" not in axis.values:
             actual = f"{axis.name} without a motor.config.torque_constant, which firmware 0.5.1 to 0.5.6 has"
             raise InputError("", actual, "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6")
-    return found
+    return axes
 
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
@@ -261,21 +261,21 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     travel = float(told)
     force = 2 * pi / travel
     kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
-    found = {
+    settings = {
         f"{CONFIG}.pos_gain": flat[f"{name}kv"],
         f"{CONFIG}.vel_gain": kp,
         f"{CONFIG}.vel_integrator_gain": kp / time if time else 0.0,
         f"{CONFIG}.inertia": flat[f"{name}acceleration_feedforward"] * travel / force,
     }
     if f"{name}integral_limit" in flat:
-        found[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
+        settings[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
     if f"{name}force_limit" in flat:
-        found[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
+        settings[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
     held = HELD if flat[f"{name}velocity_feedforward"] in (0.0, 1.0) else HELD - {"velocity_feedforward"}
     if place := _loop_of_velocity(flat):
-        found[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
+        settings[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
         held |= {place.removeprefix(name)}
-    return Parameters(found, held)
+    return Parameters(settings, held)
 
 
 def _loop_of_velocity(flat: Flat) -> str:
@@ -287,9 +287,9 @@ def _loop_of_velocity(flat: Flat) -> str:
     return place if flat[f"{place}.order"] == 2 and flat[f"{place}.damping_ratio"] == 1.0 else ""
 
 
-def text(found: Mapping[str, float]) -> str:
+def text(settings: Mapping[str, float]) -> str:
     """The lines that odrivetool takes."""
-    return "".join(f"odrv0.axis0.{name} = {value:.12g}\n" for name, value in found.items())
+    return "".join(f"odrv0.axis0.{name} = {value:.12g}\n" for name, value in settings.items())
 
 
 FORMAT = ParameterFormat(

@@ -24,16 +24,16 @@ def rows(gains: Gains) -> list[tuple[str, list[str]]]:
 
 def notes(gains: Gains) -> list[str]:
     """What to know of the numbers."""
-    found = []
+    texts = []
     if not gains.conversions:
-        found.append("This controller is not one of friso's own: its gains have no other units than those of its file")
+        texts.append("This controller is not one of friso's own: its gains have no other units than those of its file")
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
-        found.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
+        texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
     if gains.kind is not None:
-        found.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source})")
+        texts.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source})")
         if gains.lost:
-            found.append(f"Not among them: {', '.join(gains.lost)}")
-    return found
+            texts.append(f"Not among them: {', '.join(gains.lost)}")
+    return texts
 
 
 def _with_unit(value: tuple[float, str]) -> str:

@@ -34,7 +34,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
                 "share": goal.share,
             },
             "as_is": _measured(tuning.present, tuning) | {"verdict": tuning.case.verdict},
-            "ways": {found.way.name: _way(found, tuning) for found in tuning.answers},
+            "ways": {cure.way.name: _way(cure, tuning) for cure in tuning.answers},
             "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
             "relaxed": [
                 {"way": relaxed.way.name, "values": dict(relaxed.values), "factor": relaxed.factor}
@@ -44,20 +44,20 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
     )
 
 
-def _way(found: Cure, tuning: Advice) -> dict[str, Any]:
-    if found.stage is None or found.measured is None or found.case is None:
-        why = unsure_why(found) if found.interrupted else reason(found, tuning)
-        return {"works": found.sure, "why": why}
-    edge = found.case.judgement.margin
+def _way(cure: Cure, tuning: Advice) -> dict[str, Any]:
+    if cure.stage is None or cure.measured is None or cure.case is None:
+        why = unsure_why(cure) if cure.interrupted else reason(cure, tuning)
+        return {"works": cure.sure, "why": why}
+    edge = cure.case.judgement.margin
     return {
-        "works": found.sure,
-        "doubts": [*found.doubts],
-        "changes": changes(tuning.stage, found.stage),
-        "verdict": found.case.verdict,
-        "certain": found.case.judgement.hunting.certain,
+        "works": cure.sure,
+        "doubts": [*cure.doubts],
+        "changes": changes(tuning.stage, cure.stage),
+        "verdict": cure.case.verdict,
+        "certain": cure.case.judgement.hunting.certain,
         "edge_factor": None if edge is None else edge.factor,
-        "windows": [asdict(window) for window in found.windows],
-        **_measured(found.measured, tuning),
+        "windows": [asdict(window) for window in cure.windows],
+        **_measured(cure.measured, tuning),
     }
 
 

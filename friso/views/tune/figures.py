@@ -52,20 +52,20 @@ def figures(tuning: Advice) -> list[Figure]:
 
 def shown(tuning: Advice) -> list[tuple[str, Stage, str]]:
     """The stages that are drawn, with names and colours: as it is, and with each way for which there are settings."""
-    ways = [found for found in tuning.answers if found.stage is not None]
+    ways = [cure for cure in tuning.answers if cure.stage is not None]
     return [
         ("as it is", tuning.stage, INK),
-        *((_name(found), found.stage, colour(tuning, found)) for found in ways if found.stage),
+        *((_name(cure), cure.stage, colour(tuning, cure)) for cure in ways if cure.stage),
     ]
 
 
-def colour(tuning: Advice, found: Cure) -> str:
+def colour(tuning: Advice, cure: Cure) -> str:
     """The colour of a way."""
-    return COLOURS[tuning.answers.index(found) % len(COLOURS)]
+    return COLOURS[tuning.answers.index(cure) % len(COLOURS)]
 
 
-def _name(found: Cure) -> str:
-    return found.way.name if found.sure == "works" else f"{found.way.name} (not sure)"
+def _name(cure: Cure) -> str:
+    return cure.way.name if cure.sure == "works" else f"{cure.way.name} (not sure)"
 
 
 def _response(tuning: Advice, stages: list[tuple[str, Stage, str]]) -> Panel:
@@ -85,9 +85,9 @@ def _settling(tuning: Advice) -> Panel:
     end = flat["motion.duration"] - float(last_corner(flat))
     rows = [("as it is", tuning.present.moves.settling[0], INK)]
     rows += [
-        (_name(found), found.measured.moves.settling[0], colour(tuning, found))
-        for found in tuning.answers
-        if found.measured is not None
+        (_name(cure), cure.measured.moves.settling[0], colour(tuning, cure))
+        for cure in tuning.answers
+        if cure.measured is not None
     ]
     start = 1e-3 * end
     series = []

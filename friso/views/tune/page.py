@@ -23,12 +23,12 @@ def tune_files(tuning: Advice) -> dict[str, Content]:
 def stage_files(tuning: Advice) -> dict[str, Content]:
     """A stage file for every way for which there are settings; one that is not sure to work is named so."""
     files: dict[str, Content] = {}
-    for found in tuning.answers:
-        if found.stage is None:
+    for cure in tuning.answers:
+        if cure.stage is None:
             continue
-        slug = found.way.name.replace(",", "").replace(" ", "-")
-        unsure = "" if found.sure == "works" else "-not-sure"
-        files[f"tuned-{slug}{unsure}.toml"] = found.stage.to_toml()
+        slug = cure.way.name.replace(",", "").replace(" ", "-")
+        unsure = "" if cure.sure == "works" else "-not-sure"
+        files[f"tuned-{slug}{unsure}.toml"] = cure.stage.to_toml()
     least = tuning.working[:1]
     return {"tuned.toml": least[0].stage.to_toml() if least and least[0].stage else None, **files}
 

@@ -15,14 +15,14 @@ def sensitivity_sentences(tuning: Advice) -> list[str]:
     return ranked_sentences(tuning.sensitivities) if tuning.sensitivities else []
 
 
-def ranked_sentences(found: Sensitivities) -> list[str]:
+def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
     """The same of sensitivities, what matters most first; none where there are none."""
-    ranked = found.ranked()
+    ranked = sensitivities.ranked()
     if not ranked or ranked[0][1] == 0:
         return []
     largest = abs(ranked[0][1])
     named = [(key, move) for key, move in ranked[:MOST] if abs(move) >= LEAST * largest]
-    unit = "Hz" if found.stage.controller.bandwidth_key else ""
+    unit = "Hz" if sensitivities.stage.controller.bandwidth_key else ""
     parts = [f"1 % more of {key} moves it by {_signed(move, unit)}" for key, move in named]
     return [f"What matters for the edge of hunting, most first: {'; '.join(parts)}."]
 

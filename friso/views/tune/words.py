@@ -111,12 +111,12 @@ def _interrupted(tuning: Advice) -> list[str]:
     return ["Interrupted: this is the best so far. Ways that are not named were not tried, and one may be unfinished."]
 
 
-def _works(found: Cure, tuning: Advice, what: str) -> str:
-    assert found.stage is not None
-    assert found.measured is not None
+def _works(cure: Cure, tuning: Advice, what: str) -> str:
+    assert cure.stage is not None
+    assert cure.measured is not None
     return (
-        f"{what}: {found.way.name}. Set {listed(changes(tuning.stage, found.stage), 'and')}. "
-        f"{_brings(found.measured, tuning)}. {price(found.measured, tuning, found.way.buys_joint)}"
+        f"{what}: {cure.way.name}. Set {listed(changes(tuning.stage, cure.stage), 'and')}. "
+        f"{_brings(cure.measured, tuning)}. {price(cure.measured, tuning, cure.way.buys_joint)}"
     )
 
 
@@ -153,12 +153,12 @@ def _ratio(now: float, before: float) -> str:
 
 def _nothing(tuning: Advice) -> list[str]:
     """That nothing is sure to work, what is not sure to, and what to relax."""
-    unsure = [found for found in tuning.answers if found.sure == "unsure"]
+    unsure = [cure for cure in tuning.answers if cure.sure == "unsure"]
     lines = [f"No way was found that surely meets the goal: {goal_words(tuning.goal)}."]
     lines += [
-        f"{found.way.name} may do ({listed(changes(tuning.stage, found.stage), 'and')}), but {unsure_why(found)}."
-        for found in unsure
-        if found.stage is not None
+        f"{cure.way.name} may do ({listed(changes(tuning.stage, cure.stage), 'and')}), but {unsure_why(cure)}."
+        for cure in unsure
+        if cure.stage is not None
     ]
     lines += [_relax(relaxed, tuning.goal) for relaxed in tuning.relaxed]
     if not tuning.relaxed and not tuning.interrupted:
@@ -177,34 +177,34 @@ def _relax(relaxed: Relaxed, goal: Goal) -> str:
     )
 
 
-def unsure_why(found: Cure) -> str:
+def unsure_why(cure: Cure) -> str:
     """Why a way is not sure to work."""
-    if found.interrupted and not found.doubts:
+    if cure.interrupted and not cure.doubts:
         return "it was not verified: the search was interrupted"
-    return listed([DOUBTS[doubt] for doubt in found.doubts], "and")
+    return listed([DOUBTS[doubt] for doubt in cure.doubts], "and")
 
 
 def failing(tuning: Advice) -> list[str]:
     """What cannot work, and why; and what is not sure to."""
     lines = []
-    for found in tuning.answers:
-        if found.sure == "does not work":
-            lines.append(f"{found.way.name}: does not work. {reason(found, tuning)}")
-        elif found.sure == "unsure" and tuning.working:
-            lines.append(f"{found.way.name}: not sure to work: {unsure_why(found)}.")
+    for cure in tuning.answers:
+        if cure.sure == "does not work":
+            lines.append(f"{cure.way.name}: does not work. {reason(cure, tuning)}")
+        elif cure.sure == "unsure" and tuning.working:
+            lines.append(f"{cure.way.name}: not sure to work: {unsure_why(cure)}.")
     return lines
 
 
-def reason(found: Cure, tuning: Advice) -> str:
+def reason(cure: Cure, tuning: Advice) -> str:
     """Why no setting of a way meets the goal."""
-    if found.settings is None:
+    if cure.settings is None:
         return "It was not tried."
-    settings, goal = found.settings, tuning.goal
-    sentence = next(_reasons(settings, found, goal))
-    return f"{sentence}{_edges(tuning) if [v.name for v in found.way.variables] == [BANDWIDTH] else ''}"
+    settings, goal = cure.settings, tuning.goal
+    sentence = next(_reasons(settings, cure, goal))
+    return f"{sentence}{_edges(tuning) if [v.name for v in cure.way.variables] == [BANDWIDTH] else ''}"
 
 
-def _reasons(settings: SettingsTried, found: Cure, goal: Goal) -> Iterator[str]:
+def _reasons(settings: SettingsTried, cure: Cure, goal: Goal) -> Iterator[str]:
     """The first constraint that leaves nothing of the settings that meet those before."""
     broken, left = settings.broken(goal), np.ones(len(settings.margin), bool)
     tried = f"of {len(left)} settings tried"
@@ -222,7 +222,7 @@ def _reasons(settings: SettingsTried, found: Cure, goal: Goal) -> Iterator[str]:
         left = left & ~broken[name]
         if not left.any():
             yield sentence
-    yield f"Something attracts machines, or may, with all of the {found.attracted} best settings that were surveyed."
+    yield f"Something attracts machines, or may, with all of the {cure.attracted} best settings that were surveyed."
 
 
 def _edges(tuning: Advice) -> str:
@@ -246,11 +246,11 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
     words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
-    for found in tuning.answers:
-        cells = [words[found.sure], *[NOTHING] * (len(COLUMNS) - 1)]
-        if found.measured is not None:
-            cells = _row(found.measured, tuning, words[found.sure])
-        table.append((found.way.name, cells))
+    for cure in tuning.answers:
+        cells = [words[cure.sure], *[NOTHING] * (len(COLUMNS) - 1)]
+        if cure.measured is not None:
+            cells = _row(cure.measured, tuning, words[cure.sure])
+        table.append((cure.way.name, cells))
     return table
 
 
@@ -267,15 +267,15 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     ]
 
 
-def window_words(window: SettingWindow, found: Cure) -> str:
+def window_words(window: SettingWindow, cure: Cure) -> str:
     """Where a number may lie, all else being as tuned."""
     name, low, high = window.name, window.low, window.high
     unit = ""
     if window.name == BANDWIDTH:
-        present = crossover(found.way.stage)
+        present = crossover(cure.way.stage)
         low, high, unit = low * present, high * present, "Hz"
     else:
-        keys = numeric_keys(found.way.stage.flat())
+        keys = numeric_keys(cure.way.stage.flat())
         unit = keys[name].unit if name in keys else ""
     first, last = (number(value, unit) for value in (low, high))
     first = f"{first} (the least tried)" if window.open_below else first
@@ -286,14 +286,14 @@ def window_words(window: SettingWindow, found: Cure) -> str:
 def window_lines(tuning: Advice) -> list[str]:
     """The windows of the ways that work."""
     return [
-        f"{found.way.name} meets the goal, each number by itself, for {'; '.join(_windows(found))}."
-        for found in tuning.working
-        if found.windows
+        f"{cure.way.name} meets the goal, each number by itself, for {'; '.join(_windows(cure))}."
+        for cure in tuning.working
+        if cure.windows
     ]
 
 
-def _windows(found: Cure) -> list[str]:
-    return [window_words(window, found) for window in found.windows]
+def _windows(cure: Cure) -> list[str]:
+    return [window_words(window, cure) for window in cure.windows]
 
 
 def assumptions(tuning: Advice) -> list[str]:
