@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.engine.allowance import current_allowance
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, new_queue
 from friso.engine.kernel import Kernel, empty_results
 from friso.engine.layout import LANES
@@ -78,7 +79,8 @@ def run_chunks(
     They start at rest, displaced as the motion says, or else from the states `starts`, shape (runs, states); modes
     that remember may stand behind these, else they are those in which a run begins in that state. They come chunk by
     chunk, those with many turning points after the others of their chunk. Results do not depend on lanes, threads or
-    chunks. A failed run has a status; the others go on.
+    chunks. A failed run has a status; the others go on. Raises Exhausted where an allowance does not suffice (see
+    `friso.engine.allowance`).
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
@@ -158,7 +160,7 @@ def _run_with_room(
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
     results = empty_results(len(numbers), room, samples, len(kernel.full_state))
-    run_batch(kernel, batch, settings_of(options), results, options.threads)
+    _run_within_allowance(kernel, batch, options, results)
     crowded = results.turn_counts > room
     if room >= MOST_TURNS:
         results.statuses[crowded] = Status.FULL
@@ -173,6 +175,19 @@ def _run_with_room(
     repeated, fewer = numbers[crowded], max(1, options.chunk * CAPACITY // (4 * room))
     for first in range(0, len(repeated), fewer):
         yield from _run_with_room(kernel, flat, repeated[first : first + fewer], 4 * room, options, starts)
+
+
+def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
+    """Run a batch; where there is an allowance, in no more steps than it has left for each run."""
+    allowance, states = current_allowance(), len(kernel.full_state)
+    if allowance is None:
+        run_batch(kernel, batch, settings_of(options), results, options.threads)
+        return
+    budget = int(min(options.budget, allowance.most_steps(len(batch.starts), states)))
+    run_batch(kernel, batch, settings_of(replace(options, budget=budget)), results, options.threads)
+    allowance.charge(results.statistics[:, STATISTICS.index("attempted")], states)
+    if budget < options.budget and np.any(results.statuses == Status.BUDGET):
+        allowance.exhaust()
 
 
 def settings_of(options: RunOptions) -> Settings:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.engine.allowance import allowance
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import KernelRequest, kernel, kernels
@@ -20,7 +21,7 @@ from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure, options
-from friso.hunting.verdict import WORK, Judgement, judge
+from friso.hunting.verdict import ATTRACTION, PARTS, WORK, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.transmission import BACKLASH, leading_friction
@@ -98,8 +99,13 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     kernels(set().union(*map(_needed, variants.values())))
     different: list[Stage] = []
     different += (variant for variant in variants.values() if variant not in different)
-    work = Tally(progress, len(different) * len(WORK))
-    judged = [_case(variant, rtol, traces, work) for variant in different]
+    done = Tally(progress, len(different) * len(PARTS))
+    judged: list[Case] = []
+    left = WORK
+    for variant in different:
+        with allowance() as spent:
+            judged.append(_case(variant, rtol, traces, done, left / (len(different) - len(judged))))
+        left -= spent.used
     return {name: judged[different.index(variant)] for name, variant in variants.items()}
 
 
@@ -118,15 +124,15 @@ def _needed(stage: Stage) -> set[KernelRequest]:
     )
 
 
-def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
+def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> Case:
     flat = stage.flat()
-    begun = work.done
+    begun = done.done
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
     measures = measure(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
-    judgement = judge(stage, measures, max(rtol, LONG), lambda label: work.add(int(label != WORK[0]), label))
-    work.add(begun + len(WORK) - work.done, WORK[-1])  # the last, too, where nothing attracts
+    judgement = judge(stage, measures, max(rtol, LONG), lambda part: done.add(int(part != ATTRACTION), part), work)
+    done.add(begun + len(PARTS) - done.done, PARTS[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,
         judgement=judgement,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
@@ -72,7 +73,7 @@ class Searched:
 
 
 NOT_SOUGHT = Searched(None, ())
-"""What is told of a stage that cannot hunt at any bandwidth."""
+"""What is told of a stage that cannot hunt at any bandwidth, or where the allowance does not suffice for a survey."""
 
 
 def margin(stage: Stage, attracting: bool) -> Margin | None:
@@ -83,13 +84,18 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
 
 def searched(stage: Stage, attracting: bool, survey: Attractors | None = None) -> Searched:
     """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `survey` is what
-    attracts the stage itself, if that was surveyed."""
+    attracts the stage itself, if that was surveyed. Where an allowance is used up, ends are where they are known to be
+    by then, and not certain."""
     flat, crossover = stage.flat(), bandwidth(stage.flat())
     index, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
     below = np.geomspace(1 / FARTHEST, 1.0, index, endpoint=False)
     factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
-    grid = _Grid(flat, factors)
-    grid.record(index, survey or attractors(Ensemble.held(flat, 1), thorough=True))
+    survey = survey or attractors(Ensemble.held(flat, 1), thorough=True)
+    try:
+        grid = _Grid(flat, factors)
+    except Exhausted:
+        return NOT_SOUGHT
+    grid.record(index, survey)
     edge = grid.last_edge(index, attracting)
     lower = grid.lower_end(index) if attracting else None
     contradicts = bool(grid.attracts[index]) and not attracting
@@ -142,9 +148,18 @@ class _Grid:
     def end(self, at: int, ahead: int) -> AttractionEnd | None:
         """The end of what attracts at a factor, by number, while nothing does at the next one, above (`ahead` 1) or
         below (-1). None if it attracts as far as the search goes: then it is known to do so everywhere up to there; or
-        if it does not attract on closer inspection, which is known then."""
+        if it does not attract on closer inspection, which is known then. Where the allowance is used up, an end that is
+        not certain."""
         if (at, ahead) in self.ends:
             return self.ends[at, ahead]
+        try:
+            return self._followed(at, ahead)
+        except Exhausted:
+            end = AttractionEnd(float(self.factors[at]), float(self.factors[at + ahead]), False)
+            return self.ends.setdefault((at, ahead), end)
+
+    def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
+        """The same, of an end that was not followed before. Raises Exhausted."""
         outward = Outward(self.flat, FARTHEST**ahead)
         if not self.proved(at, outward):
             return None

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
@@ -69,6 +70,16 @@ class AttractionEnd:
     reserve: float = PRECISE
 
 
+@dataclass
+class _Place:
+    """What is known on the way to an end: motions that attract at a factor, `at`, and the one `outside` at which
+    nothing does."""
+
+    at: float
+    motions: tuple[Swinging, ...]
+    outside: float
+
+
 class Beyond(Exception):
     """What attracts was followed to the end of the range of bandwidths."""
 
@@ -83,21 +94,34 @@ class Outward:
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
         """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
-        where orbits attract as far as the search goes."""
+        where orbits attract as far as the search goes. Where an allowance is used up on the way, the end is as close as
+        it is known by then, and not certain; raises Exhausted where nothing is known of it."""
+        place = _Place(at, motions, outside)
+        try:
+            return self._followed_to_the_end(place)
+        except Exhausted:
+            if self._ahead(place.at) * (place.outside - place.at) <= 0:
+                raise
+            return AttractionEnd(place.at, place.outside, False)
+
+    def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
+        """The same; the place is what is known on the way."""
         chatters = Ensemble.held(self.flat, 1).chatters
         beyond = CHATTERING if chatters else BEYOND
         for _ in range(HOPS):
-            orbit = next((motion for motion in motions if motion.cycles is not None), None)
+            at, outside = place.at, place.outside
+            orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
-                at, motions, outside = self._simulated(at, motions, outside)
-                if outside / at < beyond and at / outside < beyond:
+                place.at, place.motions, place.outside = self._simulated(at, place.motions, outside)
+                if place.outside / place.at < beyond and place.at / place.outside < beyond:
                     break
                 continue
             flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
             if flip:
-                (at, reserve), distance, ended = flip, orbit.distance, True
+                (place.at, reserve), distance, ended = flip, orbit.distance, True
             else:
-                (at, distance, ended), reserve = self._followed(at, orbit), PRECISE
+                (place.at, distance, ended), reserve = self._followed(at, orbit), PRECISE
+            at = place.at
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
@@ -105,8 +129,8 @@ class Outward:
             closer = None if survey.attracts[0] else self._between(at, next_to, reserve)
             if not survey.attracts[0] and closer is None:
                 return AttractionEnd(at, next_to, ended and bool(survey.decided[0]), reserve)
-            at, motions = closer or (next_to, survey.motions)
-        return self._quiet_from(at, motions)
+            place.at, place.motions = closer or (next_to, survey.motions)
+        return self._quiet_from(place.at, place.motions)
 
     def _between(self, at: float, quiet: float, reserve: float) -> tuple[float, tuple[Swinging, ...]] | None:
         """The last factor between the end of an orbit, known up to a share of it, and one at which nothing attracts at

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.engine.allowance import Exhausted, allowance
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -23,7 +24,7 @@ from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
-from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, searched
+from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, Searched, searched
 from friso.hunting.measures import Measures, measure, options
 from friso.hunting.outward import AttractionEnd
 from friso.stage import Stage
@@ -34,6 +35,13 @@ those at the least distance from which the stage breaks away."""
 
 MOVING = "the reference never stands still"
 """Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
+
+WORK = 7e8
+"""Work of a check (see `friso.engine.allowance`): about 8 s on one core."""
+
+SURVEY, KICKS = 0.4, 0.2
+"""Shares of the work of a verdict that the search for what attracts the stage may use, and that are kept for kicks and
+moves."""
 
 STEADY = 0.01
 """Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
@@ -49,7 +57,7 @@ class Judgement:
     corner of the reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s]
     (None: no longer than its own end). `observed`: what attracts was observed in long simulations, no orbit that
     attracts could be closed. `lasting` [m], peak to peak, is where this motion alone was seen to swing on, at the end
-    of the time for which it was followed.
+    of the time for which it was followed. `given_up`: what of `PARTS` would have taken more work than was allowed.
     """
 
     verdict: Verdict
@@ -64,6 +72,7 @@ class Judgement:
     followed: float | None = None
     observed: bool = False
     lasting: float | None = None
+    given_up: tuple[str, ...] = ()
 
     @property
     def swing(self) -> Cycle | Swing | None:
@@ -98,25 +107,39 @@ class Motions:
         return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
 
 
-WORK = ("what attracts the stage", "other bandwidths", "kicks and moves")
+PARTS = ATTRACTION, BANDWIDTHS, STARTS = "what attracts the stage", "other bandwidths", "kicks and moves"
 """What is computed for a verdict, in this order; without a cycle that attracts the last is left out."""
 
 
-def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None] = lambda label: None) -> Judgement:
-    """The verdict on a stage whose motion was run and measured at a relative tolerance; `begin` is told what work is
-    begun (see `WORK`)."""
-    flat, motions = stage.flat(), Motions.of(ran)
-    begin(WORK[0])
-    moves_on = _keeps_moving(flat) and not cannot_hunt(stage)
-    attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
+def judge(
+    stage: Stage,
+    ran: Measures,
+    rtol: float,
+    begin: Callable[[str], None] = lambda label: None,
+    work: float = WORK,
+) -> Judgement:
+    """The verdict on a stage whose motion was run and measured at a relative tolerance; `begin` is told what is begun
+    (see `PARTS`). What cannot be settled by so much `work` (see `friso.engine.allowance`) is not certain."""
+    motions = Motions.of(ran)
+    begin(ATTRACTION)
+    with allowance() as spent:
+        moves_on = _keeps_moving(stage.flat()) and not cannot_hunt(stage)
+        attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=SURVEY * work)
     if not motions.completed[0]:
         return Judgement("failed", attraction)
+    begin(BANDWIDTHS)
     if attraction.target:
-        return _with_a_target(stage, motions, attraction, attraction.target, begin)
-    begin(WORK[1])
-    rest = _rest(flat, motions, 1, options(rtol), possible=attraction.possible)
+        return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used)
+    return _without_a_target(stage, motions, rtol, attraction, work - spent.used)
+
+
+def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: Hunting, work: float) -> Judgement:
+    with allowance() as spent:
+        rest = _rest(stage.flat(), motions, 1, options(rtol), possible=attraction.possible)
     observed = bool(rest.steady[0])
-    sought = searched(stage, False, attraction.surveyed) if attraction.possible and not observed else NOT_SOUGHT
+    sought, given_up = NOT_SOUGHT, ()
+    if attraction.possible and not observed:
+        sought, given_up = _sought(stage, attraction, work - spent.used)
     if sought.contradicts:
         attraction = replace(attraction, certain=False, reason=REACHED)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
@@ -130,30 +153,49 @@ def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None]
         followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
         observed=observed,
         lasting=float(rest.swing[0]) if observed else None,
+        given_up=given_up,
     )
 
 
 def _with_a_target(
-    stage: Stage, motions: Motions, attraction: Hunting, target: Target, begin: Callable[[str], None]
+    stage: Stage,
+    motions: Motions,
+    attraction: Hunting,
+    target: Target,
+    begin: Callable[[str], None],
+    work: float,
 ) -> Judgement:
-    begin(WORK[1])
-    ends, completed = ends_in(stage.flat(), 1, target)
-    if not completed[0]:
-        return Judgement("failed", attraction)
-    within, sought = float(motions.settling[0]), searched(stage, True, attraction.surveyed)
-    begin(WORK[2])
+    with allowance() as spent:
+        ends, completed = ends_in(stage.flat(), 1, target)
+        if not completed[0]:
+            return Judgement("failed", attraction)
+        within = float(motions.settling[0])
+        sought, given_up = _sought(stage, attraction, (1 - KICKS) * work - spent.used)
+    begin(STARTS)
+    starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
+    try:
+        with allowance(work - spent.used):
+            starts = displacements(stage, target), pushes(stage, target), moves(stage, target)
+    except Exhausted:
+        given_up = (*given_up, STARTS)
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
         attraction,
-        displacements(stage, target),
-        pushes(stage, target),
-        moves(stage, target),
+        *starts,
         _as_sure(sought.margin, attraction),
         sought.windows,
         sought.lower,
         None if ends[0] or not np.isfinite(within) else within,
         observed=not attraction.attracting,
+        given_up=given_up,
     )
+
+
+def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[Searched, tuple[str, ...]]:
+    """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
+    with allowance(work) as search:
+        sought = searched(stage, attraction.target is not None, attraction.surveyed)
+    return sought, (BANDWIDTHS,) if search.exhausted else ()
 
 
 def _as_sure(edge: Margin | None, attraction: Hunting) -> Margin | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.engine.allowance import Exhausted
 from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
@@ -107,23 +108,33 @@ def attractors(
     relative tolerance. Motions begin from the `distances` [m], (count, n), too, where they are finite. Without
     `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
     Starts are tried `at_once`, and beside the cycles, by a thorough survey and where nothing is thought to attract: one
-    run alone takes as long as eight together."""
+    run alone takes as long as eight together. A thorough survey whose allowance is used up tells what it has found by
+    then, which is decided where an orbit was closed; others raise Exhausted."""
     survey, numbers = Survey(stages.count, thorough, rtol, prove=cycles), np.arange(stages.count)
     at_once = thorough or at_once
-    suggested = families(stages, rtol) if at_once and cycles else ()
-    starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
-    if distances is not None:
-        starts.stuck_at(distances)
-    starts.spread(thorough)
-    _take_notice(starts, survey, numbers, suggested)
-    for runs, owners in starts.waves(at_once):
-        survey.follow(runs, owners)
-    if cycles and not at_once:
-        _try_cycles(starts, survey, rtol)
-    decided = survey.attracted | ~survey.unknown
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
-    surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, nothing)
-    return _tried_again(stages, surveyed, rtol) if thorough else surveyed
+    suggested: tuple[Cycles, ...] = ()
+    try:
+        if at_once and cycles:
+            suggested = families(stages, rtol)
+        starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
+        if distances is not None:
+            starts.stuck_at(distances)
+        starts.spread(thorough)
+        _take_notice(starts, survey, numbers, suggested)
+        for runs, owners in starts.waves(at_once):
+            survey.follow(runs, owners)
+        if cycles and not at_once:
+            _try_cycles(starts, survey, rtol)
+        decided = survey.attracted | ~survey.unknown
+        surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, nothing)
+        return _tried_again(stages, surveyed, rtol) if thorough else surveyed
+    except Exhausted:
+        if not thorough:
+            raise
+        proved = np.zeros(stages.count, bool)
+        proved[[motion.stage for motion in survey.attracting if motion.cycles is not None]] = True
+        return Attractors(tuple(survey.attracting), proved, typical, suggested, nothing)
 
 
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:

@@ -47,7 +47,7 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
     for group in (numbers[octave == n] for n in np.unique(octave)):
         runs, step = pending.take(group), float(times[group].min()) / SAMPLES
-        paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step, least_swing=np.inf).samples
+        paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step).samples
         for k, path in zip(group, paths, strict=True):
             crossed = _balanced(
                 path[:, stages.integral] - balance[k] * path[:, stages.sticking], path[:, stages.sticking]

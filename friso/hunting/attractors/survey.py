@@ -16,6 +16,10 @@ ROUNDS = 5
 STEPS, FEWER = 10_000_000, 6_000_000
 """Steps that all runs of a stage take together at most until they are given up, in a thorough survey and in others."""
 
+UNPROVED = 400_000
+"""Steps that a run takes in a round at most where nothing has to be proved: of many stages at once a single one keeps
+all others waiting."""
+
 ALIKE = 0.05
 """Share by which the time and the peak to peak of two motions differ at most that are the same."""
 
@@ -177,7 +181,8 @@ class Survey:
             if not keep.size:
                 return
             owners, before = owners[keep], before[keep]
-            runs, ends = one_round(runs.take(keep), self.left[owners].max())
+            most = self.left[owners].max()
+            runs, ends = one_round(runs.take(keep), most if self.prove else min(most, UNPROVED))
             swinging = self._still_swinging(runs, owners, ends, early=number < PATIENCE)
             swinging = self._within_budget(swinging, owners, ends)
             if not swinging.size:

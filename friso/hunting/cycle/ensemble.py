@@ -154,7 +154,10 @@ class Ensemble:
     ) -> Results:
         """Run each stage from its state for its duration [s]; `run_options` as in `RunOptions`. Modes that remember are
         those in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too.
-        Deviations may be `along` keys (see `KernelRequest`), by what the flat keys say of them."""
+        Deviations may be `along` keys (see `KernelRequest`), by what the flat keys say of them. Turning points are kept
+        where a `least_swing` is asked for: a limiter that chatters makes so many that runs would have to be repeated
+        with more room."""
+        run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
         parts = list(run_chunks(kernel(self.structure, variational, along=along), flat, self.count, options, starts))

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.engine.allowance import allowance
 from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
@@ -30,6 +31,9 @@ followed for; and up to which share a deviation counts as small."""
 
 UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
 """Why it is not certain whether anything attracts a stage."""
+
+GIVEN_UP = "the search for what attracts the stage would have taken more work than a check may"
+"""The same where an allowance was used up."""
 
 SMALL_GAP, ROUNDING = 0.002, 1e-9
 """Share of the break-away force by which friction falls with speed: the smallest for which cycles are of a size that is
@@ -157,10 +161,12 @@ def why_not(form: Structure) -> str:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
+def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     """The hunting cycles of a stage, and whatever else attracts it.
 
-    The motion of the stage file plays no part. Raises ValueError for a tolerance that is not usable.
+    The motion of the stage file plays no part. The search for what attracts may use so much `work` (see
+    `friso.engine.allowance`); what it could not settle by then is not certain. Raises ValueError for a tolerance that
+    is not usable.
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
@@ -169,12 +175,13 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     flat = stage.flat()
     kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
-    survey = attractors(stages, thorough=True, rtol=rtol)
+    with allowance(work) as search:
+        survey = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in survey.motions if m.cycles is not None]
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
     beyond = "" if survey.motions else _beyond_the_search(stages)
     certain = bool(survey.decided[0]) and not beyond
-    doubt = beyond or (FLIPS if survey.flips[0] else UNDECIDED)
+    doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
     reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
         cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),

@@ -83,6 +83,7 @@ def _case(case: Case) -> dict[str, Any]:
         "kick": _kick(judgement),
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
+        "given_up": judgement.given_up,
         "loop_unstable_while_it": case.unstable,
         **({"feeding": _feeding(case.feeding)} if case.feeding else {}),
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from friso.axis import axis_shown
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
+from friso.hunting.verdict import BANDWIDTHS, STARTS
 from friso.views.check.cases import BANDS, ShownCase
 from friso.views.check.words import at_the_end, edge_text
 from friso.views.drawing.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Kick
 
 _WINDOWS = 4  # windows of kicks that are listed, at most
+UNKNOWN = "not determined: that takes more work than a check may"
 
 
 def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
@@ -69,13 +71,13 @@ def _verdict(case: Case) -> str:
 def _edge(case: Case) -> str:
     edge = case.judgement.margin
     if edge is None:
-        return NOTHING
+        return UNKNOWN if BANDWIDTHS in case.judgement.given_up else NOTHING
     return f"{edge_text(case, edge.end)}{'' if edge.certain else ' (not certain)'}"
 
 
-def _kicks(kick: Kick | None, unit: str) -> str:
+def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
     if kick is None:
-        return NOTHING
+        return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
     if not kick.windows:
         return f"none from {range_with_unit(*kick.searched, unit)}"
     searched = range_with_unit(*kick.searched, unit)
@@ -91,7 +93,7 @@ def _kicks(kick: Kick | None, unit: str) -> str:
 def _moves(case: Case) -> str:
     moves = case.judgement.moves
     if moves is None:
-        return NOTHING
+        return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
     low, high = moves.interval
     return f"{100 * moves.fraction:.0f} % ({100 * low:.0f} to {100 * high:.0f} %) of {moves.count} moves"
 
@@ -130,8 +132,8 @@ _COLUMNS: dict[str, Callable[[Case], str]] = {
     "Observed in simulations": _observed,
     "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
     "Edge of hunting": _edge,
-    "Displacements that hunt": lambda case: _kicks(case.judgement.displacement, "m"),
-    "Pushes that hunt": lambda case: _kicks(case.judgement.push, "m/s"),
+    "Displacements that hunt": lambda case: _kicks(case, case.judgement.displacement, "m"),
+    "Pushes that hunt": lambda case: _kicks(case, case.judgement.push, "m/s"),
     "Moves that end in hunting": _moves,
     "Counted peaks": _peaks,
     "Peak to peak, last quarter": at_the_end,

@@ -9,6 +9,7 @@ from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import DISTANCE, FARTHEST
+from friso.hunting.verdict import BANDWIDTHS, STARTS
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
@@ -85,10 +86,17 @@ def _bistable(case: Case) -> str:
         like = f"this move at {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and acceleration time"
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
     first = _unmoved(case) if case.unmoved else "settles after this move"
+    if STARTS in case.judgement.given_up:
+        return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if not starts:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
     seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
     return f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
+
+
+def _too_much(what: str) -> str:
+    """That something was not determined."""
+    return f"{what} was not determined, as that takes more work than a check may"
 
 
 def _kick(name: str, kick: Kick, unit: str) -> str:
@@ -149,9 +157,18 @@ def _outlook(case: Case) -> list[str]:
     says: list[str] = []
     if judgement.margin:
         says.append(f"Hunting is possible {_below(case, judgement.margin)}.")
-    elif judgement.hunting.possible:
+    elif judgement.hunting.possible and BANDWIDTHS not in judgement.given_up:
         says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
-    return [*says, *_windows(case)]
+    return [*says, *_windows(case), *_unsearched(case)]
+
+
+def _unsearched(case: Case) -> list[str]:
+    """That the search through the bandwidths was given up."""
+    if BANDWIDTHS not in case.judgement.given_up:
+        return []
+    if case.judgement.margin:
+        return ["The search for the edge of hunting was given up there: it takes more work than a check may."]
+    return [f"{_too_much('At which bandwidths hunting is possible')}."]
 
 
 def _below(case: Case, edge: Margin) -> str:
@@ -200,8 +217,8 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     ways += [_slower(item.case, judgement.lower)] if judgement.lower else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
-    if judgement.margin:
-        return [*says, *_windows(item.case)]
+    if judgement.margin or BANDWIDTHS in judgement.given_up:
+        return [*says, *_windows(item.case), *_unsearched(item.case)]
     if judgement.hunting.target is None:
         return says
     return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says]

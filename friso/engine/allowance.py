@@ -1,0 +1,81 @@
+"""How much may be computed to answer one question: counted in work rather than in time, so that the answer is the same
+on every machine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+
+from friso.engine.layout import LANES
+
+PER_BATCH = 1e5
+"""Work to prepare a batch of runs."""
+
+FAIR = 2.0
+"""Share of what is left that each of several runs may take, in units of an equal share."""
+
+
+class Exhausted(Exception):
+    """The work allowed does not suffice for the runs that were to be done."""
+
+
+@dataclass
+class Allowance:
+    """The `work` that runs may take together, in steps times states (about 12 ns each on a core of 2024), and what of
+    it is `used`; and whether it was `exhausted`: it did not suffice. Work beyond an allowance `around` this one is not
+    allowed either."""
+
+    work: float
+    around: Allowance | None = None
+    used: float = 0.0
+    exhausted: bool = False
+
+    @property
+    def left(self) -> float:
+        """What may still be used."""
+        own = self.work - self.used
+        return own if self.around is None else min(own, self.around.left)
+
+    def most_steps(self, runs: int, states: int) -> float:
+        """How many steps each of some runs may take. Raises Exhausted if nothing is left."""
+        left = self.left
+        if left <= 0:
+            self.exhaust()
+        return left / states * min(1 / LANES, FAIR / runs)
+
+    def exhaust(self) -> NoReturn:
+        """Tell that the allowance does not suffice: raises Exhausted."""
+        self.exhausted = True
+        raise Exhausted
+
+    def charge(self, steps: np.ndarray, states: int) -> None:
+        """Count the work of a batch of runs by their steps, shape (runs,): a run alone takes as long as eight."""
+        work = PER_BATCH + states * max(float(np.sum(steps)), LANES * float(np.max(steps, initial=0.0)))
+        at: Allowance | None = self
+        while at is not None:
+            at.used += work
+            at = at.around
+
+
+_CURRENT: ContextVar[Allowance | None] = ContextVar("allowance", default=None)
+
+
+def current_allowance() -> Allowance | None:
+    """The allowance under which runs are done now, if any."""
+    return _CURRENT.get()
+
+
+@contextmanager
+def allowance(work: float = np.inf) -> Iterator[Allowance]:
+    """Let all runs within use so much work together; where it does not suffice, the run raises Exhausted."""
+    some = Allowance(work, _CURRENT.get())
+    token = _CURRENT.set(some)
+    try:
+        yield some
+    finally:
+        _CURRENT.reset(token)
