@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -24,15 +25,27 @@ FAST = 1e3
 """Speed at which friction is viscous and no more, in units of that of the loop's own motion."""
 
 
-@np.errstate(all="ignore")  # absurd gains leave infinities behind
 def unstable(stage: Stage) -> tuple[LoopState, ...]:
     """In which of its states the loop is not stable, the limiter not touched: while the stage sticks, held by its
     bristles, and while it slides, with no friction but its viscous share."""
-    stages = Ensemble.held(stage.flat(), 1)
+    return tuple(state for state, where in unstable_among(Ensemble.held(stage.flat(), 1)).items() if where[0])
+
+
+@np.errstate(all="ignore")  # absurd gains leave infinities behind
+def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
+    """The loops of which stages are not stable in each of these states, shape (count,)."""
     stuck = _rates(stages)
     loops: dict[LoopState, np.ndarray] = {"sticks": stuck, "slides": _sliding(stages, stuck)}
-    limit = GROWTH * stages.number("rate")[0]
-    return tuple(state for state, matrix in loops.items() if np.linalg.eigvals(matrix).real.max() > limit)
+    limit = GROWTH * stages.number("rate")
+    return {state: _growth(matrices) > limit for state, matrices in loops.items()}
+
+
+def _growth(matrices: np.ndarray) -> np.ndarray:
+    """The fastest growth rates [1/s] of linear equations, (count, states, states); NaN where these are not finite."""
+    rates = np.full(len(matrices), np.nan)
+    finite = np.isfinite(matrices).all(axis=(1, 2))
+    rates[finite] = np.linalg.eigvals(matrices[finite]).real.max(axis=1)
+    return rates
 
 
 def _motor_state(stages: Ensemble, which: int) -> int:
@@ -41,65 +54,70 @@ def _motor_state(stages: Ensemble, which: int) -> int:
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
-def _moved(stages: Ensemble) -> list[np.ndarray]:
-    """Each state moved a little from rest at the reference, all others at rest."""
-    return list((STEP * np.diag(stages.scales[0]))[:, None])
+def _moved(stages: Ensemble) -> Iterator[np.ndarray]:
+    """Each state moved a little from rest at the reference, all others at rest, (count, states)."""
+    for k, scale in enumerate(stages.scales.T):
+        moved = np.zeros(stages.scales.shape)
+        moved[:, k] = STEP * scale
+        yield moved
 
 
 def _rates(stages: Ensemble) -> np.ndarray:
-    """Derivatives of the rates at rest by the states, in units of the magnitudes of these."""
-    flank = np.zeros((1, len(stages.kernel.states)))
+    """Derivatives of the rates at rest by the states, in units of the magnitudes of these, (count, states, states)."""
+    flank = np.zeros((stages.count, len(stages.kernel.states)))
     if stages.structure.plays:  # the loop is open within a backlash
-        flank[0, _motor_state(stages, 0)] = stages.flat[BACKLASH]
+        flank[:, _motor_state(stages, 0)] = stages.flat[BACKLASH]
     moved = ((flank + step, flank - step) for step in _moved(stages))
-    columns = [(stages.rates(ahead) - stages.rates(behind))[0] / (2 * STEP) for ahead, behind in moved]
-    return np.array(columns).T / stages.scales[0][:, None]
+    columns = [(stages.rates(ahead) - stages.rates(behind)) / (2 * STEP) for ahead, behind in moved]
+    return np.stack(columns, axis=2) / stages.scales[:, :, None]
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray) -> np.ndarray:
     """The same without friction but for its viscous share; without the states of the friction law."""
-    kernel = stages.kernel
+    kernel, flat = stages.kernel, stages.flat
     bodies = ("cart", "stage") if stages.structure.joint == "rigid" else ("cart",)
-    mass = sum(float(stages.flat.get(f"masses.{body}", 0.0)) for body in bodies)
+    mass = sum(np.asarray(flat.get(f"masses.{body}", 0.0)) for body in bodies)
     matrix = stuck.copy()
     for output, body, own in (
         ("friction_force", kernel.cart_velocity, mass),
-        ("motor_friction_force", _motor_state(stages, 1), float(stages.flat.get(MOTOR_MASS, 0.0))),
+        ("motor_friction_force", _motor_state(stages, 1), np.asarray(flat.get(MOTOR_MASS, 0.0))),
     ):
         if output not in kernel.outputs:
             continue
-        unit = stages.scales[0, body]
+        unit = stages.scales[:, body]
         for k, step in enumerate(_moved(stages)):
             change = _force(stages, step, output) - _force(stages, -step, output)
-            matrix[body, k] += change / (2 * STEP * own * unit)
-        matrix[body, body] -= _viscous(stages, FAST * unit, output) / own
+            matrix[:, body, k] += change / (2 * STEP * own * unit)
+        matrix[:, body, body] -= _viscous(stages, FAST * unit, output) / own
     bristles = kernel.having(Role.BRISTLE)
-    return np.delete(np.delete(matrix, bristles, 0), bristles, 1)
+    return np.delete(np.delete(matrix, bristles, 1), bristles, 2)
 
 
-def _viscous(stages: Ensemble, speed: float, output: str) -> float:
-    """By how much a friction force rises with speed [N s/m] beyond a high one [m/s]."""
+def _viscous(stages: Ensemble, speed: np.ndarray, output: str) -> np.ndarray:
+    """By how much a friction force rises with speed [N s/m] beyond a high one [m/s], both (count,)."""
     slow, fast = (_force(stages, _slid(stages, times * speed), output) for times in (1.0, 2.0))
     return (fast - slow) / speed
 
 
-def _slid(stages: Ensemble, speed: float) -> np.ndarray:
-    """States of a stage that has slid for long at a speed [m/s]: those of the friction law do not change any more."""
+def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
+    """States of stages that have slid for long at a speed [m/s] each: those of the friction law do not change any
+    more."""
     states = stages.settled(Steady(0.0, 0.0, speed))
     bristles = stages.kernel.having(Role.BRISTLE)
-    begun = stages.rates(states)[0, bristles]
-    changes = np.empty((len(bristles), len(bristles)))
+    begun = stages.rates(states)[:, bristles]
+    changes = np.empty((stages.count, len(bristles), len(bristles)))
     for column, k in enumerate(bristles):
         moved = states.copy()
-        moved[0, k] += stages.scales[0, k]
-        changes[:, column] = (stages.rates(moved)[0, bristles] - begun) / stages.scales[0, k]
-    states[0, bristles] -= np.linalg.lstsq(changes, begun, rcond=None)[0]
+        moved[:, k] += stages.scales[:, k]
+        changes[:, :, column] = (stages.rates(moved)[:, bristles] - begun) / stages.scales[:, k, None]
+    for state, change, rate in zip(states, changes, begun, strict=True):
+        state[bristles] -= np.linalg.lstsq(change, rate, rcond=None)[0]
     return states
 
 
-def _force(stages: Ensemble, states: np.ndarray, output: str) -> float:
-    """A force [N] among the outputs."""
+def _force(stages: Ensemble, states: np.ndarray, output: str) -> np.ndarray:
+    """A force [N] among the outputs, shape (count,)."""
     kernel = stages.kernel
     modes = kernel.modes(states.T, 0.0, np.zeros(3), stages.values)
     rows = kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), stages.values)
-    return float(np.ravel(rows[list(kernel.outputs).index(output)])[0])
+    return np.broadcast_to(rows[list(kernel.outputs).index(output)], (stages.count,))

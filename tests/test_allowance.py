@@ -1,0 +1,61 @@
+"""The work that a question may take: counted in steps, the same on every machine."""
+
+import numpy as np
+import pytest
+
+from friso.engine.allowance import Exhausted, allowance
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.structure import structure
+from friso.hunting.measures import measured_run
+from friso.hunting.verdict import BANDWIDTHS, STARTS, judge
+from friso.stage import Stage
+
+
+@pytest.fixture(scope="module")
+def locked(rig: Stage) -> Stage:
+    """The thesis rig, its joint locked."""
+    return rig.variants()["locked"]
+
+
+def runs_of(stage: Stage, count: int) -> np.ndarray:
+    """The steps that runs of a stage take, shape (count,)."""
+    flat = stage.flat()
+    (runs,) = run_chunks(kernel(structure(flat)), flat, count, RunOptions())
+    return runs.statistic("attempted")
+
+
+def test_work_is_counted_by_states_and_steps(locked: Stage) -> None:
+    states = len(kernel(structure(locked.flat())).full_state)
+    with allowance() as around, allowance() as several:
+        steps = runs_of(locked, 24)
+    assert several.used == around.used >= states * steps.sum()
+    with allowance() as single:
+        runs_of(locked, 1)
+    assert several.used / 24 < single.used < several.used  # a run alone keeps a whole vector busy
+
+
+def test_runs_beyond_an_allowance_are_refused(locked: Stage) -> None:
+    with allowance() as needed:
+        runs_of(locked, 1)
+    with allowance(needed.used / 4) as too_little, pytest.raises(Exhausted):
+        runs_of(locked, 1)
+    assert too_little.exhausted
+    with allowance(needed.used / 4), allowance(2 * needed.used), pytest.raises(Exhausted):
+        runs_of(locked, 1)
+    runs_of(locked, 1)  # without one, as many as are wanted
+
+
+def test_what_too_little_work_does_not_settle_is_not_certain(locked: Stage) -> None:
+    """The stage of the thesis hunts: the more of the work is missing, the less is said, and nothing else."""
+    full = judge(locked, measured_run(locked), 1e-6)
+    half = judge(locked, measured_run(locked), 1e-6, work=5e7)
+    none = judge(locked, measured_run(locked), 1e-6, work=1e5)
+    assert not full.given_up
+    assert full.margin
+    assert full.margin.certain
+    assert half.verdict == full.verdict == "hunts"
+    assert BANDWIDTHS in half.given_up
+    assert half.margin is None or not half.margin.certain
+    assert not none.hunting.certain
+    assert STARTS in half.given_up
