@@ -3,6 +3,7 @@
 import json
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -228,6 +229,7 @@ def round_a_fold() -> Diagram:
         cycles([-0.5, np.nan, np.inf]),
         attracts=np.array([True, False, False]),
         decided=np.array([True, True, False]),
+        unstable=np.zeros(3, bool),
     )
 
 
@@ -250,6 +252,18 @@ def test_sentences_tell_what_becomes_of_a_cycle_as_the_key_rises(round_a_fold: D
     snapshots.check("boundary", "one key", "\n".join([answer, *changes, followed]))
 
 
+def test_an_unstable_loop_is_said_first(round_a_fold: Diagram, crossing: Plane) -> None:
+    high = replace(round_a_fold, unstable=np.array([False, True, True]))
+    first, rest = sentences(high, (MM,))[0].split(": there, ")
+    assert first.startswith("The loop is unstable")
+    assert "2 of the 3" in first
+    assert "joint.stroke 1.5 to 2 mm" in first
+    assert rest.endswith(conclusion(round_a_fold, (MM,)))
+    corner = replace(crossing, unstable=np.array([False, True, False]))
+    keys = (MM, ShownKey("controller.kp", "N/m"))
+    assert "joint.stroke 1 to 1 mm and controller.kp 100 to 100 N/m" in conclusion(corner, keys)
+
+
 def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: Diagram) -> None:
     figure = boundary_figure(round_a_fold, (MM,), "Rig")
     assert [panel.y.quantity for panel in figure.panels] == ["Amplitude", "Period", "Multiplier"]
@@ -268,7 +282,8 @@ def crossing() -> Plane:
     across = np.array([1.0, 0.0])
     spots = tuple(Spot(np.array([0.5, y]), found("flip", 0.0, -1), across) for y in (0.0, 0.5, 1.0))
     curve = Curve("flip", -1.0, spots, ("end of the range", "end of the range"))
-    known = cycles([-0.5, np.inf, -2]), np.array([True, False, False]), np.array([True, False, True])
+    stable = np.zeros(3, bool)
+    known = cycles([-0.5, np.inf, -2]), np.array([True, False, False]), np.array([True, False, True]), stable
     return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), *known, (np.array([0.5, 0.25]),))
 
 

@@ -15,10 +15,11 @@ ATTRACTED = ("hunts", "bistable")
 
 @dataclass(frozen=True)
 class Edge:
-    """The edge of hunting as a factor of the stage's bandwidth, and whether it is sure."""
+    """The edge of hunting as a factor of the stage's bandwidth, whether it is sure, and up to what share of it."""
 
     factor: float
     sure: bool
+    reserve: float
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def checked(stage: Stage) -> Checked:
 def _claim(name: str, case: Case) -> Claim:
     said = case.judgement
     sure = said.hunting.certain and case.verdict != "failed"
-    edge = Edge(said.margin.factor, sure and said.margin.certain) if said.margin else None
+    edge = Edge(said.margin.factor, sure and said.margin.certain, said.margin.reserve) if said.margin else None
     windows = said.displacement.windows if said.displacement else ()
     kicks = tuple((low * high) ** 0.5 for low, high in windows)
     return Claim(name, case.stage, case.verdict, sure, edge, kicks)

@@ -26,8 +26,9 @@ SECOND = 24
 TRIED, MOST = 3, 0.5
 """Starts of those that swing on which are looked at closely, and the share of its neighbours that take a swing up."""
 
-ABOVE = (1.01, 1.1, 1.6)
-"""Factors above the edge at which nothing may attract."""
+ABOVE = (1.002, 1.005, 1.01, 1.1, 1.6)
+"""Factors above the edge at which nothing may attract; those within the range that the edge itself is known to are left
+out."""
 
 BELOW = (0.995, 0.98, 0.95)
 """Factors below it; at one of them at least something must."""
@@ -155,8 +156,9 @@ def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
     """Whether nothing attracts on the far side of the edge, and something on the near side."""
     assert claim.edge
-    edge = claim.edge.factor
-    for factor in ABOVE if claim.attracted else (factor for factor in (*ABOVE[:2], edge**-0.5) if edge * factor < 1):
+    edge, nearest = claim.edge.factor, 1 + claim.edge.reserve
+    beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], edge**-0.5) if edge * factor < 1]
+    for factor in (factor for factor in beyond if factor > nearest):
         bench = Bench(at(claim, edge * factor))
         if why := swinging(bench, bench.starts(*FEW, seed)):
             place = f"at {factor:.4g} times the edge{_crossover(bench.flat)}"

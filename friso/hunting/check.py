@@ -100,13 +100,17 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     different: list[Stage] = []
     different += (variant for variant in variants.values() if variant not in different)
     done = Tally(progress, len(different) * len(PARTS))
-    judged: list[Case] = []
+    judged: list[tuple[Stage, Case]] = []
     left = WORK
-    for variant in different:
+    for variant in sorted(different, key=_is_free):  # a free joint takes the most work: it gets what the other leaves
         with allowance() as spent:
-            judged.append(_case(variant, rtol, traces, done, left / (len(different) - len(judged))))
+            judged.append((variant, _case(variant, rtol, traces, done, left / (len(different) - len(judged)))))
         left -= spent.used
-    return {name: judged[different.index(variant)] for name, variant in variants.items()}
+    return {name: next(case for stage, case in judged if stage == variant) for name, variant in variants.items()}
+
+
+def _is_free(stage: Stage) -> bool:
+    return stage.joint is not None and not stage.joint.locked
 
 
 def check_given(stage: Stage, rtol: float = RTOL) -> Case:

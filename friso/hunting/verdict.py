@@ -39,7 +39,7 @@ MOVING = "the reference never stands still"
 WORK = 7e8
 """Work of a check (see `friso.engine.allowance`): about 8 s on one core."""
 
-SURVEY, KICKS = 0.4, 0.2
+SURVEY, KICKS = 0.4, 0.3
 """Shares of the work of a verdict that the search for what attracts the stage may use, and that are kept for kicks and
 moves."""
 

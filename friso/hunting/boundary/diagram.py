@@ -12,6 +12,7 @@ from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.loop import unstable_among
 
 SEEDS = 33
 """Stages over the range at which cycles are looked for."""
@@ -27,7 +28,8 @@ SAME = 0.02
 @dataclass(frozen=True)
 class Diagram:
     """Branches of cycles over the range of one key, the special points of each, and, of stages evenly over the range
-    (their places), the hunting cycles, whether anything attracts, and whether that is known, shape (places,)."""
+    (their places), the hunting cycles, whether anything attracts, whether that is known, and whether their loop is
+    unstable, whatever the friction does, shape (places,)."""
 
     space: Space
     branches: tuple[Branch, ...]
@@ -36,6 +38,7 @@ class Diagram:
     cycles: Cycles
     attracts: np.ndarray
     decided: np.ndarray
+    unstable: np.ndarray
 
     def value(self, place: float) -> float:
         """The value of the key [SI] at a place."""
@@ -75,9 +78,9 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
         if motion.cycles is not None and skipped < OTHERS:
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     attracts = surveyed.attracts | sought[0].attracting
-    return Diagram(
-        space, tuple(branches), tuple(special), places, sought[0], attracts, surveyed.decided | sought[0].attracting
-    )
+    decided = surveyed.decided | sought[0].attracting
+    unstable = np.any([*unstable_among(stages).values()], axis=0)
+    return Diagram(space, tuple(branches), tuple(special), places, sought[0], attracts, decided, unstable)
 
 
 def _passes(branch: Branch, point: Point) -> bool:

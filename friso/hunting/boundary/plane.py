@@ -15,6 +15,7 @@ from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.loop import unstable_among
 
 NODES = 13
 """Stages along either side of the grid from which curves are looked for."""
@@ -27,7 +28,8 @@ SAME = 0.2
 class Plane:
     """What was found in the box of two keys: the curves; the hunting cycles on those nodes of a grid, numbered in C
     order with the first key along the first side, that are `allowed`; whether anything attracts the stages on these,
-    and whether that is known; and where a change was seen that no curve could be begun at, each shape (2,)."""
+    whether that is known, and whether their loop is unstable, whatever the friction does; and where a change was seen
+    that no curve could be begun at, each shape (2,)."""
 
     space: Space
     curves: tuple[Curve, ...]
@@ -36,6 +38,7 @@ class Plane:
     cycles: Cycles
     attracts: np.ndarray
     decided: np.ndarray
+    unstable: np.ndarray
     gaps: tuple[np.ndarray, ...]
 
 
@@ -75,7 +78,8 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
         known_gap = any(np.array_equal(middle, at) for at in gaps)
         if not known_gap and not any(_crossed(curve, points[a], points[b]) for curve in curves):
             gaps.append(middle)
-    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, tuple(gaps))
+    unstable = np.any([*unstable_among(stages).values()], axis=0)
+    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps))
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:

@@ -7,6 +7,8 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from friso.hunting.boundary import END_OF_RANGE, Diagram, KeyRange, Plane, Space
 from friso.studies.boundary_lines import (
     ATTRACTS,
@@ -85,7 +87,25 @@ def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 
 
 def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
-    """Where hunting is possible, and where it ends."""
+    """Where hunting is possible, and where it ends; first of all, where the loop is not stable."""
+    return " ".join([*_unstable(traced, keys), _where(traced, keys)])
+
+
+def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+    """At which of the values tried the loop is not stable, whatever the friction."""
+    if not traced.unstable.any():
+        return []
+    points = traced.places[:, None] if isinstance(traced, Diagram) else traced.space.grid(traced.nodes)[traced.allowed]
+    values = traced.space.values(points[traced.unstable]).values()
+    box = zip(keys, values, traced.space.ranges, strict=True)
+    places = listed([f"{key.key} {key.extent(column, swept)}" for key, column, swept in box], "and")
+    return [
+        f"The loop is unstable, whatever the friction, at {np.count_nonzero(traced.unstable)} of the "
+        f"{traced.unstable.size} stages tried ({places}): there, retune the controller (friso bode)."
+    ]
+
+
+def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     if isinstance(traced, Diagram):
         return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
     verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
