@@ -117,7 +117,7 @@ def check_given(stage: Stage, rtol: float = RTOL) -> Case:
     """The case "given" alone. Raises ValueError for an `rtol` that is not usable."""
     checked_rtol(rtol)
     kernels(_needed(stage))
-    return _case(stage, rtol, False, Tally(silent, len(WORK)))
+    return _case(stage, rtol, False, Tally(silent, len(PARTS)), WORK)
 
 
 def _needed(stage: Stage) -> set[KernelRequest]:
