@@ -28,6 +28,7 @@ from friso.views.map.words import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.stage import Stage
     from friso.studies.study import Study
 
 MEANINGS = {
@@ -222,9 +223,24 @@ def _extent(runs: xr.Dataset) -> str:
 
 
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
-    """All that is said on the terminal: first what share of the map swings, and where."""
+    """All that is said on the terminal: first whether the loop is unstable, then what share of the map swings, and
+    where."""
     words = "; ".join(filter(None, (tally(runs, name) for name in KINDS)))
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
-    return [headline(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
+    answer = [*unstable_loop(study.stage), headline(runs, metric)]
+    return [*answer, extent, verification(runs), *caveats(runs, metric), *reasons]
+
+
+def unstable_loop(stage: Stage) -> list[str]:
+    """In which of its states the loop of the stage as its file gives it is unstable; nothing where it is stable."""
+    from friso.hunting.loop import unstable  # looking at a map needs no engine
+
+    if not (states := unstable(stage)):
+        return []
+    where = listed([f"while the stage {state}" for state in states], "and")
+    return [
+        f"The loop of the stage as its file gives it is unstable {where}, whatever the friction: retune the controller "
+        "(friso bode)."
+    ]
