@@ -21,7 +21,7 @@ FEW = (16, 8, 32, 8)
 """The same at a crossover beside an edge."""
 
 CLOSE = (0, 0, 600, 0)
-"""Starts 1.2 % apart, which are tried where none of these swings on although something is said to attract below an edge:
+"""Starts 1.2 % apart, tried where none of these swings on although something is said to attract just below an edge:
 there it may do so from no farther than 1.5 % about its own distance."""
 
 SECOND = 24
