@@ -179,10 +179,7 @@ class Sampled(Blocks):
     def dead_zone(self, error: Signal) -> Signal:
         """As the error is at a sample."""
         band = self.key("error_deadband")
-        value, settled = (
-            sp.Piecewise((part - band, part > band), (part + band, part < -band), (0, True))
-            for part in (error.value, error.settled)
-        )
+        value, settled = (part - clipped(part, band) for part in (error.value, error.settled))
         return replace(error, value=value, settled=settled, rate=None, before=None)
 
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
