@@ -42,14 +42,13 @@ def gains_of(stage: Stage, told: Mapping[str, Any], to: str | None = None) -> Ga
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
     known = {TRAVEL, MOTOR_CONSTANT}
     if kind is not None:
-        open_questions = kind.questions_back(flat, answers)
         known |= {question.key for question in kind.questions_back(flat, UserAnswers({}))}
     for key in told:
         if key not in known:
             raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(known))}")
     if kind is None:
         return Gains(stage, drawing(flat), conversions(flat, answers))
-    refuse_open(open_questions, f"--to {to}")
+    refuse_open(kind.questions_back(flat, answers), f"--to {to}")
     back = kind.parameters(flat, answers)
     return Gains(stage, drawing(flat), conversions(flat, answers), kind, back.values, _lost(flat, back.held))
 

@@ -86,7 +86,7 @@ def as_built(form: AsBuilt) -> Model:
     loops: list[Loop] = []
     model = assemble(form.structure, lambda stage: _cable(stage.position, stage.velocity), _drive(form, loops))
     position, cart = model.stage.position, model.cart.position
-    seen = {state("seen"): position}
+    seen: dict[sp.Symbol, sp.Expr] = {state("seen"): position}
     if loops[0].rated is not None:
         seen[state(RATED)] = loops[0].rated
     places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))

@@ -133,7 +133,8 @@ def _over_period(flat: Mapping[str, Any], machine: System, drive: DriveTiming, b
     """Poles of a loop of several rates, over its period; `bare` are those in continuous time."""
     controls = samples_controller(flat, len(machine.a), drive.period)
     closed, cut = closed_over_period(machine, controls), cut_over_period(machine, controls).a
-    return Poles(*(np.linalg.eigvals(matrix).astype(complex) for matrix in (closed, cut)), bare, drive)
+    closed, cut = (np.linalg.eigvals(matrix).astype(complex) for matrix in (closed, cut))
+    return Poles(closed, cut, bare, drive)
 
 
 def response(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:

@@ -45,21 +45,22 @@ class Lifted:
     def at(self, points: np.ndarray) -> Complex:
         """Its transfer matrices at points (k,) of z to the power N, shape (members, k, N, N)."""
         shifted = points[:, None, None] * np.eye(self.a.shape[-1]) - self.a[:, None]
-        return self.c[:, None] @ np.linalg.solve(shifted, self.b[:, None].astype(complex)) + self.d[:, None]
+        states = np.linalg.solve(shifted, self.b[:, None].astype(complex)).astype(complex)
+        return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
     def fundamental(self, turn: np.ndarray) -> Complex:
         """The part of the answer to a harmonic signal that has its frequency, shape (members, k), for the angle (k,)
         [rad] by which it turns in a sample."""
         turns = np.exp(1j * turn[:, None] * np.arange(self.d.shape[-1]))  # (k, N)
         answers = (self.at(turns[:, 1] ** self.d.shape[-1]) @ turns[..., None])[..., 0]
-        return (answers * turns.conj()).mean(axis=-1)
+        return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
 
     def locus(self, turn: np.ndarray) -> Complex:
         """The characteristic locus that is the loop at that frequency, shape (members, k): the eigenvalue that is
         closest to the fundamental."""
         every = np.linalg.eigvals(self.at(np.exp(1j * turn * self.d.shape[-1])))
         near = np.abs(every - self.fundamental(turn)[..., None]).argmin(axis=-1)
-        return np.take_along_axis(every, near[..., None], axis=-1)[..., 0]
+        return np.take_along_axis(every, near[..., None], axis=-1)[..., 0].astype(complex)
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
@@ -98,7 +99,7 @@ def _declared(form: ControllerForm, due: tuple[bool, ...]) -> Declared:
     bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
     y = sp.Symbol("measured_position", real=True)
     force, held = sampled_controller(bare, Loop(-y, y, sp.S.Zero, sp.S.Zero), 1)
-    passed = {counter(name): sp.Integer(not now) for name, now in zip(LOOPS, due, strict=True)}
+    passed: dict[Any, Any] = {counter(name): sp.Integer(not now) for name, now in zip(LOOPS, due, strict=True)}
     numbers: list[Held] = [number for number in held if number.symbol not in passed]
     following = tuple(sp.sympify(number.update).subs(passed) for number in numbers)
     symbols = tuple(number.symbol for number in numbers)
