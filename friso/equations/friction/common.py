@@ -128,7 +128,7 @@ class StribeckSection(FrictionSection):
     )
 
     @staticmethod
-    def variant(flat: Mapping[str, Any]) -> StribeckCurve:
+    def variant(flat: Mapping[str, Any]) -> Any:
         """What of the curve decides on its code: the exponent where it is a small whole number, and asymmetries."""
         exponent = float(flat["friction.stribeck_exponent"])
         return StribeckCurve(

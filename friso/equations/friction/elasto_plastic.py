@@ -72,7 +72,8 @@ class ElastoPlastic(StribeckSection):
             full = Kink(f"slipping_{name}", side * deflection - limit, starts=side * deflection - most)
             sliding |= {plastic.beyond: along, full.beyond: along}
             turns = (side * deflection - (limit + begins) / 2) / (limit - begins) / 2
-            rising = (1 + sine(turns)) / 2
+            swelling: Any = sine(turns)
+            rising = (1 + swelling) / 2
             shares.append(plastic.beyond * (rising + full.beyond * (1 - rising)))
             kinks += [plastic, full]
         ahead, behind = shares

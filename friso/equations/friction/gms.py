@@ -44,7 +44,7 @@ class Elements(NamedTuple):
     """What the equations depend on: the Stribeck curve, the number of elements, and whether they are damped."""
 
     curve: StribeckCurve
-    count: int
+    number: int
     damped: bool
 
 
@@ -91,7 +91,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
     )
 
     @staticmethod
-    def variant(flat: Mapping[str, Any]) -> Elements:
+    def variant(flat: Mapping[str, Any]) -> Any:
         """What decides on the code: the curve, the number of elements, and whether these are damped."""
         return Elements(
             StribeckSection.variant(flat), len(element_keys(flat, STIFFNESS)), bool(element_keys(flat, DAMPING))
@@ -113,7 +113,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         static, attraction = key("friction.static"), key("friction.attraction")
         force = viscous_force(velocity, forward.sign, curve)
         states, switches, outputs, sliding = [], [], {}, {}
-        for number in range(1, variant.count + 1):
+        for number in range(1, variant.number + 1):
             z, stiffness, share = state(f"deflection_{number}"), key(f"{STIFFNESS}.{number}"), key(f"{SHARE}.{number}")
             scale = share * static / stiffness
             limit = share * level / stiffness
