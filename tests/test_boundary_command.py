@@ -109,9 +109,9 @@ def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None
 def test_a_range_without_a_boundary_says_so(tmp_path: Path, snapshots: Snapshots) -> None:
     done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz")
     assert done.returncode == 0
-    said = " ".join(done.stdout.split())
-    assert said.count(VERDICTS["attracting cycle"]) == 2
-    assert VERDICTS["no attracting cycle"] not in said
+    text = " ".join(done.stdout.split())
+    assert text.count(VERDICTS["attracting cycle"]) == 2
+    assert VERDICTS["no attracting cycle"] not in text
     snapshots.check("boundary", "no boundary", done.stdout)
     assert list(tmp_path.iterdir()) == []
 
@@ -143,9 +143,9 @@ def test_the_curve_of_two_keys_separates_what_attracts(
             "masses.cart": np.tile(points[:, 1] / 1000, 2),
         }
     )
-    found = symmetric_cycles(Ensemble.held(flat, 2 * len(points)))
-    assert (np.split(np.abs(found.multiplier), 2)[0] < 1).all()
-    assert (np.split(np.abs(found.multiplier), 2)[1] > 1).all()
+    result = symmetric_cycles(Ensemble.held(flat, 2 * len(points)))
+    assert (np.split(np.abs(result.multiplier), 2)[0] < 1).all()
+    assert (np.split(np.abs(result.multiplier), 2)[1] > 1).all()
 
 
 @pytest.mark.parametrize(
@@ -182,12 +182,12 @@ def test_a_stage_that_cannot_hunt_is_refused(tmp_path: Path) -> None:
 def cycles(multipliers: Sequence[float], sign: float = -1.0) -> Cycles:
     """Made-up cycles of 1 mm and 2 s; NaN where there is none, infinite where the orbit could not be closed."""
     multiplier = np.array(multipliers)
-    found, count = np.isfinite(multiplier), len(multiplier)
+    result, count = np.isfinite(multiplier), len(multiplier)
     reasons = np.where(np.isinf(multiplier), NOT_CLOSED, "").astype(object)
     return Cycles(
         sign,
         1 if sign < 0 else 2,
-        found,
+        result,
         reasons,
         states=np.zeros((count, 2)),
         period=np.full(count, 2.0),
@@ -283,8 +283,8 @@ def crossing() -> Plane:
     spots = tuple(Spot(np.array([0.5, y]), found("flip", 0.0, -1), across) for y in (0.0, 0.5, 1.0))
     curve = Curve("flip", -1.0, spots, ("end of the range", "end of the range"))
     stable = np.zeros(3, bool)
-    known = cycles([-0.5, np.inf, -2]), np.array([True, False, False]), np.array([True, False, True]), stable
-    return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), *known, (np.array([0.5, 0.25]),))
+    expected = cycles([-0.5, np.inf, -2]), np.array([True, False, False]), np.array([True, False, True]), stable
+    return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), *expected, (np.array([0.5, 0.25]),))
 
 
 def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:

@@ -48,7 +48,7 @@ HUNTING = {name: stage(release("1 mm", "1 s"), friction=law, controller=van_dijk
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    forms = [structure(each.flat()) for each in HUNTING.values()]
+    forms = [structure(item.flat()) for item in HUNTING.values()]
     kernels([*map(KernelRequest, forms), *(KernelRequest(form, True) for form in forms)])
 
 
@@ -158,14 +158,14 @@ def test_bristles_that_would_not_slip_are_refused() -> None:
 
 
 def test_imposed_motion_takes_every_law() -> None:
-    assert {imposed_form(each.flat()).friction for each in HUNTING.values()} == {*LAWS}
+    assert {imposed_form(item.flat()).friction for item in HUNTING.values()} == {*LAWS}
 
 
 def test_what_of_them_is_fitted() -> None:
     """Of rolling friction what LuGre has, its exponent as given; elasto-plastic friction is refused, not ignored: its
     stiffness is bounded by its break-away deflection."""
     levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
-    names = {each.name for each in parameters_of(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
+    names = {item.name for item in parameters_of(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
     assert {"friction.bristle_stiffness", "friction.bristle_damping", "friction.stribeck_velocity"} <= names
     with pytest.raises(InputError, match="elasto_plastic"):
         parameters_of(HUNTING["elasto_plastic"].flat(), levels, 0.1, 0.1, True)

@@ -427,7 +427,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
     assert "[floor]" in sentences(quiet)[-1]
     assert "1.00 nm RMS" in " ".join(sentences(shaken))
     assert "[floor]" not in " ".join(sentences(shaken))
-    assert [paired_rows(each)[0][1][4] for each in (quiet, shaken)] == ["no [floor]", "0.5 (0.5 to 0.5)"]
+    assert [paired_rows(entry)[0][1][4] for entry in (quiet, shaken)] == ["no [floor]", "0.5 (0.5 to 0.5)"]
     for item, compared in ((quiet, False), (shaken, True)):
         expected, text = compare_document(item), Page(page(item, [])).text
         ratio = expected["options"]["c"]["against_a"]["in_position_rms"]

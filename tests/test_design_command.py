@@ -298,7 +298,7 @@ def test_leaves_and_what_binds_them(found: Design, wording: Wording) -> None:
 def test_the_window_of_the_crossover(found: Design) -> None:
     above, below = upper(found), lower(found)
     assert [item.value for item in above] == sorted(item.value for item in above)
-    assert {48.0, stiffest(found)} <= {each.value for each in above}
+    assert {48.0, stiffest(found)} <= {entry.value for entry in above}
     assert 1.2 * found.edges.highest in {each.value for each in below}
     assert below[0].value < found.controller.crossover <= above[0].value
     text = " ".join(controller_step(found).sentences)

@@ -242,7 +242,7 @@ def test_models_that_differ_are_a_warning(found: BothModels) -> None:
     assert not any("differ" in said for said in warnings(found))
     assert found.beams is not None
     other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
-    (text,) = (said for said in warnings(other) if "differ" in said)
+    (text,) = (texts for texts in warnings(other) if "differ" in texts)
     assert "-50 %" in text
     assert "+2" in text
 

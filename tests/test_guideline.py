@@ -331,7 +331,7 @@ def test_claims_hold_differ_or_are_unknown() -> None:
     assert [differ.judgement for differ in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
     lost = claims(studied(lambda name, flat: np.nan, UNKNOWN))
     assert {item.judgement for item in lost} == {"unknown"}
-    assert all("unknown" in each.result for each in lost)
+    assert all("unknown" in entry.result for entry in lost)
 
 
 def test_edges_below_the_grid_are_good_ones() -> None:

@@ -65,11 +65,11 @@ def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -
     answer = friso_inside(break_away, "identify", "turned.csv", *options)
     assert answer.returncode == 0, answer.stderr
     assert load(break_away / "turned.csv") == Mapping(experiment="break-away", axis="rotary")
-    (found,) = json.loads(answer.stdout)["estimates"]
+    (result,) = json.loads(answer.stdout)["estimates"]
     static = static_from_ramps(read_log(break_away / "linear.csv")).static
-    assert found["unit"] == "N*m"
-    assert found["written"].count("N*m") == 2
-    assert [found[end] for end in ("low", "value", "high")] == pytest.approx([static.low, static.value, static.high])
+    assert result["unit"] == "N*m"
+    assert result["written"].count("N*m") == 2
+    assert [result[end] for end in ("low", "value", "high")] == pytest.approx([static.low, static.value, static.high])
     assert not LENGTHS.search(answer.stderr + " ".join(texts(json.loads(answer.stdout))))
 
 

@@ -91,7 +91,7 @@ def few_variants() -> Iterator[None]:
     """The linear analysis of each variant takes longer than all its maps, and the rig as built longer than both: its
     evidence is made up here. That all variants are stages is tried beside."""
     made = {LOOPS_BUILT: loops(), MOVES: moves((HUNTS, 0, 0, 0)), GRID: grid(1, 1, 0), ON_RAILS: rail_cycles()}
-    runs = {name: lambda stage, it=item: it for name, item in {**made, STANDSTILL: standstill()}.items()}
+    runs = {name: lambda stage, mechanism=item: mechanism for name, item in {**made, STANDSTILL: standstill()}.items()}
     reproducing = import_module("friso.studies.thesis.reproduce")
     experiments._experiment.cache_clear()  # what is made up is kept like any evidence, here and after this file
     with patched({reproducing: {"OPEN": FEW}, experiments: {"_RUNS": {**_RUNS, **runs}}}):
@@ -445,7 +445,7 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     reproduction = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
     judged = {item.claim.id for item in reproduction.verdicts if item.finding}
     assert judged == {"F5", "F12B", "F13"} | LINEAR | LEAVES | IDENTIFIED | BUILT
-    assert {each.reason for each in reproduction.verdicts if each.claim.id == "F11A"} == {
+    assert {entry.reason for entry in reproduction.verdicts if entry.claim.id == "F11A"} == {
         "not computed in this run: path"
     }
     assert [step[0] for step in steps] == list(range(len(steps)))

@@ -168,9 +168,9 @@ def test_the_answer_names_what_to_change(tuning: Advice) -> None:
 
 def test_gains_are_told_in_the_terms_of_drives(tuning: Advice) -> None:
     """k_p = m omega^2 sqrt(alpha) of van Dijk's rules, at the crossover that was found."""
-    (found,) = tuning.working
-    assert found.stage is not None
-    flat = found.stage.flat()
+    (result,) = tuning.working
+    assert result.stage is not None
+    flat = result.stage.flat()
     gain = flat["controller.tuned_mass"] * (2 * np.pi * flat["controller.crossover"]) ** 2 * 0.1**0.5
     assert f"k_p = {gain:.6g} N/m" in gain_lines(tuning)[0]
 
