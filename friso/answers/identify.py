@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from collections.abc import Mapping as Keyed
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -164,7 +165,7 @@ def identify(
     >>> friso.identify("log.csv", stage="my_stage.toml", scale={"force": "35.15 N/V"})  # doctest: +SKIP
     """
     if stage is None and set:
-        first = next(iter(f"{key}={value}" for key, value in set.items()) if hasattr(set, "items") else iter(set))
+        first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
         raise InputError("set", str(first), "a stage whose keys to override", "stage=stage.toml")
     assumed = None if stage is None else stage_of(stage, set)
     if axis is None and assumed is not None and assumed.axis_kind != LINEAR:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,11 +81,11 @@ def options_of(
     axis: str | None = None,
 ) -> Any:
     """What is said of channels, from dictionaries or texts. Raises LogError."""
-    texts = [
-        [f"{key}={text}" for key, text in item.items()] if hasattr(item, "items") else item or ()
+    roles, units, scales = (
+        [f"{key}={text}" for key, text in item.items()] if isinstance(item, Mapping) else item or ()
         for item in (map, unit, scale)
-    ]  # type: ignore[union-attr]
-    return from_options(*texts, dt if dt is None or isinstance(dt, str) else f"{dt!r} s", kind, axis)
+    )
+    return from_options(roles, units, scales, dt if dt is None or isinstance(dt, str) else f"{dt!r} s", kind, axis)
 
 
 def paths_of(logs: LogFiles) -> list[Path]:

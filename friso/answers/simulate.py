@@ -128,11 +128,14 @@ def simulate(
     interval = None if sample_time is None else seconds_of(sample_time, "sample_time")
     tolerance = None if rtol is None else tolerance_of(rtol)
     if cell is None:
+        source: Any = stage
         if isinstance(stage, list | tuple) and len(stage) == 1:
-            stage = stage[0]  # as the command line has it
-        if stage is None or isinstance(stage, list | tuple):
-            raise InputError("STAGE.toml", " ".join(map(str, stage or [])), "one stage file", "friso simulate rig.toml")
-        chosen, name, usual = read_stage(stage, set), stem_of(stage), RTOL
+            source = stage[0]  # as the command line has it
+        if source is None or isinstance(source, list | tuple):
+            raise InputError(
+                "STAGE.toml", " ".join(map(str, source or [])), "one stage file", "friso simulate rig.toml"
+            )
+        chosen, name, usual = read_stage(source, set), stem_of(source), RTOL
     else:
         index = [] if stage is None else list(stage)  # type: ignore[arg-type]
         chosen, name, usual = _cell(Path(cell), [str(number) for number in index], set)

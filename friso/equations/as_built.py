@@ -79,6 +79,8 @@ def as_built(form: AsBuilt) -> Model:
     """
     from dataclasses import replace
 
+    from sympy import Symbol
+
     from friso.equations.component import Clock, key, state
     from friso.equations.model import assemble, resets
     from friso.equations.sampled import SAMPLE_TIME
@@ -86,9 +88,11 @@ def as_built(form: AsBuilt) -> Model:
     loops: list[Loop] = []
     model = assemble(form.structure, lambda stage: _cable(stage.position, stage.velocity), _drive(form, loops))
     position, cart = model.stage.position, model.cart.position
-    seen: dict[sp.Symbol, sp.Expr] = {state("seen"): position}
-    if loops[0].rated is not None:
-        seen[state(RATED)] = loops[0].rated
+    seen = {state("seen"): position}
+    rated = loops[0].rated
+    if rated is not None:
+        assert isinstance(rated, Symbol)
+        seen[state(RATED)] = rated
     places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))
     clock = Clock(SAMPLE_TIME, key("drive.late"), seen, places, tuple(map(state, TIMES)))
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in LEVELS}

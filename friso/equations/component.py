@@ -76,7 +76,7 @@ class Clock:
 
     period: sp.Expr
     late: sp.Expr
-    seen: Mapping[sp.Symbol, sp.Expr]
+    seen: Mapping[sp.Symbol, sp.Symbol]
     places: Mapping[sp.Symbol, sp.Symbol]
     times: tuple[sp.Symbol, ...]
 
