@@ -1,6 +1,7 @@
 """The cure: machines, ways, searches and answers, with tiny budgets."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from refusals import Wording
 
 from friso import Stage, load
-from friso.cure.answers import Cure, doubts, measure
+from friso.cure.answers import Cure, Performance, doubts, measure
 from friso.cure.goal import Goal
 from friso.cure.machines import Fleet, drawn
 from friso.cure.method import Advice, tune
@@ -16,10 +17,11 @@ from friso.cure.relax import relaxations
 from friso.cure.search import Budget, Search, SettingsTried
 from friso.cure.sensitivities import Sensitivities, sensitivity
 from friso.cure.suggestion import suggestion
-from friso.cure.trials import attraction, margins, moved, quantile
+from friso.cure.trials import Attraction, Moves, attraction, margins, moved, quantile
 from friso.cure.variables import BANDWIDTH, crossover
 from friso.cure.ways import WayOut, ways
-from friso.design_method.isolator import isolated, least_friction
+from friso.design_method.isolator import isolated
+from friso.equations.breakaway import least_breakaway
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check_given
@@ -27,6 +29,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.margin import searched
 from friso.hunting.measures import measured_run
+from friso.hunting.verdict import BANDWIDTHS
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
@@ -34,7 +37,7 @@ from friso.views.tune.document import tune_document
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
-from friso.views.tune.words import answer, changes, failing, rows
+from friso.views.tune.words import DOUBTS, answer, changes, failing, rows
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 TINY = Budget(settings=3, generations=2, machines=4, surveyed=2, fresh=6)
@@ -89,7 +92,7 @@ def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> N
         flat["masses.cart"] + flat["masses.stage"], machines.laid_over(whole, {}, 1)["masses.stage"]
     )
     assert free.flat()["controller.tuned_mass"] == 2.0
-    assert free.flat()["joint.stiffness"] * free.flat()["joint.stroke"] < least_friction(whole.flat())
+    assert free.flat()["joint.stiffness"] * free.flat()["joint.stroke"] < least_breakaway(whole.flat())
 
 
 def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
@@ -228,11 +231,17 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -
 
 @pytest.fixture(scope="module")
 def sensitivities(rigid: Stage) -> Sensitivities:
-    """Of the thesis's rig without its joint, along four keys."""
+    """Of the thesis's rig without its joint, along several keys."""
     return sensitivity(rigid, KEYS, edge=searched(rigid, True).margin)
 
 
-KEYS = ("friction.static", "friction.bristle_stiffness", "masses.cart", "controller.alpha")
+KEYS = (
+    "friction.static",
+    "friction.bristle_stiffness",
+    "masses.cart",
+    "controller.alpha",
+    "friction.stribeck_exponent",  # 2: the equations are written with it as a number
+)
 
 
 @pytest.mark.parametrize("name", KEYS)
@@ -278,6 +287,45 @@ def test_a_margin_s_derivative_is_that_of_margins_nearby(rigid: Stage, sensitivi
 def test_an_unknown_key_has_no_derivative(rigid: Stage) -> None:
     with pytest.raises(InputError):
         sensitivity(rigid, ["friction.statik"])
+
+
+def test_a_key_that_cannot_be_changed_by_a_share_has_no_derivative(rigid: Stage) -> None:
+    """One that is 0, and one that decides which equations there are and is not in them."""
+    still = rigid.with_numbers({"friction.viscous": 0.0})
+    with pytest.raises(InputError, match="viscous = 0"):
+        sensitivity(still, ["friction.static", "friction.viscous"])
+    locked = load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True})
+    with pytest.raises(InputError, match="stroke"):
+        sensitivity(locked, ["joint.stroke"])
+
+
+def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: range) -> tuple[Any, Performance]:
+    """The case of a stage that settles, and machines of which some fail a part of the goal."""
+    hunting = SimpleNamespace(certain=True)
+    judgement = SimpleNamespace(verdict="settles", hunting=hunting, margin=None, windows=(), given_up=given_up)
+    ok = {name: np.array([k not in failing.get(name, ()) for k in range(machines)])[None] for name in PARTS}
+    moves = Moves(np.where(ok["settling"], 0.1, np.inf), np.full((1, machines), 0.1), np.where(ok["force"], 1.0, 99.0))
+    margin = np.where(ok["margin"], 0.6, 0.1)
+    survey = Attraction(~ok["hunting"], np.ones((1, machines), bool))
+    return SimpleNamespace(judgement=judgement, unstable=()), Performance(moves, margin, survey, 0.6, 1e6)
+
+
+PARTS = ("hunting", "settling", "margin", "force")
+FORCE_LIMITED = Goal(force_limit=10.0)
+
+
+def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
+    """2 of 40 fail each part: 95 % meet each, 80 % meet all."""
+    apart = made_up(**{name: range(2 * k, 2 * k + 2) for k, name in enumerate(PARTS)})
+    assert apart[1].share(FORCE_LIMITED).probability == pytest.approx(0.8)
+    assert doubts(*apart, FORCE_LIMITED) == ("together",)
+    assert doubts(*made_up(**dict.fromkeys(PARTS, range(2))), FORCE_LIMITED) == ()
+    assert doubts(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
+
+
+def test_an_edge_that_was_not_searched_to_the_end_is_a_doubt() -> None:
+    assert doubts(*made_up(given_up=(BANDWIDTHS,)), FORCE_LIMITED) == ("given up",)
+    assert {"given up", "together"} <= DOUBTS.keys()
 
 
 def test_costs_order_settings() -> None:

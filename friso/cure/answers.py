@@ -18,6 +18,7 @@ from friso.equations.bandwidth import proportional_stiffness
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
 from friso.hunting.check import Case, check_given
+from friso.hunting.verdict import BANDWIDTHS
 from friso.stage import Stage
 from friso.studies.shares import Share, share
 
@@ -135,14 +136,19 @@ def doubts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
         listed.append("verdict")
     elif not judgement.hunting.certain:
         listed.append("certain")
+    if BANDWIDTHS in judgement.given_up:
+        listed.append("given up")
     if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
         listed.append("distance")
     if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
         listed.append("window")
     if case.unstable or measured.own_margin < goal.margin * (1 - ROUNDED):
         listed.append("own margin")
-    listed += [name for name, meets in measured.meets(goal).items() if np.mean(meets) < goal.share]
-    return tuple(listed)
+    parts = measured.meets(goal)
+    missed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]
+    if not missed and np.mean(np.all([*parts.values()], axis=0)) < goal.share:
+        missed.append("together")
+    return (*listed, *missed)
 
 
 ROUNDED = 2e-3

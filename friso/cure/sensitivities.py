@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
+from friso.equations.structure import decisive_keys
 from friso.equations.variational import along
 from friso.errors import InputError
 from friso.frequency.crossover import settled_members
@@ -115,7 +116,12 @@ def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | 
     for name in names:
         if name not in numeric or name not in flat:
             raise InputError("keys", name, "numeric keys of the stage", "friction.static")
+        if not flat[name]:
+            raise InputError(
+                "keys", f"{name} = 0", "keys that are not 0: they are changed by shares", "friction.static"
+            )
     values = np.array([flat[name] for name in names])
+    flat = _varied(flat, names)
     hunts = can_hunt(flat)
     return Sensitivities(
         stage,
@@ -140,6 +146,18 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The keys that the equations contain, without those of the motion, and not 0."""
     contained = Ensemble.held(flat, 1).kernel.parameters
     return tuple(name for name in contained if name.startswith(TABLES) and flat[name])
+
+
+def _varied(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+    """The same stage with equations that contain those of the keys that are decisive, as an exponent that is a whole
+    number is not. Raises InputError for one that they never contain."""
+    decisive = [name for name in keys if name in decisive_keys(flat)]
+    nearby = {**flat, **{name: np.nextafter(flat[name], np.inf) for name in decisive}}
+    contained = Ensemble.held(nearby, 1).kernel.parameters if decisive else ()
+    for name in decisive:
+        if name not in contained:
+            raise InputError("keys", name, "keys that the equations contain as numbers", "friction.static")
+    return nearby
 
 
 @np.errstate(all="ignore")
@@ -192,9 +210,9 @@ def _extremes(
     """Half of peak to peak of the position on an orbit and its derivatives to the keys, the orbit's state being moved
     (states, keys) by these."""
     whole = orbits.times * (2.0 if orbits.sign < 0 else 1.0)
-    results = stages.run(orbits.states, whole, RTOL)
+    results = stages.run(orbits.states, whole, RTOL, least_swing=0.0)
     turns = int(results.turn_counts[0])
-    if not turns:
+    if turns < 2:
         return None
     times, values = results.turn_times[0, :turns], results.turn_values[0, :turns]
     sides = []

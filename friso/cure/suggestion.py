@@ -9,8 +9,9 @@ import numpy as np
 from friso.cure.goal import Goal
 from friso.cure.variables import DAMPING_RATIOS, joint
 from friso.cure.ways import WayOut
-from friso.design_method.isolator import isolated, least_friction
+from friso.design_method.isolator import isolated
 from friso.equations.bandwidth import faster
+from friso.equations.breakaway import least_breakaway
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
@@ -40,8 +41,10 @@ class Suggestion:
 def suggestion(stage: Stage) -> Suggestion | None:
     """The shortest stroke of a few with which an isolator settles a stage, with the softest joint that does not move
     the cart; None for a stage that has a joint already, or can have none."""
-    friction = least_friction(stage.flat())
-    if stage.joint or friction <= 0:
+    if stage.joint:
+        return None
+    friction = float(least_breakaway(stage.flat()))
+    if friction <= 0:
         return None
     try:
         free = isolated(stage)

@@ -11,14 +11,15 @@ import numpy as np
 from friso.cure import variables
 from friso.cure.goal import Goal
 from friso.cure.variables import Variable, bandwidth_factor, of_key
-from friso.design_method.isolator import isolated, least_friction
+from friso.design_method.isolator import isolated
+from friso.equations.breakaway import breakaway, least_breakaway
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.controllers import FILTERS_KEY, controller_of
 
 LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
-"""Ranges of the integral limit, in units of the static friction, and of the leak, in units of the bandwidth or, where
-no key states one, of 1 Hz."""
+"""Ranges of the integral limit, in units of the break-away friction, and of the leak, in units of the bandwidth or,
+where no key states one, of 1 Hz."""
 
 DEADBANDS, EXITS = (0.1, 0.9), (1.0, 10.0)
 """Ranges of the deadband, in tolerances, and of the error that ends it, in deadbands."""
@@ -65,7 +66,7 @@ def ways(stage: Stage, goal: Goal) -> list[WayOut]:
     if goal.controller:
         listed += [WayOut("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
         listed += [*_notch(stage, speed), *_against_friction(stage, goal)]
-    if goal.joint and least_friction(stage.flat()) > 0:
+    if goal.joint and least_breakaway(stage.flat()) > 0:
         listed += _isolators(stage, goal, speed)
     return listed
 
@@ -99,7 +100,7 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[WayOut]:
     """Each setting against friction that the stage has not got, by itself."""
     flat = stage.flat()
     law = controller_of(flat)
-    friction, within = least_friction(flat), goal.within
+    friction, within = float(breakaway(flat)), goal.within
     if not law.integrates(flat) or friction <= 0:
         return
     hertz = flat[law.bandwidth_key] if law.bandwidth_key else 1.0
@@ -129,7 +130,7 @@ def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[WayOut]:
     if free.flexure:
         kept = {key: flat[key] for key in flat if key.startswith(("joint.stiffness", "parasitic."))}
         free = free.with_numbers(kept, without=("flexure",))
-    joint = variables.joint(least_friction(flat))
+    joint = variables.joint(float(least_breakaway(flat)))
     yield WayOut("isolator", free, joint, True)
     if goal.controller:
         yield from _gains("isolator and gains", free, speed, joint, True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from friso.equations.breakaway import least_breakaway
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
 
@@ -20,12 +21,6 @@ STEEL = 190e9
 STOP, STOP_DAMPING_RATIO = 0.1, 0.016
 """Stiffness of a stroke limiter over Young's modulus times the stroke, and its damping ratio with the stage: of the
 thesis's limiter they are 0.105 and 0.0158."""
-
-
-def least_friction(flat: Mapping[str, Any]) -> float:
-    """The force [N] at which a cart breaks away in its weaker direction, less what a bias force takes of it."""
-    key = "friction.static" if "friction.static" in flat else "friction.coulomb"
-    return float(flat.get(key, 0.0) * (1 - abs(flat.get("friction.asymmetry", 0.0))) - abs(flat.get("bias.cart", 0.0)))
 
 
 def split(flat: Mapping[str, Any]) -> dict[str, float]:
@@ -46,7 +41,7 @@ def isolated(stage: Stage, stroke: float = STROKE, young: float = STEEL) -> Stag
         return free
     flat = stage.flat()
     masses = split(flat)
-    stiffness = FORCE_SHARE * least_friction(flat) / stroke
+    stiffness = FORCE_SHARE * float(least_breakaway(flat)) / stroke
     stop = STOP * young * stroke
     numbers = {
         **masses,

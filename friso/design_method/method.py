@@ -20,6 +20,7 @@ from friso.design_method.relax import Relaxation, relaxations
 from friso.design_method.requirements import LeafTask
 from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
+from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import Limits, limits
 from friso.progress import Progress, silent
@@ -121,7 +122,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
     without = edges_over(
         rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS, progress, "hunting without isolator"
     )
-    friction = least_friction(population, flat)
+    friction = float(np.min(least_breakaway(population.over(flat))))
     if friction <= 0:
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
     task, candidates = leaves(spec, flat, friction, progress)
@@ -160,14 +161,6 @@ def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
             name = f"crossover of up to {best:.3g} Hz with a modulus margin of 0.5"
             return Relaxation(name, "joint.damping", flat["joint.damping"], float(damping), "N*s/m"), best
     return None, target
-
-
-def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
-    """The least force of the joint [N] at which the cart breaks away: in the weaker direction, less what a bias force
-    on the cart takes of it."""
-    key = "friction.static" if "friction.static" in flat else "friction.coulomb"
-    weaker = 1 - abs(flat.get("friction.asymmetry", 0.0))
-    return float(np.min(population.keys.get(key, flat[key]))) * weaker - abs(flat.get("bias.cart", 0.0))
 
 
 def leaves(

@@ -5,6 +5,7 @@ A module needs no SymPy to run, so that a warm start loads neither the equations
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
 import sympy as sp
@@ -29,11 +30,18 @@ from friso.engine.simd_math import clipped, exp, gaussian, power, quantised, sin
 '''
 
 
+_LOG = "from friso.engine.simd_math import log"
+"""Of the few modules that need it: those with the derivative of a power to its exponent."""
+
+
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
     """The source of the module for `model`, stepping by the method of `tableau`."""
     writer = StepWriter(model, tableau)
     straight = (writer.source(), writer.locate_source(), writer.update_source())
-    parts = [_HEAD.format(title=title, method=tableau.name), _numbers(model, writer, lanes)]
+    head = _HEAD.format(title=title, method=tableau.name)
+    if any(re.search(r"(?<![.\w])log\(", part) for part in straight):
+        head += f"{_LOG}\n"
+    parts = [head, _numbers(model, writer, lanes)]
     return "\n\n".join([*parts, _numpy_functions(model, writer), *straight])
 
 

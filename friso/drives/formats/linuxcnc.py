@@ -2,8 +2,9 @@
 
 The gains of a joint go to the HAL component `pid`: output = P e + I sum(e) T + D e' + FF0 r + FF1 r' + FF2 r'' + BIAS,
 e behind MAX_ERROR and DEADBAND, the output within MAX_OUTPUT, where the integral rests while it would drive it further.
-e' is r' - y' (of the dead-banded error up to 2.3). In torque mode the output is a force; in velocity mode it is a
-velocity, which the drive's own loop follows.
+e' is r' - y', as in versions with the pins command-deriv and feedback-deriv; older ones differentiate the error behind
+its deadband. In torque mode the output is a force; in velocity mode it is a velocity, which the drive's own loop
+follows, in whatever unit the drive is scaled to: FF1 = 1 where that is machine units per second.
 """
 
 from __future__ import annotations
@@ -19,8 +20,15 @@ from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 
 FORCE = "force_per_output"
+VELOCITY = "velocity_per_output"
 UNIT = "machine_unit"
 FORCE_FIELD = Quantity("N", positive, "20 N")
+VELOCITY_FIELD = Quantity("m/s", positive, "5 mm/s")
+
+UNITY = (0.9, 1.1)
+"""FF1 [machine units/s per unit of output] of a drive whose output is taken to be in machine units per second."""
+
+TARGET = "error-previous-target, with which the error is taken from the command of the sample before"
 
 LENGTHS = {"mm": 1e-3, "metric": 1e-3, "inch": 0.0254, "in": 0.0254, "imperial": 0.0254, "m": 1.0, "cm": 1e-2}
 ANGLES = {"deg": 0.017453292519943295, "degree": 0.017453292519943295, "rad": 1.0, "radian": 1.0}
@@ -106,6 +114,9 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         asked.append(OpenQuestion(UNIT, "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS", example))
     if "SERVO_PERIOD" not in axis.machine and "drive.sample_time" not in answers:
         asked.append(OpenQuestion("drive.sample_time", "period of the servo thread", '"1 ms"'))
+    if "controller.kp" in answers and FORCE not in answers and VELOCITY not in answers and not _unity(axis):
+        what = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
+        asked.append(OpenQuestion(VELOCITY, what, VELOCITY_FIELD.on(kind).written_example))
     if FORCE not in answers and "controller.kp" not in answers:
         what = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
         gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
@@ -142,7 +153,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
             "return_at": si(back, "s"),
             "duration": si(back + 15, "s"),
         }
-    return AsStage(tables, (*left, *more))
+    return AsStage(tables, (*left, *more, TARGET))
 
 
 def _torque(
@@ -183,11 +194,12 @@ def _velocity(
     p, i = axis.number("P"), axis.number("I", 0.0)
     if p <= 0:
         raise InputError("P", f"{p:g}", "a gain greater than 0", "P = 50")
-    table: dict[str, object] = {"kind": "cascade", "kv": si(p, "1/s")}
+    scale = answers.value(VELOCITY, VELOCITY_FIELD.on(kind)) / unit if VELOCITY in answers else 1.0
+    table: dict[str, object] = {"kind": "cascade", "kv": si(p * scale, "1/s")}
     if i:
         table["position_integral_time"] = si(p / i, "s")
     if axis.given("FF1"):
-        table["velocity_feedforward"] = axis.number("FF1")
+        table["velocity_feedforward"] = axis.number("FF1") * scale
     left = [
         f"{name} = {axis.number(name):g}, {what}"
         for name, what in {
@@ -197,7 +209,16 @@ def _velocity(
         }.items()
         if axis.given(name)
     ]
+    if VELOCITY not in answers:
+        left.append(
+            f"the scale of the output, since FF1 is about 1: one machine unit per second is assumed ({VELOCITY})"
+        )
     return table, left
+
+
+def _unity(axis: AxisParameters) -> bool:
+    """Whether FF1 says that the output is in machine units per second."""
+    return UNITY[0] <= axis.number("FF1", 0.0) <= UNITY[1]
 
 
 def _kind(axis: AxisParameters) -> AxisKind:
@@ -220,10 +241,13 @@ def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float
 
 
 def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """The unit, and, of a controller that exerts a force, what an output of 1 makes."""
+    """The unit, and what an output of 1 makes: a force, or a velocity that a cascade's inner loop follows."""
     kind = axis_of(flat)
     asked = [OpenQuestion(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
-    if flat["controller.kind"] != "cascade":
+    if flat["controller.kind"] == "cascade":
+        example = VELOCITY_FIELD.on(kind).written_example
+        asked.append(OpenQuestion(VELOCITY, "velocity that an output of 1 makes", example))
+    else:
         asked.append(OpenQuestion(FORCE, "force that an output of 1 makes", FORCE_FIELD.on(kind).written_example))
     return tuple(question for question in asked if question.key not in answers)
 
@@ -233,9 +257,13 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     kind = axis_of(flat)
     units = LENGTHS if kind == LINEAR else ANGLES
     unit = units[answers.choice(UNIT, tuple(units))]
+    if flat["controller.kind"] not in ("pid", "cascade"):
+        raise lacks(
+            f'kind = "{flat["controller.kind"]}"', 'kind = "pid" or kind = "cascade", which this component can be'
+        )
     get = lambda name, default=0.0: float(flat.get(f"controller.{name}", default))  # noqa: E731
     if flat["controller.kind"] == "cascade":
-        return _of_cascade(flat, unit)
+        return _of_cascade(flat, unit, answers.value(VELOCITY, VELOCITY_FIELD.on(kind)) / unit)
     if "controller.crossover" in flat:
         expected = "gains: its low-pass comes first, which this component has not"
         raise lacks("van Dijk's rules", expected, 'kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"')
@@ -259,10 +287,11 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     return Parameters(settings, HELD)
 
 
-def _of_cascade(flat: Flat, unit: float) -> Parameters:
-    """Those whose output is the velocity that a drive follows."""
+def _of_cascade(flat: Flat, unit: float, scale: float) -> Parameters:
+    """Those whose output is the velocity that a drive follows, of `scale` machine units per second where it is 1."""
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
-    ahead = flat["controller.velocity_feedforward"]
+    ahead = flat["controller.velocity_feedforward"] / scale
+    kv /= scale
     settings = {"P": kv, "I": kv / time if time else 0.0, "D": 0.0, "FF0": 0.0, "FF1": ahead, "FF2": 0.0}
     settings["DEADBAND"] = flat.get("controller.error_deadband", 0.0) / unit
     return Parameters(settings, HELD_OF_CASCADE)
@@ -276,7 +305,7 @@ def text(settings: Mapping[str, float]) -> str:
 
 FORMAT = ParameterFormat(
     title="LinuxCNC INI file",
-    firmware="LinuxCNC's component pid, versions 2.4 to 2.9",
+    firmware="LinuxCNC's component pid with the pin command-deriv",
     source="src/hal/components/pid.c",
     recognises=recognises,
     axes=axes,

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from math import pi, sqrt
 from typing import Any
 
+from friso.equations.breakaway import breakaway, sliding
 from friso.equations.continuous import slow_gains
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.controllers import CONTROLLER
-from friso.stage.transmission import MOTOR_FRICTION, moving_mass
+from friso.stage.transmission import moving_mass
 
 Sizes = Callable[[Mapping[str, Any], float], dict[str, float]]
 
@@ -31,12 +32,6 @@ class Setting:
         return {f"{CONTROLLER}.{key}": value for key, value in self.keys(flat, within).items()}
 
 
-def _level(flat: Mapping[str, Any], name: str) -> float:
-    """Static or Coulomb friction of guide and motor [N]; static friction is Coulomb friction where a law has none."""
-    tables = ("friction", MOTOR_FRICTION)
-    return float(sum(flat.get(f"{t}.{name}", flat.get(f"{t}.coulomb", 0.0)) for t in tables))
-
-
 def _leak(flat: Mapping[str, Any], within: float) -> dict[str, float]:
     proportional, integral = slow_gains(flat)
     return {"integral_leak": integral / proportional / (2 * pi) / 10}
@@ -46,13 +41,13 @@ def _dither(flat: Mapping[str, Any], within: float) -> dict[str, float]:
     proportional, _ = slow_gains(flat)
     fast = 10 * sqrt(proportional / moving_mass(flat)) / (2 * pi)
     return {
-        "dither_amplitude": 0.5 * _level(flat, "coulomb"),
+        "dither_amplitude": 0.5 * float(sliding(flat)),
         "dither_frequency": min(fast, 1 / (20 * flat["drive.sample_time"])),
     }
 
 
 SETTINGS: Mapping[str, Setting] = {
-    "limit": Setting("h", "integral limit", True, lambda f, _: {"integral_limit": 1.2 * _level(f, "static")}),
+    "limit": Setting("h", "integral limit", True, lambda f, _: {"integral_limit": 1.2 * float(breakaway(f))}),
     "leak": Setting("i", "leak", True, _leak),
     "hysteresis": Setting(
         "j", "hysteresis", True, lambda _, w: {"integral_deadband": 0.5 * w, "integral_deadband_exit": 2 * w}
@@ -61,7 +56,7 @@ SETTINGS: Mapping[str, Setting] = {
         "k", "standstill gain", False, lambda _, w: {"standstill_window": 5 * w, "standstill_factor": 0.5}
     ),
     "push": Setting(
-        "l", "push", False, lambda f, w: {"stiction_push": 0.8 * _level(f, "coulomb"), "stiction_push_window": w}
+        "l", "push", False, lambda f, w: {"stiction_push": 0.8 * float(sliding(f)), "stiction_push_window": w}
     ),
     "dither": Setting("m", "dither", False, _dither),
 }

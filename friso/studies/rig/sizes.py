@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, proportional_stiffness, sped_up
+from friso.equations.breakaway import breakaway
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.transmission import moving_mass as mass_moved
@@ -65,9 +66,8 @@ def moving_mass(stage: Stage) -> float:
 
 
 def friction(stage: Stage) -> float:
-    """The largest friction [N]; without any, what moves the mass at 1 m/s^2, our choice."""
-    flat = stage.flat()
-    return float(flat.get("friction.static", flat.get("friction.coulomb", moving_mass(stage))))
+    """The break-away friction [N]; without any, what moves the mass at 1 m/s^2, our choice."""
+    return float(breakaway(stage.flat())) or moving_mass(stage)
 
 
 def travel(stage: Stage) -> tuple[float, float]:

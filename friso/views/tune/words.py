@@ -21,6 +21,7 @@ from friso.views.drawing.prefixes import NOTHING, listed, percent, share_with_in
 DOUBTS = {
     "verdict": "friso check does not say that it settles",
     "certain": "friso check is not certain that nothing attracts it",
+    "given up": "friso check gave up the search for its edge of hunting",
     "distance": "its edge of hunting is closer than wanted",
     "window": "something attracts it at a bandwidth nearby",
     "own margin": "a settled state of the stage itself has less margin than wanted",
@@ -28,6 +29,7 @@ DOUBTS = {
     "settling": "too many of the machines are not in position in time",
     "margin": "too many of the machines have less modulus margin than wanted",
     "force": "too many of the machines take more force than there is",
+    "together": "too many of the machines miss one part of the goal or another",
 }
 """Why a way is not sure to work."""
 

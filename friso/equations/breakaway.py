@@ -1,0 +1,96 @@
+"""Forces at which guide and motor break away and slide, by what their friction laws declare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.stage.tables import friction_law
+from friso.stage.transmission import MOTOR_FRICTION, as_friction
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+SLOW = 1e-12
+"""Speed [m/s] at which a law slides that hardly moves."""
+
+Force = Callable[[Mapping[str, Any]], Any]
+
+
+def breakaway(flat: Mapping[str, Any]) -> Any:
+    """The largest friction force at rest [N] of guide and motor together: a number, or an array where keys are. 0 for
+    laws that declare none."""
+    return sum(_breakaway(keys) for keys in _tables(flat))
+
+
+def sliding(flat: Mapping[str, Any]) -> Any:
+    """The level of sliding friction [N] of guide and motor together: Coulomb friction where a law has that key, else
+    what it declares for the slowest motion."""
+    named = "friction.coulomb"
+    return sum(keys[named] if named in keys else np.maximum(*_slow(keys)) for keys in _tables(flat))
+
+
+def least_breakaway(flat: Mapping[str, Any]) -> Any:
+    """The force [N] at which the guide alone breaks away in its weaker direction, less what a bias force on the cart
+    takes of it. Laws declare the break-away force without what differs between the directions, as their mean."""
+    forward, back = _slow(flat)
+    total = forward + back
+    weaker = np.divide(2 * np.minimum(forward, back), total, out=np.ones_like(total), where=total > 0)
+    return _breakaway(flat) * weaker - np.abs(flat.get("bias.cart", 0.0))
+
+
+def _tables(flat: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """The keys as the laws of guide and motor know them."""
+    at_motor = [as_friction(flat)] if f"{MOTOR_FRICTION}.model" in flat else []
+    return [flat, *at_motor]
+
+
+def _variant(flat: Mapping[str, Any]) -> Hashable:
+    one = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
+    return friction_law(flat["friction.model"]).variant(one)
+
+
+def _breakaway(flat: Mapping[str, Any]) -> Any:
+    """That of one law [N]; 0 without friction."""
+    force = _breakaway_of(flat["friction.model"], _variant(flat))
+    return 0.0 if force is None else force(flat)
+
+
+def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """The forces [N] of one law against the slowest motion forward and back; 0 where it cannot say them."""
+    force = _steady_of(flat["friction.model"], _variant(flat))
+    if force is None:
+        return np.zeros(()), np.zeros(())
+    forward, back = (np.abs(force({**flat, "velocity": way * SLOW})) for way in (1.0, -1.0))
+    return forward, back
+
+
+@cache
+def _breakaway_of(name: str, variant: Hashable) -> Force | None:
+    from friso.equations.component import state
+
+    friction = friction_law(name).declare(state("velocity"), variant)
+    return friction and _compiled(friction.breakaway)
+
+
+@cache
+def _steady_of(name: str, variant: Hashable) -> Force | None:
+    from friso.equations.component import state
+
+    velocity = state("velocity")
+    friction = friction_law(name).declare(velocity, variant)
+    steady = friction and friction.steady(velocity)
+    return None if steady is None else _compiled(steady)
+
+
+def _compiled(expression: sp.Expr) -> Force:
+    """An expression as a function of the values of its symbols by name."""
+    import sympy as sp
+
+    expression = sp.sympify(expression)
+    symbols = sorted(expression.free_symbols, key=str)
+    function = sp.lambdify(symbols, expression, [{"sine": lambda turns: np.sin(2 * np.pi * turns)}, "numpy"])
+    return lambda flat: function(*np.broadcast_arrays(*(np.asarray(flat[str(x)], float) for x in symbols)))
