@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import Wording
+from variants import maxwell, release, van_dijk
+from variants import stage as variant
 
 from friso import Stage, load
 from friso.cure.answers import Cure, Performance, doubts, measure
@@ -21,7 +23,7 @@ from friso.cure.trials import Attraction, Moves, attraction, margins, moved, qua
 from friso.cure.variables import BANDWIDTH, crossover
 from friso.cure.ways import WayOut, ways
 from friso.design_method.isolator import isolated
-from friso.equations.breakaway import least_breakaway
+from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check_given
@@ -32,12 +34,13 @@ from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
+from friso.studies.compare.settings import settings_named
 from friso.views.check.isolator_words import isolator_sentence
 from friso.views.tune.document import tune_document
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
-from friso.views.tune.words import DOUBTS, answer, changes, failing, rows
+from friso.views.tune.words import DOUBTS, _without_friction, answer, changes, failing, rows
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 TINY = Budget(settings=3, generations=2, machines=4, surveyed=2, fresh=6)
@@ -128,6 +131,32 @@ def test_ways_are_what_may_be_changed(rigid: Stage) -> None:
     assert names["all"] == [*names["controller"], *names["joint"], "isolator and gains"]
     assert names["joint"] == ["isolator"]
     assert names["controller"][:2] == ["bandwidth", "gains"]
+
+
+def test_friction_of_any_law_counts() -> None:
+    """That of a law from outside friso, and that of a motor alone, which holds no cart against a joint."""
+    own = variant(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
+    assert breakaway(own.flat()) == least_breakaway(own.flat()) == pytest.approx(2.82)
+    assert sliding(own.flat()) == pytest.approx(0.4 * 2.82)
+    assert {"isolator", "integral limit"} <= {way.name for way in ways(own, Goal())}
+    (limit,) = settings_named(("limit",))
+    assert limit.numbers(own.flat(), 1e-6) == {"controller.integral_limit": pytest.approx(1.2 * 2.82)}
+    screw = load(EXAMPLES / "ball_screw_axis.toml")
+    at_motor = screw.flat()["motor_friction.static"]
+    assert breakaway(screw.flat()) == pytest.approx(screw.flat()["friction.static"] + at_motor)
+    free = screw.replace({"friction": {"model": "none"}})
+    names = {way.name for way in ways(free, Goal())}
+    assert "integral limit" in names
+    assert "isolator" not in names
+    assert breakaway(free.flat()) == sliding(free.flat()) + at_motor - free.flat()["motor_friction.coulomb"] == at_motor
+    assert len([*_without_friction(free.flat(), Goal())]) == 1
+    assert not [*_without_friction(screw.flat(), Goal())]
+
+
+def test_the_weaker_direction_breaks_away_first() -> None:
+    flat = load(EXAMPLES / "thesis_rig.toml").replace({"friction.asymmetry": 0.2, "bias.cart": "0.3 N"}).flat()
+    several = {**flat, "friction.static": np.array([2.0, 3.0])}
+    assert least_breakaway(several) == pytest.approx([2.0 * 0.8 - 0.3, 3.0 * 0.8 - 0.3])
 
 
 GOALS = {"all": Goal(), "controller": Goal(joint=False), "joint": Goal(controller=False)}

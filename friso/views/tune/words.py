@@ -15,7 +15,9 @@ from friso.cure.relax import Relaxed
 from friso.cure.search import SettingsTried
 from friso.cure.variables import BANDWIDTH, crossover
 from friso.cure.window import SettingWindow
+from friso.equations.breakaway import breakaway, least_breakaway
 from friso.stage import Stage, numeric_keys
+from friso.stage.transmission import leading_friction
 from friso.views.drawing.prefixes import NOTHING, listed, percent, share_with_interval, with_unit
 
 DOUBTS = {
@@ -298,6 +300,19 @@ def _windows(cure: Cure) -> list[str]:
     return [window_words(window, cure) for window in cure.windows]
 
 
+def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
+    """What was not tried on a stage with friction because its laws declare too little of it."""
+    if leading_friction(flat)["friction.model"] == "none":
+        return
+    if breakaway(flat) <= 0:
+        yield "No settings against friction were tried: the friction law declares no break-away force to size them by."
+    if goal.joint and least_breakaway(flat) <= 0:
+        yield (
+            "No isolator was tried: the friction of the guide does not hold the cart against the force of a joint and "
+            "the bias force."
+        )
+
+
 def assumptions(tuning: Advice) -> list[str]:
     """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
     lines, stage, machines = [], tuning.stage, tuning.machines
@@ -306,6 +321,7 @@ def assumptions(tuning: Advice) -> list[str]:
             "The stage file has no parasitic mode: none is assumed. State [parasitic], or the highest bandwidth that "
             'the machine allows (--bandwidth-limit "25 Hz"): modes that are not stated make fast controllers unstable.'
         )
+    lines += _without_friction(stage.flat(), tuning.goal)
     lines.append(
         "Margins include the sampling and delay of the file; hunting and moves are those of a controller in continuous "
         f"time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), each with a "
