@@ -92,9 +92,9 @@ def named_as_options(names: Mapping[str, Any]) -> Iterator[None]:
         if key not in names and origin not in names:
             raise
         option = option_of(key) if key in names else key
-        example = (
-            error.example.replace(f"{key}=", f"{option} ", 1) if error.example.startswith(f"{key}=") else error.example
-        )
+        example = error.example
+        if example.startswith(f"{key}="):
+            example = example.replace(f"{key}=", f"{option} ", 1).removesuffix(" True")  # a flag takes no value
         place = option_of(origin) if origin in names else origin
         raise type(error)(option, error.actual, error.expected, example, place, error.also) from None
 
