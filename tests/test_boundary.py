@@ -195,8 +195,7 @@ def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
 
 def test_a_logarithmic_range_finds_the_same_flip() -> None:
     traced = friso.boundary(RIGID, {"controller.crossover": "8 Hz..12 Hz:log"})
-    assert isinstance(traced, Diagram)
-    (flip,) = special(traced, symmetric=True)["flip"]
+    (flip,) = special(traced.result, symmetric=True)["flip"]
     assert flip[0] == pytest.approx(9.77, abs=0.005)
 
 

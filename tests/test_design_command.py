@@ -542,7 +542,7 @@ def test_exit_status(
     monkeypatch.setattr(method, "design", interrupt)
     bad = tmp_path / "bad.toml"
     bad.write_text(SPEC.read_text().replace("stainless 1.4310", "stainles"))
-    inputs = {"specification": [str(RIG), str(bad)], "interrupt": [str(RIG), str(SPEC)], "argument": [str(RIG)]}
+    inputs = {"specification": [str(RIG), str(bad)], "interrupt": [str(RIG), str(SPEC)], "argument": []}
     monkeypatch.setattr(sys, "argv", ["friso", "design", *inputs[broken], "--out", str(tmp_path / "out")])
     with pytest.raises(SystemExit) as left:
         main()

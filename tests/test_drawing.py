@@ -92,7 +92,7 @@ def test_values_in_sentences():
 
 def test_shares_in_percent_have_no_exponents():
     """A share of all is 100 %, not 1e+02 %."""
-    assert [percent(share) for share in (1.0, 0.954, 12.3, 0.00012)] == [
+    assert [percent(share) for share in (1.0, 0.954, 12.3, 0.00012, float("nan"))] == [
         "100 %",
         "95 %",
         "1200 %",

@@ -63,6 +63,7 @@ def test_a_finished_store_is_not_run_again(rig: Stage, tmp_path: Path) -> None:
 RUN = """
 import sys
 import friso
+from friso.studies.sweep import sweep
 sweep(friso.load(sys.argv[1]), {AXES!r}, store=sys.argv[2], refine=len(sys.argv) > 3, threads=1, rtol=1e-9)
 """
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, read_stage, wrong
+from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, read_stage, text_of, wrong
 from friso.errors import InputError
 from friso.frequency.bode import Bode
 from friso.progress import Progress, silent
@@ -114,7 +114,7 @@ def bode(
 
 def _band(entry: str | tuple[float, float], stage: Stage) -> tuple[float, float]:
     """Both ends [Hz] of a range of frequencies that the drive knows. Raises InputError."""
-    text = entry if isinstance(entry, str) else f"{entry[0]!r} Hz..{entry[1]!r} Hz"
+    text = entry if isinstance(entry, str) else f"{text_of(entry[0], 'Hz')}..{text_of(entry[1], 'Hz')}"
     first, _, last = text.partition("..")
     if not (first.strip() and last.strip()):
         raise wrong("frequencies", quoted(text), "a range of frequencies, FIRST..LAST", EXAMPLE)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, read_stage, wrong
+from friso.answers.inputs import Changes, StageLike, read_stage, text_of, wrong
 from friso.errors import InputError
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.mechanism import Mechanism
@@ -129,7 +129,7 @@ def _stroke(entry: str | float | None, stage: Stage, mechanism: Mechanism) -> fl
             raise wrong("stroke", "nothing", "the stroke, because the joint has none", '"1 mm"')
     else:
         try:
-            stroke = STROKE.read(entry if isinstance(entry, str) else f"{entry!r} m")
+            stroke = STROKE.read(text_of(entry, "m"))
         except InputError as error:
             raise wrong("stroke", error.actual, error.expected, '"1 mm"') from None
     if stroke > mechanism.length / 2:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, stage_of
+from friso.answers.inputs import Changes, StageLike, stage_of, text_of
 from friso.answers.logs import LogFiles, options_of, paths_of
 from friso.axis import LINEAR, AxisKind, speak_of
 from friso.errors import InputError
@@ -191,7 +191,7 @@ def _settings(bandwidth: str | float | None, band: str | None, period: str | flo
     """What the user chose for the analyses. Raises InputError."""
     values = []
     for name, value, quantity in (("bandwidth", bandwidth, _HERTZ), ("period", period, _SECONDS)):
-        text = value if value is None or isinstance(value, str) else f"{value!r} {quantity.unit}"
+        text = None if value is None else text_of(value, quantity.unit)
         try:
             values.append(None if text is None else float(quantity.read(text)))
         except InputError as error:

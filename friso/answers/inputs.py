@@ -95,11 +95,15 @@ def tolerance_of(value: str | float) -> float:
         raise wrong("rtol", str(value), "a number from 1e-12 to 1e-2", "1e-6") from None
 
 
+def text_of(value: str | float, unit: str) -> str:
+    """A quantity as a file would have it: a text as it is, a number with its unit."""
+    return value if isinstance(value, str) else f"{float(value)!r} {unit}"
+
+
 def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:
     """The SI value of a text with a unit, or of a number, which is in SI already. Raises InputError."""
-    text = f"{value!r} {quantity.unit}" if isinstance(value, int | float) else value
     try:
-        return float(quantity.read(text))
+        return float(quantity.read(text_of(value, quantity.unit)))
     except InputError as error:
         raise InputError(name, error.actual, error.expected, f"{name}={example or error.example}") from None
 

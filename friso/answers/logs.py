@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes
+from friso.answers.inputs import Changes, text_of
 from friso.errors import InputError
 from friso.identification.contents import LogContent, content_of
 from friso.identification.logs.mapping import from_options
@@ -85,7 +85,7 @@ def options_of(
         [f"{key}={text}" for key, text in item.items()] if isinstance(item, Mapping) else item or ()
         for item in (map, unit, scale)
     )
-    return from_options(roles, units, scales, dt if dt is None or isinstance(dt, str) else f"{dt!r} s", kind, axis)
+    return from_options(roles, units, scales, None if dt is None else text_of(dt, "s"), kind, axis)
 
 
 def paths_of(logs: LogFiles) -> list[Path]:

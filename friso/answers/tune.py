@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, whole_number, wrong
+from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, text_of, whole_number, wrong
 from friso.cure.goal import Goal
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -158,7 +158,7 @@ def _goal(
 
     def read(name: str, value: float | str | None, unit: str, example: str) -> float | None:
         quantity = Quantity(unit, positive, example).on(stage.axis_kind)
-        text = value if value is None or isinstance(value, str) else f"{value!r} {quantity.unit}"
+        text = None if value is None else text_of(value, quantity.unit)
         try:
             return None if text is None else float(quantity.read(text))
         except InputError as error:
