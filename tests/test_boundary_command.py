@@ -107,7 +107,7 @@ def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None
 
 
 def test_a_range_without_a_boundary_says_so(tmp_path: Path, snapshots: Snapshots) -> None:
-    done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz")
+    done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz", "--details")
     assert done.returncode == 0
     text = " ".join(done.stdout.split())
     assert text.count(VERDICTS["attracting cycle"]) == 2

@@ -458,7 +458,7 @@ def test_command_writes_page_and_figures(
     }  # fmt: skip
     page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
     snapshots.check("compare", "page", page.lines)
-    snapshots.check("compare", "run", friso_inside(tmp_path, "compare", EXAMPLE).stdout)
+    snapshots.check("compare", "run", friso_inside(tmp_path, "compare", EXAMPLE, "--details").stdout)
 
 
 def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -108,7 +108,7 @@ def written(spec: Path, finished: list[str], tmp_path_factory: pytest.TempPathFa
     out = tmp_path_factory.mktemp("written") / "design"
     with redirect_stdout(StringIO()) as said, pytest.MonkeyPatch.context() as patch:
         patch.setattr(matplotlib_renderer, "FORMATS", ("svg",))
-        command(RIG, spec, out=out)
+        command(RIG, spec, out=out, details=True)
     return out, said.getvalue()
 
 

@@ -494,7 +494,7 @@ def test_the_command_writes_its_page_and_claims(
     monkeypatch.chdir(tmp_path)
     assert run("masses", "--points", "5") == 2
     assert "isolator-masses" in capsys.readouterr().err
-    assert run("isolator-masses", "--points", "5", "--out", "rep") == 0
+    assert run("isolator-masses", "--points", "5", "--out", "rep", "--details") == 0
     snapshots.check("reproduce", "run", capsys.readouterr().out)
     snapshots.check("reproduce", "page", Page((tmp_path / "rep" / "reproduction.html").read_text("utf-8")).lines)
     written = {claim["id"]: claim for claim in json.loads((tmp_path / "rep" / "claims.json").read_text())["claims"]}

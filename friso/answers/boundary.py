@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
-from friso.answers.inputs import Changes, StageLike, pairs_of, read_stage, stem_of, tolerance_of, wrong
+from friso.answers.inputs import Changes, StageLike, axes_of, pairs_of, read_stage, stem_of, tolerance_of, wrong
 from friso.hunting.boundary import Diagram, KeyRange, Plane
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
@@ -118,9 +118,7 @@ def boundary(
     >>> friso.boundary(friso.example("thesis_rig"), x="controller.crossover=1 Hz..40 Hz")  # doctest: +SKIP
     """
     chosen, tolerance = read_stage(stage, set), tolerance_of(rtol)
-    ranges = dict(axes or {})
-    for name, text in (("x", x), ("y", y)):
-        ranges |= pairs_of([text], name, EXAMPLE) if text is not None else {}
+    ranges = axes_of(axes or {}, {"x": x, "y": y}, EXAMPLE)
     if not ranges:
         raise wrong("x", "no key", "one key or two with their ranges", EXAMPLE)
     links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')

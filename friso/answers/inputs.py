@@ -136,6 +136,18 @@ def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
     return pairs
 
 
+def axes_of(axes: Mapping[str, Any], texts: Mapping[str, str | None], example: str) -> dict[str, Any]:
+    """The axes of a dictionary and those of texts KEY=RANGE by the option's name, each key once. Raises InputError."""
+    every = dict(axes)
+    for name, text in texts.items():
+        ranges = {} if text is None else pairs_of([text], name, example)
+        for key in ranges:
+            if key in every:
+                raise wrong(name, f"{key} given twice", "each key once", example)
+        every |= ranges
+    return every
+
+
 def wrong(name: str, actual: str, expected: str, example: str) -> InputError:
     """The error for an option, by the name of its keyword: the command line says "--name" for it."""
     return InputError(name, actual, expected, f"{name}={example}")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.answers.inputs import Changes, pairs_of
+from friso.answers.inputs import Changes, axes_of, pairs_of
 from friso.answers.output_folder import refuse_device
 from friso.errors import InputError, StoreError
 from friso.stage import Stage
@@ -58,14 +58,9 @@ class Varied:
     ) -> Varied:
         """The axes of a dictionary and those of texts KEY=RANGE, each once. Raises InputError."""
         named = {"x": x, "y": y} | {f"axis {k + 1}": text for k, text in enumerate(more)}
-        every = dict(axes)
-        for name, text in named.items():
-            ranges = {} if text is None else pairs_of([text], name, AXIS_EXAMPLE)
-            for key in ranges:
-                if key in every:
-                    raise InputError(name, f"{key} given twice", "each key once", f"{name}={AXIS_EXAMPLE}")
-            every |= ranges
-        return cls(every, pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log)
+        return cls(
+            axes_of(axes, named, AXIS_EXAMPLE), pairs_of(link, "link", 'masses.cart="0.7 * mass"'), samples, latin, log
+        )
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
