@@ -144,6 +144,7 @@ def test_the_document_tells_margins_and_limits_of_the_rig(written: tuple[dict, P
     assert np.ravel(comfortable) == pytest.approx([0.1, 0.651, 3.64, 14.3], rel=5e-3)
 
 
+@pytest.mark.thorough
 def test_the_highest_stable_crossover_is_that_of_the_joint_as_given(rig: Stage) -> None:
     slow = rig.replace({"drive.delay": "2 ms"})
     for locked in (True, False):

@@ -61,6 +61,7 @@ def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagra
     assert max(places) == pytest.approx(9.77, abs=0.02)
 
 
+@pytest.mark.thorough
 def test_errors_are_honest(over_crossover: Diagram) -> None:
     """A diagram at a hundredth of the tolerance has its points within a few of the errors told."""
     tight = diagram(Space.of(RIGID, [CROSSOVER]), rtol=1e-11)

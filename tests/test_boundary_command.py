@@ -116,6 +116,7 @@ def test_a_range_without_a_boundary_says_so(tmp_path: Path, snapshots: Snapshots
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.thorough
 def test_the_curve_of_two_keys_separates_what_attracts(
     tmp_path: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:

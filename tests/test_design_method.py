@@ -291,6 +291,7 @@ def test_the_least_friction_is_that_of_the_range(base: Stage) -> None:
     assert np.min(least_breakaway(corners(SPEC, base.flat()).over(base.flat()))) == 1.0
 
 
+@pytest.mark.thorough
 def test_without_a_comfortable_crossover_there_is_no_design(
     base: Stage, task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -46,7 +46,9 @@ duration = "2 s"
 """
 SPAN = ("--x", "controller.crossover=10 Hz..30 Hz:9", "--y", "masses.stage=2 kg..4 kg:9", "--verify", "0")
 
-pytestmark = pytest.mark.parametrize("host", ["win32", "darwin"])
+on_both = pytest.mark.parametrize("host", ["win32", "darwin"])
+on_windows = pytest.mark.parametrize("host", ["win32", pytest.param("darwin", marks=pytest.mark.thorough)])
+"""Windows lacks more than macOS does."""
 
 
 def started(
@@ -91,6 +93,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "whole.zarr"
 
 
+@on_both
 def test_check_writes_its_page(host: str, axis: Path) -> None:
     document = json.loads(friso(host, axis, "check", "axis.toml", "--json", "--out", "Größe"))
     assert document["cases"]["given"]["verdict"] in ("hunts", "settles", "bistable", "transient")
@@ -98,12 +101,14 @@ def test_check_writes_its_page(host: str, axis: Path) -> None:
     assert Page((axis / "Größe" / "report.html").read_text(encoding="utf-8")).text
 
 
+@on_windows
 def test_files_are_replaced(host: str, axis: Path) -> None:
     for _ in range(2):
         friso(host, axis, "simulate", "axis.toml", "--out", "run")
     assert not list(axis.rglob(f"{DRAFTS}*"))
 
 
+@on_windows
 def test_a_map_is_killed_resumed_and_drawn_again(host: str, axis: Path, whole: Path) -> None:
     process = started(host, axis, "map", "axis.toml", *SPAN, "--out", "killed.zarr", "--workers", "2")
     while not (axis / "killed.zarr").exists() and process.poll() is None:
@@ -145,6 +150,7 @@ if __name__ == "__main__":
 """
 
 
+@on_windows
 def test_a_store_is_made_in_an_empty_folder_replaced_and_put_back(host: str, axis: Path) -> None:
     """The lock of a store is a file in it, and Windows renames and deletes no folder with a file that is open."""
     (axis / "stores.py").write_text(STORES)
@@ -154,6 +160,7 @@ def test_a_store_is_made_in_an_empty_folder_replaced_and_put_back(host: str, axi
     assert {path.name for path in axis.iterdir()} == {"axis.toml", "stores.py", "a.zarr"}
 
 
+@on_both
 def test_names_of_devices_are_refused_on_windows_alone(host: str, axis: Path) -> None:
     there = {*axis.iterdir()}
     span = ("--x", "controller.crossover=10 Hz, 20 Hz", "--verify", "0")
@@ -165,6 +172,7 @@ def test_names_of_devices_are_refused_on_windows_alone(host: str, axis: Path) ->
     assert {path.name for path in {*axis.iterdir()} - there} == {"console.toml", *(["con.toml"] * (host == "darwin"))}
 
 
+@on_windows
 def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
     time = np.arange(0, 4, 2e-3)
     speed = 0.01 * (1 + time // 2) * np.where(time % 2 < 1, 1.0, -1.0)
@@ -178,6 +186,7 @@ def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
     assert document["estimates"]
 
 
+@on_windows
 def test_two_processes_share_an_empty_cache(host: str, axis: Path, tmp_path: Path) -> None:
     arguments = ("simulate", "axis.toml", "--json")
     folder = str(tmp_path / "kernels")

@@ -453,6 +453,7 @@ def test_a_resonance_that_an_antiresonance_nearly_cancels_is_flagged() -> None:
 # Two masses
 
 
+@pytest.mark.thorough
 def test_two_mass_intervals_hold_the_truth() -> None:
     rng, frequency = np.random.default_rng(25), np.arange(3.0, 40.0, 1.0)
     truth = dict(zip(("driven mass", "other mass", "joint stiffness", "joint damping"), np.exp(TRUE[:4]), strict=True))

@@ -144,6 +144,7 @@ def reason(log: Log, known: MassOnBristles | None = KNOWN) -> str:
     return sliding_fit.estimates[2].reason
 
 
+@pytest.mark.thorough
 def test_what_a_log_cannot_show_is_told(refused: Refused, wording: Wording) -> None:
     assert "--as presliding" in reason(sliding(), None)
     assert "delay" in stribeck_from_slow_sliding(sliding(), replace(THERE, delay=None), KNOWN).estimates[0].reason

@@ -177,6 +177,7 @@ def test_the_cycle_against_simulation(cycle: tuple[Ensemble, Cycles]) -> None:
     assert abs(cycles.multiplier[0]) < 1
 
 
+@pytest.mark.thorough
 def test_the_cycle_against_scipy_with_events(cycle: tuple[Ensemble, Cycles]) -> None:
     stages, cycles = cycle
     names = ["position", "velocity", "filtered_error", "integral", *(f"deflection_{n}" for n in (1, 2, 3))]

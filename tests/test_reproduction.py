@@ -557,6 +557,7 @@ def test_a_judge_of_no_claim_is_refused() -> None:
     assert not_covered(claims()[0], "reason").judgement == "not yet covered"
 
 
+@pytest.mark.thorough
 def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     """Crossover and mass, locked: the flip of the rig's 1.7 kg lies at 9.75 Hz, on the drawn curve as in the check; the
     cells compared add up; the page shows curve and table."""

@@ -57,6 +57,7 @@ def test_slips_lie_within_the_static_friction_of_their_rail(built: Stage) -> Non
     assert slips.static.holds((low + high) / 2)
 
 
+@pytest.mark.thorough
 def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     built: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:

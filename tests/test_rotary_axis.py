@@ -190,7 +190,10 @@ WRITTEN = ("check", "map")
 """Commands whose pages and figures are drawn, too."""
 
 
-@pytest.mark.parametrize("command", [*COMMANDS])
+LONG = {"boundary": pytest.mark.thorough}
+
+
+@pytest.mark.parametrize("command", [pytest.param(name, marks=LONG.get(name, ())) for name in COMMANDS])
 def test_commands(folder: Path, command: str) -> None:
     documents = []
     for name, static in (("linear", "friction.static=2 N..3 N"), ("rotary", "friction.static=2 N*m..3 N*m")):

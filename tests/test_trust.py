@@ -165,6 +165,7 @@ def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:
     assert np.isnan(result["peaks"][guessed]).all()
 
 
+@pytest.mark.thorough
 def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
     """Crossover x mass: the outline of hunting as on a grid four times finer, for a fifth of its runs.
 

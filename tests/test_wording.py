@@ -84,7 +84,10 @@ def test_a_mistake(command: str, tmp_path: Path, snapshots: Snapshots) -> None:
     snapshots.check(command, "mistake", done.stderr)
 
 
-@pytest.mark.parametrize("command", RUNS)
+LONG = {"boundary": pytest.mark.thorough}
+
+
+@pytest.mark.parametrize("command", [pytest.param(name, marks=LONG.get(name, ())) for name in RUNS])
 def test_a_run(command: str, tmp_path: Path, snapshots: Snapshots) -> None:
     done = friso_inside(tmp_path, *RUNS[command])
     assert done.returncode == 0
