@@ -38,7 +38,7 @@ NO_RETURN = "from no distance does the stage swing back as far as it came from"
 
 
 def fake_solver(status: str) -> Any:
-    return SimpleNamespace(status=status, steps=4321, rejected=321, rtol=1e-6)
+    return SimpleNamespace(status=status, steps=4321, rejected=321, rtol=1e-6, done=status == "done")
 
 
 def fake_cycle(symmetric: bool = True, multiplier: float = -0.9312, apart: float = 0.0) -> Cycle:

@@ -151,7 +151,7 @@ def test_moves_by_single_runs() -> None:
     assert result is not None
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(result.accelerations, result.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    item, completed = ends_in(own, MOVES, target())
+    item, completed, _ = ends_in(own, MOVES, target())
     assert completed.all()
     assert item.sum() == result.hunting
     assert 0 < result.hunting < MOVES

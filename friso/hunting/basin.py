@@ -50,14 +50,16 @@ SHARES = (0.1, 2.0)
 class Kick:
     """Kicks of a stage at rest at its reference that start hunting: a displacement [m] (everything displaced, then let
     go, as in the motion "release") or a push, a velocity [m/s] of all masses. `windows` are ranges of kicks that do,
-    their ends found to 1 %; the last may end with the range that was `searched`."""
+    their ends found to 1 %; the last may end with the range that was `searched`. `unknown` counts the runs that were
+    not completed: they are left out, and windows may reach across them."""
 
     windows: tuple[tuple[float, float], ...]
     searched: tuple[float, float]
+    unknown: int = 0
 
     @property
     def smallest(self) -> float | None:
-        """The smallest kick that starts hunting; None if none does."""
+        """The smallest kick that was seen to start hunting; None if none was."""
         return self.windows[0][0] if self.windows else None
 
 
@@ -91,11 +93,11 @@ def ends_in(
     starts: np.ndarray | None = None,
     rtol: float = RTOL,
     **options: Any,
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in one of the motions that attract
-    the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; and
-    which were completed; both of shape (count,). The target is the same for all, or there is one for each. `options`:
-    `RunOptions`."""
+    the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; which
+    were completed; and how far they swing at the end, peak to peak [m]; all of shape (count,). The target is the same
+    for all, or there is one for each. `options`: `RunOptions`."""
     corner, size = np.max(last_corner(flat)), np.broadcast_to(2 * target.amplitude, (count,))
     early, after = (np.broadcast_to(corner + time, (count,)) for time in (target.early, target.lasting))
     swing, completed = _last_swing(flat, early, target, starts, rtol, **options)
@@ -104,9 +106,9 @@ def ends_in(
         part = {key: value[unfinished] if np.ndim(value) else value for key, value in flat.items()}
         aims = target.of(unfinished) if np.ndim(target.amplitude) else target
         begin = None if starts is None else starts[unfinished]
-        swing, completed[unfinished] = _last_swing(part, after[unfinished], aims, begin, rtol, **options)
-        ends[unfinished] = lasts(swing, 0.0, size[unfinished] / 4) & completed[unfinished]
-    return ends, completed
+        swing[unfinished], completed[unfinished] = _last_swing(part, after[unfinished], aims, begin, rtol, **options)
+        ends[unfinished] = lasts(swing[unfinished], 0.0, size[unfinished] / 4) & completed[unfinished]
+    return ends, completed, swing
 
 
 def _last_swing(
@@ -132,8 +134,8 @@ def displacements(stage: Stage, target: Target) -> Kick:
     """The displacements that start hunting."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
-    def hunts(kicks: np.ndarray) -> np.ndarray:
-        return ends_in({**flat, "motion.displacement": kicks}, len(kicks), target)[0]
+    def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return ends_in({**flat, "motion.displacement": kicks}, len(kicks), target)[:2]
 
     return _kick(hunts, target.amplitude)
 
@@ -142,29 +144,35 @@ def pushes(stage: Stage, target: Target) -> Kick:
     """The velocities that start hunting."""
     stages = Ensemble.held(stage.flat(), 1)
 
-    def hunts(kicks: np.ndarray) -> np.ndarray:
+    def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return ends_in(released, len(kicks), target, pushed(several, kicks))[0]
+        return ends_in(released, len(kicks), target, pushed(several, kicks))[:2]
 
     return _kick(hunts, target.amplitude * float(stages.number("rate")[0]))
 
 
-def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
-    """The windows of kicks that hunt, searched on a grid about `unit`, their edges closer and closer."""
-    kicks = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
-    hunting = hunts(kicks)
+def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: float) -> Kick:
+    """The windows of kicks that hunt, searched on a grid about `unit`, their edges closer and closer; `hunts` tells
+    which kicks do, and whose runs were completed."""
+    tried = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
+    hunting, completed = hunts(tried)
+    kicks, hunting, unknown = tried[completed], hunting[completed], np.count_nonzero(~completed)
+    if not kicks.size:
+        return Kick((), (float(tried[0]), float(tried[-1])), unknown)
     edges = np.flatnonzero(hunting[1:] != hunting[:-1])
     low, high = kicks[edges], kicks[edges + 1]
     while edges.size and np.any(high > (1 + EDGE) * low):
         between = np.geomspace(low, high, BETWEEN + 2, axis=1)
-        unlike = hunts(between[:, 1:-1].ravel()).reshape(-1, BETWEEN) != hunting[edges, None]
+        ends, completed = (part.reshape(-1, BETWEEN) for part in hunts(between[:, 1:-1].ravel()))
+        unknown += np.count_nonzero(~completed)
+        unlike = completed & (ends != hunting[edges, None])
         last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), BETWEEN)
         low, high = (between[np.arange(len(edges)), last + step] for step in (0, 1))
     places = np.where(hunting[edges], low, high)  # the side that hunts
-    ends = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
-    windows = tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))
-    return Kick(windows, (float(kicks[0]), float(kicks[-1])))
+    turns = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
+    windows = tuple((float(a), float(b)) for a, b in zip(turns[::2], turns[1::2], strict=True))
+    return Kick(windows, (float(kicks[0]), float(kicks[-1])), unknown)
 
 
 def moves(stage: Stage, target: Target) -> MoveShare | None:
@@ -179,5 +187,5 @@ def moves(stage: Stage, target: Target) -> MoveShare | None:
     times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
     sample = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
     moved = {**flat, "motion.acceleration": sample[:, 0], "motion.acceleration_time": sample[:, 1]}
-    hunts, completed = ends_in(moved, MOVES, target)
+    hunts, completed, _ = ends_in(moved, MOVES, target)
     return MoveShare(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None

@@ -18,8 +18,8 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
-from friso.hunting.attractors.rounds import loose_from
-from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
+from friso.hunting.attractors.rounds import RESOLVED, loose_from
+from friso.hunting.basin import MOVES, Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
@@ -43,6 +43,12 @@ SURVEY, KICKS = 0.4, 0.3
 """Shares of the work of a verdict that the search for what attracts the stage may use, and that are kept for kicks and
 moves."""
 
+LEFT_OVER = "not every motion that swings on was followed to its end: this one may end in another than those found"
+"""Why it is not certain that a motion comes to rest which does not end in what attracts."""
+
+SWINGS_ON = "this motion still swings when it is given up, by less than half of what was found to attract"
+"""The same where it has been seen not to have done so."""
+
 STEADY = 0.01
 """Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
 
@@ -55,8 +61,8 @@ class Judgement:
     of hunting in bandwidth, `windows` where else something attracts, and `lower` the end below the bandwidth of what
     attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last
     corner of the reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s]
-    (None: no longer than its own end). `observed`: what attracts was observed in long simulations, no orbit that
-    attracts could be closed. `lasting` [m], peak to peak, is where this motion alone was seen to swing on, at the end
+    (None: no longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was
+    observed in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone was seen to swing on, at the end
     of the time for which it was followed. `given_up`: what of `PARTS` would have taken more work than was allowed.
     """
 
@@ -166,11 +172,12 @@ def _with_a_target(
     work: float,
 ) -> Judgement:
     with allowance() as spent:
-        ends, completed = ends_in(stage.flat(), 1, target)
+        ends, completed, swing = ends_in(stage.flat(), 1, target)
         if not completed[0]:
             return Judgement("failed", attraction)
         within = float(motions.settling[0])
         sought, given_up = _sought(stage, attraction, (1 - KICKS) * work - spent.used)
+    doubt = "" if ends[0] else _restless(stage, attraction, float(swing[0]), within)
     begin(STARTS)
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     try:
@@ -178,9 +185,11 @@ def _with_a_target(
             starts = displacements(stage, target), pushes(stage, target), moves(stage, target)
     except Exhausted:
         given_up = (*given_up, STARTS)
+    if _some_unknown(*starts):
+        given_up = (*given_up, STARTS)
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
-        attraction,
+        replace(attraction, certain=False, reason=doubt) if doubt else attraction,
         *starts,
         _as_sure(sought.margin, attraction),
         sought.windows,
@@ -189,6 +198,24 @@ def _with_a_target(
         observed=not attraction.attracting,
         given_up=given_up,
     )
+
+
+def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
+    """Why a motion need not come to rest that does not end in what was found to attract, and at last swings by so much
+    [m], peak to peak; `within` is the time from which on it stays near its reference [s] (NaN: not within its run).
+    "" if it does."""
+    if swing > 2 * RESOLVED * float(Ensemble.held(stage.flat(), 1).length[0]):
+        return SWINGS_ON
+    surveyed = attraction.surveyed
+    every = surveyed is None or bool(surveyed.complete[0])
+    return "" if every or np.isfinite(within) else LEFT_OVER
+
+
+def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare | None) -> bool:
+    """Whether no kick or no move of one kind was seen to start hunting, and runs of that kind were not completed."""
+    kicks = [kick for kick in (displacement, push) if kick]
+    lost = any(kick.unknown and not kick.windows for kick in kicks)
+    return lost or (moved is not None and not moved.hunting and moved.count < MOVES)
 
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[Searched, tuple[str, ...]]:
@@ -268,7 +295,7 @@ class _Rest:
     """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
     their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown);
     whether they swing on `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
-    than their end); and peak to peak of the last quarter of that, `swing` [m]."""
+    than their end, or not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
 
     rests: np.ndarray
     after: np.ndarray
@@ -293,8 +320,10 @@ def _rest(flat: Mapping[str, Any], motions: Motions, count: int, run_options: Ru
         followed[moving] = np.maximum(np.maximum(LONG, part["motion.duration"]), waits)
         long = {**part, "motion.duration": followed[moving] + last_corner(part)}
         last, half = (_motions(long, moving.size, replace(run_options, window=window)) for window in (0.75, 0.5))
-        after[moving], swing[moving] = last.settling, last.swing
-        steady[moving] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
+        done = last.completed & half.completed
+        followed[moving] = np.where(done, followed[moving], np.nan)
+        after[moving], swing[moving] = np.where(done, last.settling, np.nan), last.swing
+        steady[moving] = done & lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
     return _Rest(rests, after, steady, followed, swing)
 
 

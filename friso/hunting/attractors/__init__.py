@@ -54,13 +54,16 @@ class Attractors:
     `decided`, shape (count,) (not where a simulation that had to decide failed); a `typical` period of
     hunting [s], shape (count,); and of a thorough survey the cycles that the return map suggests, attracting or not:
     `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period); and of which
-    stages simulations at different tolerances tell different things, `flips`, shape (count,): the tighter hold."""
+    stages simulations at different tolerances tell different things, `flips`, shape (count,): the tighter hold.
+    `complete`, shape (count,): every motion was followed to what attracts it, so that a thorough survey has missed none
+    of these."""
 
     motions: tuple[Swinging, ...]
     decided: np.ndarray
     typical: np.ndarray
     families: tuple[Cycles, ...]
     flips: np.ndarray
+    complete: np.ndarray
 
     @property
     def attracts(self) -> np.ndarray:
@@ -90,7 +93,8 @@ class Attractors:
             motions_of.setdefault(motion.stage, []).append(motion)
         motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in motions_of.get(n, ()))
         suggested = tuple(cycles.take(numbers) for cycles in self.families)
-        return Attractors(tuple(motions), self.decided[numbers], self.typical[numbers], suggested, self.flips[numbers])
+        columns = (array[numbers] for array in (self.flips, self.complete))
+        return Attractors(tuple(motions), self.decided[numbers], self.typical[numbers], suggested, *columns)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -127,14 +131,14 @@ def attractors(
         if cycles and not at_once:
             _try_cycles(starts, survey, rtol)
         decided = survey.attracted | ~survey.unknown
-        surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, nothing)
+        surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, nothing, ~survey.unknown)
         return _tried_again(stages, surveyed, rtol) if thorough else surveyed
     except Exhausted:
         if not thorough:
             raise
         proved = np.zeros(stages.count, bool)
         proved[[motion.stage for motion in survey.attracting if motion.cycles is not None]] = True
-        return Attractors(tuple(survey.attracting), proved, typical, suggested, nothing)
+        return Attractors(tuple(survey.attracting), proved, typical, suggested, nothing, complete=nothing)
 
 
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:

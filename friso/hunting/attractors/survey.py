@@ -177,7 +177,9 @@ class Survey:
         before = np.full(len(owners), np.nan)
         for number in range(ROUNDS):
             enough = ENOUGH if self.thorough else 0
-            keep = np.flatnonzero(~self.attracted[owners] | (number < enough))
+            dropped = self.attracted[owners] & (number >= enough)
+            self.unknown[owners[dropped]] = True
+            keep = np.flatnonzero(~dropped)
             if not keep.size:
                 return
             owners, before = owners[keep], before[keep]

@@ -47,6 +47,10 @@ SMALL_SWING, FED = 0.001, (2.0, 6.0)
 how much larger than the amplitude of a cycle the fall of friction over its speeds is, as a share of the static one, at
 least and at most."""
 
+WIDE_BAND = 2.0
+"""Dead zone of the controller, in units of the deflection by the break-away force, from which on most starts of a
+survey lie within it, where no integrator winds up."""
+
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
 """The same where simulations contradict each other."""
 
@@ -201,6 +205,9 @@ def _beyond_the_search(stages: Ensemble) -> str:
     controller = stages.structure.controller
     if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
+    dead = np.max(stages.flat.get("controller.error_deadband", 0.0))
+    if dead >= WIDE_BAND * float(stages.length[0]):
+        return "most starts that were tried lie within error_deadband, and few beyond it: some of these may swing on"
     if stages.outer_integrals:
         return "with integrals in several loops, stages that stick with an outer one wound up otherwise may swing on"
     if small_cycles_possible(stages):

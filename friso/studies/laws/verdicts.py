@@ -10,6 +10,7 @@ import numpy as np
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.check import LONG, Case, check
 from friso.hunting.criteria import ATTRACTED
+from friso.hunting.verdict import BANDWIDTHS
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
@@ -32,6 +33,19 @@ class Trial:
         """Whether something attracts the stage that hunts, in a case."""
         return self.cases[case].verdict in ATTRACTED
 
+    def certain(self, case: str) -> bool:
+        """Whether the verdict in a case is certain."""
+        shown = self.cases[case]
+        return shown.verdict != "failed" and shown.judgement.hunting.certain
+
+    def edge_sought(self, case: str) -> bool:
+        """Whether the search for the edge of hunting in a case found one, or came to its end without."""
+        shown = self.cases[case]
+        judgement = shown.judgement
+        unsought = shown.verdict == "failed" or BANDWIDTHS in judgement.given_up
+        unsought |= judgement.observed and judgement.hunting.target is None  # its own motion alone swings on
+        return judgement.margin is not None or not unsought
+
 
 @dataclass(frozen=True)
 class LawVerdict:
@@ -49,12 +63,19 @@ class LawVerdict:
         """The verdicts in a case, each once."""
         return tuple(dict.fromkeys(trial.cases[case].verdict for trial in self.trials))
 
+    def answers(self, case: str) -> set[bool]:
+        """Whether the stage hunts under the law in a case, by the trials whose verdict is certain: both where that
+        hangs on what is open."""
+        return {trial.attracted(case) for trial in self.trials if trial.certain(case)}
+
+    def certain(self, case: str) -> bool:
+        """Whether the verdicts of all trials in a case are certain."""
+        return all(trial.certain(case) for trial in self.trials)
+
     def hunts(self, case: str) -> bool | None:
-        """Whether the stage hunts under the law in a case; None where that hangs on what is open, or a run failed."""
-        if "failed" in self.verdicts(case):
-            return None
-        attracted = {trial.attracted(case) for trial in self.trials}
-        return attracted.pop() if len(attracted) == 1 else None
+        """Whether the stage hunts under the law in a case; None where that is not certain, or hangs on what is open."""
+        answers = self.answers(case)
+        return answers.pop() if len(answers) == 1 and self.certain(case) else None
 
     def edges(self, case: str) -> tuple[float, float] | None:
         """Lowest and highest edge of hunting [Hz], or in factors of the bandwidth where there is no crossover, in a
@@ -62,6 +83,15 @@ class LawVerdict:
         margins = [trial.cases[case].judgement.margin for trial in self.trials]
         edges = [edge.factor if edge.crossover is None else edge.crossover for edge in margins if edge]
         return (min(edges), max(edges)) if edges else None
+
+    def edges_certain(self, case: str) -> bool:
+        """Whether the edges of hunting that were found in a case are certain."""
+        margins = [trial.cases[case].judgement.margin for trial in self.trials]
+        return all(edge.certain for edge in margins if edge)
+
+    def edges_sought(self, case: str) -> bool:
+        """Whether the search for the edge in a case came to its end in every trial."""
+        return all(trial.edge_sought(case) for trial in self.trials)
 
     def amplitudes(self, case: str) -> tuple[float, float] | None:
         """Smallest and largest amplitude [m] of the hunting in a case; None without any."""
@@ -84,18 +114,32 @@ class VerdictsByLaw:
         return bandwidth(self.stage.flat()) is not None
 
     def hunts(self, case: str) -> bool | None:
-        """Whether the stage hunts in a case, whatever the law; None where that hangs on the law."""
+        """Whether the stage hunts in a case, whatever the law; None where that hangs on the law or is not certain."""
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
+
+    def answers(self, case: str) -> set[bool]:
+        """Whether the stage hunts in a case, by all verdicts that are certain."""
+        return set().union(*(verdict.answers(case) for verdict in self.verdicts))
+
+    def hangs_on_the_law(self, case: str) -> bool:
+        """Whether verdicts that are certain disagree in a case."""
+        return len(self.answers(case)) > 1
+
+    def uncertain(self, case: str) -> list[str]:
+        """The laws under which not every verdict in a case is certain."""
+        return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
         """The experiments that would decide, where the verdict hangs on the law: those that tell what is open in a law
         under which the verdict hangs on that, else those that tell the laws that disagree from the others."""
-        open_ones = [verdict for verdict in self.verdicts if verdict.hunts(case) is None]
+        if not self.hangs_on_the_law(case):
+            return []
+        open_ones = [verdict for verdict in self.verdicts if len(verdict.answers(case)) > 1]
         if open_ones:
             names = {(verdict.law, key) for verdict in open_ones for key in verdict.conversion.open}
         else:
-            fewer = [[v for v in self.verdicts if v.hunts(case) is answer] for answer in (True, False)]
+            fewer = [[v for v in self.verdicts if answer in v.answers(case)] for answer in (True, False)]
             names = {(verdict.law, "") for verdict in min(fewer, key=len)}
         texts = (friction_law(law).decided_by.get(key, "") for law, key in sorted(names))
         return list(dict.fromkeys(filter(None, texts)))

@@ -124,7 +124,12 @@ def _swing(swing: Swing) -> dict[str, Any]:
 def _kick(judgement: Judgement) -> dict[str, Any] | None:
     if judgement.displacement is None or judgement.push is None:
         return None
-    return {"displacement_m": judgement.displacement.windows, "velocity_m_per_s": judgement.push.windows}
+    return {
+        "displacement_m": judgement.displacement.windows,
+        "velocity_m_per_s": judgement.push.windows,
+        "displacements_given_up": judgement.displacement.unknown,
+        "velocities_given_up": judgement.push.unknown,
+    }
 
 
 def _margin(edge: Margin) -> dict[str, Any]:

@@ -27,31 +27,49 @@ def laws_sentences(laws: VerdictsByLaw) -> list[str]:
 
 def _sentence(laws: VerdictsByLaw, case: str) -> str:
     hunts, names = laws.hunts(case), [verdict.law for verdict in laws.verdicts]
-    count = COUNTS.get(len(names), str(len(names)))
-    edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
+    count, edges = COUNTS.get(len(names), str(len(names))), _edges(laws, case)
     if hunts is not None:
-        says = "hunts" if hunts else "settles"
-        return f"under all {count} laws that keep what is measured the stage {says}{_edges(laws, case, edges)}."
+        return f"under all {count} laws that keep what is measured the stage {_does(hunts)}{edges}."
+    unsure = [f"under {listed(laws.uncertain(case), 'and')} that is not certain"] if laws.uncertain(case) else []
+    if not laws.answers(case):
+        return f"under none of the {count} laws that keep what is measured the verdict is certain."
     parts = [
-        f"{says} under {listed(under, 'and')}"
-        for says, answer in (("hunts", True), ("settles", False))
+        f"{_does(answer)} under {listed(under, 'and')}"
+        for answer in (True, False)
         if (under := [verdict.law for verdict in laws.verdicts if verdict.hunts(case) is answer])
     ]
-    parts += [
-        f"under {verdict.law} {listed(list(verdict.verdicts(case)), 'or')}, by what is open in it"
-        for verdict in laws.verdicts
-        if verdict.hunts(case) is None
-    ]
+    parts += [text for verdict in laws.verdicts if (text := _open(verdict, case))]
+    if not laws.hangs_on_the_law(case):
+        return f"the stage {'; '.join([*parts, *unsure])}{edges}."
     measure = listed(laws.deciding(case), "and")
     decide = f" To decide, measure {measure}." if measure else ""
-    return f"the verdict hangs on the law: the stage {'; '.join(parts)}{_edges(laws, case, edges)}.{decide}"
+    return f"the verdict hangs on the law: the stage {'; '.join([*parts, *unsure])}{edges}.{decide}"
 
 
-def _edges(laws: VerdictsByLaw, case: str, edges: list[tuple[float, float]]) -> str:
+def _does(hunts: bool) -> str:
+    return "hunts" if hunts else "settles"
+
+
+def _open(verdict: LawVerdict, case: str) -> str:
+    """What the stage certainly does under a law with some of what is open in it; "" if it does so with all of it."""
+    answers = verdict.answers(case)
+    if verdict.hunts(case) is not None or not answers:
+        return ""
+    words = [_does(answer) for answer in (True, False) if answer in answers]
+    some = "by what" if len(answers) > 1 else "with some of what"
+    return f"under {verdict.law} {listed(words, 'or')}, {some} is open in it"
+
+
+def _edges(laws: VerdictsByLaw, case: str) -> str:
+    edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
+    unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
+    missing = f"not determined under {listed(unsought, 'and')}" if unsought else ""
     if not edges:
-        return ", with no edge of hunting within a factor of ten of its bandwidth"
+        none = "with no edge of hunting within a factor of ten of its bandwidth"
+        return f", its edge of hunting {missing}" if missing else f", {none}"
     low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
-    return f", edge {_span(laws, (low, high))}"
+    doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"
+    return f", edge {_span(laws, (low, high))}{doubt}{', ' + missing if missing else ''}"
 
 
 def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
@@ -72,13 +90,17 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
     rows = []
     for case, label in case_labels(laws.stage).items():
         rows += [
-            (f"{label}: verdict", [" or ".join(verdict.verdicts(case)) for verdict in laws.verdicts]),
+            (f"{label}: verdict", [_verdict(verdict, case) for verdict in laws.verdicts]),
             (f"{label}: amplitude", [_amplitude(verdict, case) for verdict in laws.verdicts]),
             (f"{label}: edge", [_edge(laws, verdict, case) for verdict in laws.verdicts]),
         ]
     rows.append(("Drawn, since left open", [_drawn(verdict) for verdict in laws.verdicts]))
     rows.append(("Not kept", [_lost(verdict) for verdict in laws.verdicts]))
     return [(axis_shown().text(name), texts) for name, texts in rows]
+
+
+def _verdict(verdict: LawVerdict, case: str) -> str:
+    return f"{' or '.join(verdict.verdicts(case))}{'' if verdict.certain(case) else ' (not certain)'}"
 
 
 def _amplitude(verdict: LawVerdict, case: str) -> str:
@@ -88,7 +110,10 @@ def _amplitude(verdict: LawVerdict, case: str) -> str:
 
 def _edge(laws: VerdictsByLaw, verdict: LawVerdict, case: str) -> str:
     edges = verdict.edges(case)
-    return _span(laws, edges) if edges else NOTHING
+    if edges is None:
+        return NOTHING if verdict.edges_sought(case) else "not determined"
+    doubt = "" if verdict.edges_certain(case) else " (not certain)"
+    return f"{_span(laws, edges)}{doubt}{'' if verdict.edges_sought(case) else ', in part not determined'}"
 
 
 def _drawn(verdict: LawVerdict) -> str:
@@ -101,14 +126,15 @@ def _lost(verdict: LawVerdict) -> str:
 
 
 def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
-    """Law by law and case by case, with every trial; whether the verdict hangs on the law, and what would decide."""
+    """Law by law and case by case, with every trial; whether the verdict hangs on the law or is not certain, and what
+    would decide."""
     cases = {}
     for case in case_labels(laws.stage):
-        hunts = laws.hunts(case)
         cases[case] = {
-            "hunts": hunts,
-            "hangs_on_the_law": hunts is None,
-            "measure": laws.deciding(case) if hunts is None else [],
+            "hunts": laws.hunts(case),
+            "hangs_on_the_law": laws.hangs_on_the_law(case),
+            "not_certain": laws.uncertain(case),
+            "measure": laws.deciding(case),
             "laws": {verdict.law: _law(verdict, case) for verdict in laws.verdicts},
         }
     return {
@@ -136,5 +162,6 @@ def _trial(trial: Trial, case: Case) -> dict[str, Any]:
         "multiplier": cycle.multiplier if cycle else None,
         "edge_hz": edge.crossover if edge else None,
         "edge_factor": edge.factor if edge else None,
+        "edge_certain": edge.certain if edge else trial.edge_sought(case),
         "certain": case.judgement.hunting.certain,
     }

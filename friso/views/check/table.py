@@ -78,9 +78,15 @@ def _edge(case: Case) -> str:
 def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
     if kick is None:
         return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
-    if not kick.windows:
-        return f"none from {range_with_unit(*kick.searched, unit)}"
     searched = range_with_unit(*kick.searched, unit)
+    if not kick.windows:
+        return UNKNOWN if kick.unknown else f"none from {searched}"
+    lost = f" ({kick.unknown} runs were given up)" if kick.unknown else ""
+    return f"{_windows(kick, unit, searched)}{lost}"
+
+
+def _windows(kick: Kick, unit: str, searched: str) -> str:
+    """The kicks that start hunting, at least one, of the range `searched`."""
     if kick.windows == (kick.searched,):
         return f"all that were tried, {searched}"
     texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]

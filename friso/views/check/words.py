@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 _MICRON, _TEN_MICRON = BANDS
 
+_UNFINISHED = "this run was completed, but not the longer one that tells whether it ends in the hunting that was found"
+
 ROUGH = 5e-4
 """Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""
 
@@ -29,6 +31,8 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     case = item.case
     loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
+    if case.verdict not in says and case.solver.done:
+        return " ".join([*loop, f"{case.verdict}: {_UNFINISHED}."])
     if case.verdict not in says:
         return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []
@@ -51,14 +55,14 @@ def answer(cases: Mapping[str, Case]) -> list[str]:
 
 
 def conclusion(cases: Mapping[str, Case]) -> str | None:
-    """What the joint does to the hunting, where both of its cases were run to a known verdict."""
-    words = [cases[key].verdict for key in ("locked", "free") if key in cases]
-    if len(words) < 2 or "failed" in words:
+    """What the joint does to the hunting, where both of its cases were run to a verdict that is certain."""
+    both = [cases[key] for key in ("locked", "free") if key in cases]
+    words = [case.verdict for case in both]
+    if len(words) < 2 or "failed" in words or not all(case.judgement.hunting.certain for case in both):
         return None
     locked, free = (word in ("hunts", "bistable") for word in words)
     if not free:
-        certain = cases["free"].judgement.hunting.certain
-        return "The free joint stops the hunting." if locked and certain else None
+        return "The free joint stops the hunting." if locked else None
     if words == ["hunts", "bistable"]:
         return "The free joint stops the hunting after this move, but does not rule it out."
     return "The free joint does not stop the hunting." if locked else "The stage hunts only with its joint free."
@@ -86,7 +90,7 @@ def _bistable(case: Case) -> str:
         like = f"this move at {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and acceleration time"
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
     first = _unmoved(case) if case.unmoved else "settles after this move"
-    if STARTS in case.judgement.given_up:
+    if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if not starts:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
@@ -113,7 +117,9 @@ def _transient(case: Case) -> str:
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end})."]
     if judgement.cycle:
         says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
-    if judgement.settled_after is None:
+    if judgement.settled_after is None and judgement.followed is None:
+        says.append(f"{_too_much('How long it takes to settle')}.")
+    elif judgement.settled_after is None:
         says.append(
             f"It does not settle to within {band_text(_TEN_MICRON)} in {with_unit(judgement.followed, 's')} either."
         )
