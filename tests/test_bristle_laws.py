@@ -127,6 +127,16 @@ def test_passive_laws_create_no_energy(law: str, speed: float, bent: float, expo
 
 
 @pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("asymmetry", [0.5, -0.5])
+def test_a_law_is_passive_only_if_it_is_in_both_directions(law: str, asymmetry: float) -> None:
+    """With half the viscous damping one way it takes twice as much."""
+    flat = {**HUNTING[law].flat(), "friction.coulomb": 1.5, "friction.viscous_asymmetry": asymmetry}
+    flat["friction.rolling_exponent"], least = 1.0, 2 * 316.2277660168379 * (3 / 1.5 - 1)
+    assert friction_law(law).active({**flat, "friction.viscous": 0.999 * least})
+    assert not friction_law(law).active({**flat, "friction.viscous": 1.001 * least})
+
+
+@pytest.mark.parametrize("law", LAWS)
 def test_an_active_law_gives_energy_back_somewhere(law: str) -> None:
     flat = HUNTING[law].flat()
     assert friction_law(law).active(flat)

@@ -33,11 +33,12 @@ from snapshots import Snapshots
 from friso.hunting import Judgement, Kick, Margin
 from friso.hunting.margin import BandwidthWindow
 from friso.hunting.outward import AttractionEnd
+from friso.hunting.verdict import STARTS
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
 from friso.views.check.page import check_html, conclusion, verdict_sentence
-from friso.views.check.table import rows
+from friso.views.check.table import UNKNOWN, rows
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Figure
@@ -296,6 +297,7 @@ def said_by_name() -> dict[str, str]:
         "bistable, no kick starts it": sentence(hunts(verdict="bistable", displacement=none, push=none, moves=None)),
         "transient": sentence(transient, peak_to_peak=6.9e-4, period=1.33),
         "transient, at rest": sentence(still, peak_to_peak=1e-7),
+        "transient, longer run given up": sentence(replace(still, followed=None), peak_to_peak=1e-7),
         "transient, cannot hunt": sentence(cannot_hunt("transient"), peak_to_peak=0.383, period=6.36),
         "settles": sentence(settles()),
         "settles, no margin": sentence(settles(margin=None)),
@@ -304,7 +306,8 @@ def said_by_name() -> dict[str, str]:
         "settles, coarsely": sentence(settles(), settling_time={1e-6: None, 1e-5: 1.5}),
         "settles, band not reached": sentence(settles(), settling_time={1e-6: None, 1e-5: None}, peak_to_peak=7e-5),
         "settles, uncertain": sentence(settles(hunting=uncertain)),
-        "failed": sentence(settles(verdict="failed")),
+        "failed": sentence(settles(verdict="failed"), solver=fake_solver("failed")),
+        "failed, the longer run": sentence(settles(verdict="failed")),
     }
 
 
@@ -397,6 +400,21 @@ def test_windows_of_kicks(windows, text):
     assert row_.endswith("and 3 more ranges") == (len(windows) == 7)
 
 
+def test_kicks_that_were_given_up_are_told() -> None:
+    lost = Kick((), (1e-5, 0.1), unknown=3)
+    assert row("Displacements that hunt", hunts(displacement=lost)) == UNKNOWN
+    some = replace(lost, windows=((1e-3, 2e-3),))
+    assert row("Displacements that hunt", hunts(displacement=some)) == "1.00 to 2.00 mm (3 runs were given up)"
+
+
+def test_kicks_that_start_hunting_are_told_where_others_were_given_up() -> None:
+    none = Kick((), (1e-5, 0.1), unknown=3)
+    silent = hunts(verdict="bistable", displacement=none, push=none, moves=None, given_up=(STARTS,))
+    assert "none of the kicks" not in sentence(silent)
+    assert "was not determined" in sentence(silent)
+    assert "1.72 mm" in sentence(hunts(verdict="bistable", push=none, moves=None, given_up=(STARTS,)))
+
+
 @pytest.mark.parametrize(
     ("judgement", "peaks", "text"),
     [
@@ -426,6 +444,18 @@ def test_conclusion_names_what_the_joint_does(snapshots):
     assert conclusion({"locked": settled, "free": settled}) is None
     assert conclusion({"given": hunting}) is None
     assert conclusion({"locked": hunting, "free": failed}) is None
+
+
+def uncertain(case: Any) -> Any:
+    return replace(case, judgement=replace(case.judgement, hunting=replace(case.judgement.hunting, certain=False)))
+
+
+@pytest.mark.parametrize(("locked", "free"), [("locked", "free"), ("free", "locked"), ("locked", "locked")])
+def test_no_conclusion_from_a_case_that_is_not_certain(locked: str, free: str) -> None:
+    cases = {"locked": both_joints()[locked], "free": both_joints()[free]}
+    assert conclusion(cases)
+    assert conclusion({**cases, "locked": uncertain(cases["locked"])}) is None
+    assert conclusion({**cases, "free": uncertain(cases["free"])}) is None
 
 
 def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it(wording: Wording) -> None:

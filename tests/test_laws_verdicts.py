@@ -5,27 +5,33 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import pytest
 from inside import friso_inside
 from variants import VARIANTS, gains, lugre, release, stage
 
 from friso.studies.laws.conversion import convert
 from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, verdicts_by_law
 from friso.views.check.laws import laws_document, laws_rows, laws_sentences
+from friso.views.drawing.prefixes import NOTHING
 
 RIGID = VARIANTS["rigid"]
 PD = stage(release(), friction=lugre(2), controller=gains(kp=1000, kd=20, tau=1e-3))
 """Without an integrator, which nothing winds up in: it cannot hunt."""
 
 
-def case(verdict: str, edge: float | None = None, amplitude: float = 5e-4) -> Any:
+def case(
+    verdict: str, edge: float | None = None, certain: bool = True, edge_certain: bool = True, given_up: Any = ()
+) -> Any:
     """As much of a case as the verdicts across laws look at."""
-    cycle = SimpleNamespace(amplitude=amplitude, multiplier=-0.5) if verdict == "hunts" else None
-    margin = None if edge is None else SimpleNamespace(crossover=edge, factor=edge / 4)
-    judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=SimpleNamespace(certain=True))
+    cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
+    margin = None if edge is None else SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain)
+    hunting = SimpleNamespace(certain=certain, target=cycle)
+    judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)
     return SimpleNamespace(verdict=verdict, judgement=judgement)
 
 
-def under(law: str, *verdicts: tuple[str, float | None]) -> LawVerdict:
+def under(law: str, *verdicts: Any) -> LawVerdict:
+    """A law with a trial for each verdict, its edge [Hz] and what else is told of it (see `case`)."""
     conversion = convert(RIGID, law)
     keys = list(conversion.open)
     trials = [
@@ -74,6 +80,68 @@ def test_a_verdict_that_hangs_on_what_is_open_in_a_law() -> None:
 def test_failed_runs_leave_it_open() -> None:
     laws = across(under("lugre", ("failed", None)))
     assert laws.hunts("given") is None
+    assert not laws.hangs_on_the_law("given")
+    assert dict(laws_rows(laws))["As given: edge"] == ["not determined"]
+    assert "no edge" not in laws_sentences(laws)[0]
+
+
+@pytest.mark.parametrize("verdict", [("settles", 6.0, False), ("hunts", 6.0, False), ("failed", None)])
+def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple) -> None:
+    laws = across(under("lugre", ("settles", 6.0)), under("rolling", ("settles", 6.1)), under("gms", verdict))
+    assert laws.hunts("given") is None
+    assert laws.uncertain("given") == ["gms"]
+    assert laws.deciding("given") == []
+    says = laws_sentences(laws)[0]
+    assert "hangs on the law" not in says
+    assert "settles under lugre and rolling; under gms that is not certain" in says
+    assert dict(laws_rows(laws))["As given: verdict"] == ["settles", "settles", f"{verdict[0]} (not certain)"]
+    document = laws_document(laws)["cases"]["given"]
+    assert (document["hunts"], document["hangs_on_the_law"], document["not_certain"]) == (None, False, ["gms"])
+
+
+def test_laws_that_certainly_disagree_do_so_beside_one_that_is_not_certain() -> None:
+    laws = across(
+        under("lugre", ("hunts", 9.7)), under("rolling", ("settles", 6.0)), under("gms", ("settles", 7.0, False))
+    )
+    assert laws.hangs_on_the_law("given")
+    says = laws_sentences(laws)[0]
+    assert "hangs on the law" in says
+    assert "settles under rolling; under gms that is not certain" in says
+
+
+def test_no_law_is_certain() -> None:
+    laws = across(under("lugre", ("settles", 6.0, False)), under("gms", ("hunts", 6.0, False)))
+    assert (laws.hunts("given"), laws.hangs_on_the_law("given")) == (None, False)
+    assert not any(word in laws_sentences(laws)[0] for word in ("settles", "hunts", "hangs"))
+
+
+def test_a_law_that_is_certain_with_some_of_what_is_open() -> None:
+    laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0), ("settles", 7.1, False)))
+    assert laws.hunts("given") is None
+    assert (
+        "settles under lugre; under gms settles with some of what is open in it, else not certain"
+        in (laws_sentences(laws)[0])
+    )
+
+
+def test_edges_that_were_given_up_are_not_told_as_absent() -> None:
+    lost = ("settles", None, True, True, ("other bandwidths",))
+    laws = across(under("lugre", ("settles", None)), under("gms", lost))
+    assert "no edge" not in laws_sentences(laws)[0]
+    assert "not determined under gms" in laws_sentences(laws)[0]
+    assert dict(laws_rows(laws))["As given: edge"] == [NOTHING, "not determined"]
+    some = across(under("lugre", ("settles", 6.0)), under("gms", lost))
+    assert "edge 6.00 Hz, not determined under gms" in laws_sentences(some)[0]
+    none = across(under("lugre", ("settles", None)), under("gms", ("settles", None)))
+    assert "no edge" in laws_sentences(none)[0]
+
+
+def test_an_edge_that_is_not_certain_says_so() -> None:
+    laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0, True, False)))
+    assert "edge 6.00 to 7.00 Hz (not certain)" in laws_sentences(laws)[0]
+    assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 Hz (not certain)"]
+    trial = laws_document(laws)["cases"]["given"]["laws"]["gms"]["trials"][0]
+    assert not trial["edge_certain"]
 
 
 def test_nothing_hunts_without_an_integrator() -> None:

@@ -180,6 +180,13 @@ def test_what_is_said_of_hunting_is_what_a_long_run_does(name: str) -> None:
     assert min(abs(size / swing - 1) for size in sizes) < 5e-3
 
 
+def test_nothing_is_sure_beyond_a_wide_dead_zone() -> None:
+    """The break-away force deflects the loop by 1.5 mm; most starts are nearer than 3.5 mm to the reference."""
+    wide = hunting_of(machine({"error_deadband": "3.5 mm"}))
+    assert (wide.attracting, wide.observed, wide.certain) == ((), (), False)
+    assert "error_deadband" in wide.reason
+
+
 def test_dither_leaves_the_answer_to_runs() -> None:
     chosen = machine(SETTINGS["dither"], duration="2 s")
     hunting = hunting_of(chosen)

@@ -59,11 +59,12 @@ class Judgement:
 
     `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
     of hunting in bandwidth, `windows` where else something attracts, and `lower` the end below the bandwidth of what
-    attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last
-    corner of the reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s]
-    (None: no longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was
-    observed in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone was seen to swing on, at the end
-    of the time for which it was followed. `given_up`: what of `PARTS` would have taken more work than was allowed.
+    attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last corner of the
+    reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no
+    longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
+    in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
+    was seen to swing on, at the end of the time for which it was followed. `given_up`: what of `PARTS` would have taken
+    more work than was allowed.
     """
 
     verdict: Verdict

@@ -9,7 +9,6 @@ from friso.views.check.cases import case_labels
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
 
 if TYPE_CHECKING:
-    from friso.hunting import Case
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
 
 COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
@@ -30,7 +29,8 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
     count, edges = COUNTS.get(len(names), str(len(names))), _edges(laws, case)
     if hunts is not None:
         return f"under all {count} laws that keep what is measured the stage {_does(hunts)}{edges}."
-    unsure = [f"under {listed(laws.uncertain(case), 'and')} that is not certain"] if laws.uncertain(case) else []
+    silent = [verdict.law for verdict in laws.verdicts if not verdict.answers(case)]
+    unsure = [f"under {listed(silent, 'and')} that is not certain"] if silent else []
     if not laws.answers(case):
         return f"under none of the {count} laws that keep what is measured the verdict is certain."
     parts = [
@@ -51,13 +51,15 @@ def _does(hunts: bool) -> str:
 
 
 def _open(verdict: LawVerdict, case: str) -> str:
-    """What the stage certainly does under a law with some of what is open in it; "" if it does so with all of it."""
+    """What the stage does under a law with some of what is open in it; "" if it does so with all of it, or if nothing
+    is certain."""
     answers = verdict.answers(case)
     if verdict.hunts(case) is not None or not answers:
         return ""
     words = [_does(answer) for answer in (True, False) if answer in answers]
-    some = "by what" if len(answers) > 1 else "with some of what"
-    return f"under {verdict.law} {listed(words, 'or')}, {some} is open in it"
+    if len(answers) > 1:
+        return f"under {verdict.law} {listed(words, 'or')}, by what is open in it"
+    return f"under {verdict.law} {words[0]} with some of what is open in it, else not certain"
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
@@ -147,13 +149,14 @@ def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
 def _law(verdict: LawVerdict, case: str) -> dict[str, Any]:
     return {
         "verdicts": list(verdict.verdicts(case)),
-        "trials": [_trial(trial, trial.cases[case]) for trial in verdict.trials],
+        "trials": [_trial(trial, case) for trial in verdict.trials],
         "not_kept": [item.what for item in verdict.conversion.lost],
         "passive_where": verdict.conversion.active or None,
     }
 
 
-def _trial(trial: Trial, case: Case) -> dict[str, Any]:
+def _trial(trial: Trial, name: str) -> dict[str, Any]:
+    case = trial.cases[name]
     cycle, edge = case.judgement.cycle, case.judgement.margin
     return {
         "drawn": dict(trial.drawn),
@@ -162,6 +165,6 @@ def _trial(trial: Trial, case: Case) -> dict[str, Any]:
         "multiplier": cycle.multiplier if cycle else None,
         "edge_hz": edge.crossover if edge else None,
         "edge_factor": edge.factor if edge else None,
-        "edge_certain": edge.certain if edge else trial.edge_sought(case),
+        "edge_certain": edge.certain if edge else trial.edge_sought(name),
         "certain": case.judgement.hunting.certain,
     }

@@ -1,0 +1,147 @@
+"""What was given up or is not certain is not told as sure: verdicts that rest on made-up surveys and runs."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up import fake_cycle, fake_hunting
+from patched import patched
+from variants import VARIANTS
+
+from friso.engine.arrays import Status
+from friso.hunting import basin, verdict
+from friso.hunting.attractors import Attractors, Target
+from friso.hunting.basin import Kick, MoveShare, displacements
+from friso.hunting.margin import NOT_SOUGHT
+from friso.hunting.measures import options
+from friso.hunting.verdict import LEFT_OVER, STARTS, SWINGS_ON, Judgement, judge
+
+STAGE = VARIANTS["rigid"]
+TARGET = Target(1e-3, 1.6, 100.0, 25.0)
+HUNTING = Kick(((2e-3, 1e-2),), (1e-5, 0.1))
+NONE = replace(HUNTING, windows=())
+
+
+def displaced(hunts: Any, completed: Any) -> Kick:
+    """What is made of kicks that hunt, and of which runs were completed, by functions of their size [m]."""
+
+    def ends_in(flat: Any, count: int, *_: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        kicks = flat["motion.displacement"]
+        return hunts(kicks) & completed(kicks), completed(kicks), np.zeros(count)
+
+    with patched({basin: {"ends_in": ends_in}}):
+        return displacements(STAGE, TARGET)
+
+
+def beyond(size: float) -> Any:
+    return lambda kicks: kicks > size
+
+
+def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
+    """Between 10 and 20 mm no run is completed: there is no edge of hunting."""
+    whole = displaced(beyond(2e-3), beyond(0))
+    assert whole.unknown == 0
+    gap = displaced(beyond(2e-3), lambda kicks: (kicks < 0.01) | (kicks > 0.02))
+    assert gap.unknown > 0
+    assert gap.windows == whole.windows
+    assert len(whole.windows) == 1
+    assert 2e-3 < whole.windows[0][0] < 1.01 * 2e-3
+
+
+def test_kicks_of_which_none_is_completed_are_unknown() -> None:
+    nothing = displaced(beyond(2e-3), beyond(1))
+    assert (nothing.windows, nothing.unknown) == ((), basin.POINTS)
+    assert nothing.searched == pytest.approx((1e-3 / 30, 0.3))
+
+
+def surveyed(complete: bool) -> Attractors:
+    yes, no = np.ones(1, bool), np.zeros(1, bool)
+    return Attractors((), yes, np.ones(1), (), no, np.array([complete]))
+
+
+def run_to(settling: float, swing: float = 0.0) -> Any:
+    """As much of the measures of the stage's own motion as a verdict looks at."""
+    return SimpleNamespace(
+        status=np.array([Status.DONE]),
+        peaks=np.zeros(1),
+        peak_to_peak=np.array([swing]),
+        settling_time=(np.array([settling]), np.array([settling])),
+    )
+
+
+def judged(
+    settling: float = np.nan,
+    ends: bool = False,
+    completed: bool = True,
+    swing: float = 0.0,
+    complete: bool = True,
+    starts: tuple[Kick, Kick, MoveShare | None] = (HUNTING, HUNTING, None),
+) -> Judgement:
+    """The verdict on a stage that something attracts, where its own motion ends so."""
+    attraction = replace(fake_hunting(fake_cycle()), surveyed=surveyed(complete))
+    made_up = {
+        "hunting": lambda *_, **__: attraction,
+        "ends_in": lambda *_: (np.array([ends]), np.array([completed]), np.array([swing])),
+        "searched": lambda *_: NOT_SOUGHT,
+        "displacements": lambda *_: starts[0],
+        "pushes": lambda *_: starts[1],
+        "moves": lambda *_: starts[2],
+    }
+    with patched({verdict: made_up}):
+        return judge(STAGE, run_to(settling), 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("run", "doubt"),
+    [
+        ({}, ""),
+        ({"complete": False}, LEFT_OVER),
+        ({"complete": False, "settling": 0.5}, ""),
+        ({"swing": 2e-4}, SWINGS_ON),
+        ({"swing": 1e-5, "settling": 0.5}, SWINGS_ON),
+    ],
+)
+def test_a_motion_that_may_end_in_another_swing_does_not_surely_settle(run: dict[str, Any], doubt: str) -> None:
+    judgement = judged(**run)
+    assert judgement.verdict == "bistable"
+    assert judgement.hunting.certain == (not doubt)
+    assert judgement.hunting.reason == doubt
+
+
+def test_a_longer_run_that_is_not_completed_gives_no_verdict() -> None:
+    assert judged(completed=False).verdict == "failed"
+
+
+def test_what_ends_in_the_hunting_that_was_found_hunts_whatever_else_there_is() -> None:
+    judgement = judged(ends=True, swing=1e-3, complete=False)
+    assert (judgement.verdict, judgement.hunting.certain) == ("hunts", True)
+
+
+@pytest.mark.parametrize(
+    ("starts", "known"),
+    [
+        ((NONE, NONE, None), True),
+        ((HUNTING, replace(NONE, unknown=2), None), False),
+        ((replace(HUNTING, unknown=2), NONE, None), True),
+        ((NONE, NONE, MoveShare(100, 0, (1.0, 2.0), (0.1, 0.2))), False),
+    ],
+)
+def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, known: bool) -> None:
+    assert (STARTS in judged(starts=starts).given_up) == (not known)
+
+
+def test_a_longer_run_that_is_given_up_tells_nothing_of_settling() -> None:
+    """Of a motion that has not settled at its end: the longer run is out of steps at once."""
+    resting = fake_hunting(reason="")
+    attraction = replace(resting, surveyed=surveyed(complete=True))
+    made_up = {
+        "hunting": lambda *_, **__: attraction,
+        "searched": lambda *_: NOT_SOUGHT,
+        "options": lambda *_: replace(options(1e-6), budget=100),
+    }
+    with patched({verdict: made_up}):
+        judgement = judge(STAGE, run_to(np.nan, swing=1e-3), 1e-6)
+    assert (judgement.verdict, judgement.observed) == ("transient", False)
+    assert (judgement.settled_after, judgement.followed) == (None, None)
