@@ -288,7 +288,7 @@ def _end_in_a_cycle(
     flat: Mapping[str, Any], survey: Attractors, threads: int | None, cancel: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which stages' own motions end in what attracts, and which runs were completed."""
-    return ends_in(flat, len(survey.decided), survey.target, threads=threads, cancel=cancel)
+    return ends_in(flat, len(survey.decided), survey.target, threads=threads, cancel=cancel)[:2]
 
 
 @dataclass(frozen=True)
