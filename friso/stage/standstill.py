@@ -93,3 +93,8 @@ def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
     reset = bool(flat.get("controller.integral_reset", False))
     dead_zone = "controller.error_deadband" in flat
     return FrictionSettings(limit, leak, deadband, hysteresis, reset, gains, push, dither, dead_zone)
+
+
+def dead_band(flat: Mapping[str, Any]) -> Any:
+    """The error [m] up to which the controller does nothing, of stages given as flat keys; 0 without a dead zone."""
+    return flat.get("controller.error_deadband", 0.0)

@@ -21,6 +21,7 @@ from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.stage import Stage
+from friso.stage.standstill import dead_band
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -205,8 +206,7 @@ def _beyond_the_search(stages: Ensemble) -> str:
     controller = stages.structure.controller
     if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
-    dead = np.max(stages.flat.get("controller.error_deadband", 0.0))
-    if dead >= WIDE_BAND * float(stages.length[0]):
+    if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
         return "most starts that were tried lie within error_deadband, and few beyond it: some of these may swing on"
     if stages.outer_integrals:
         return "with integrals in several loops, stages that stick with an outer one wound up otherwise may swing on"
