@@ -24,8 +24,9 @@ from friso.frequency.members import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
+from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
-from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_machines
+from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.settings import SETTINGS, settings_named
@@ -74,8 +75,8 @@ def comparison(built: Stage) -> Comparison:
 
 def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     flat = built.flat()
-    assert {*machines.keys} == {*SPREADS, "rail.seed"}
-    for key, spread in SPREADS.items():
+    assert {*machines.keys} == {*SPREADS.keys() & flat.keys(), "rail.seed"}
+    for key, spread in SPREADS.items() & machines.spreads.items():
         within = np.abs(machines.keys[key] / flat[key] - 1) <= spread / 100
         assert np.mean(within) == pytest.approx(0.95, abs=0.01), key
         assert np.mean(machines.keys[key]) == pytest.approx(flat[key], rel=0.01)
@@ -85,9 +86,33 @@ def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     assert {*machines.signs.tolist()} == {-1.0, 1.0}
 
 
+def test_presliding_of_every_law_is_drawn() -> None:
+    """Elements by one factor; the deflection at which bristles begin to slip below that of sliding, without a draw that
+    it rules out: Coulomb friction is drawn as with LuGre."""
+    elements = load(EXAMPLE.with_name("thesis_rig_gms.toml"))
+    gms = draw_machines(elements, Correlations(), 200, 3)
+    for array in ELEMENTS:
+        ratios = [gms.keys[key] / elements.flat()[key] for key in element_keys(elements.flat(), array)]
+        assert len(ratios) == 4
+        assert np.ptp(ratios, axis=0).max() < 1e-6
+        assert np.std(ratios[0]) == pytest.approx(0.25, abs=0.03)
+    assert "friction.attraction" in gms.spreads
+    bristles = load(EXAMPLE.with_name("thesis_rig_elasto_plastic.toml"))
+    drawn, lugre = (draw_machines(stage, Correlations(), 1000, 3) for stage in (bristles, load(EXAMPLE)))
+    coulomb, stiffness = drawn.keys["friction.coulomb"], drawn.keys["friction.bristle_stiffness"]
+    share = drawn.keys["friction.breakaway_deflection"] * stiffness / coulomb
+    assert (
+        not drawn.sample.broken
+    )  # what is left out lies beyond the bound of one key, not on the wrong side of the rule
+    assert np.std(coulomb) == pytest.approx(np.std(lugre.keys["friction.coulomb"]), rel=0.05)
+    assert (share.min() > 0, share.max() < 1) == (True, True)
+    assert np.median(share) == pytest.approx(0.7, abs=0.01)
+    assert np.std(share) > 0.03
+
+
 def test_signs_have_random_numbers_of_their_own(machines: Machines) -> None:
     scrambling = np.random.default_rng(3).random(machines.count) < 0.5
-    for other in (scrambling, *(machines.keys[key] for key in SPREADS)):
+    for other in (scrambling, *(machines.keys[key] for key in machines.spreads)):
         assert abs(np.corrcoef(machines.signs, other)[0, 1]) < 0.1
 
 

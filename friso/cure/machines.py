@@ -34,7 +34,7 @@ ADDED_KEYS = ("joint.stiffness", "joint.damping")
 class Fleet:
     """Keys of the stage to what they are multiplied by on each machine (`ratios`), or what is added where they are 0
     (`shifts`), and its share of the travel, all of shape (count,); which keys the file calls uncertain, and the default
-    spreads [%] of others."""
+    spreads [%] of others; and how many draws that no stage may have were `left_out`, others being drawn instead."""
 
     ratios: Mapping[str, np.ndarray]
     shifts: Mapping[str, np.ndarray]
@@ -42,6 +42,7 @@ class Fleet:
     from_file: tuple[str, ...]
     spreads: Mapping[str, float]
     seed: int
+    left_out: int = 0
 
     @property
     def count(self) -> int:
@@ -95,4 +96,4 @@ def drawn(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fl
         values[0] = 1.0
     for values in shifts.values():
         values[0] = 0.0
-    return Fleet(ratios, shifts, travel, sample.from_file, dict(sample.spreads), seed)
+    return Fleet(ratios, shifts, travel, sample.from_file, dict(sample.spreads), seed, sample.sample.left_out)

@@ -14,6 +14,7 @@ from friso.errors import InputError
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, as_tuned
 from friso.stage.correlations import Correlations, Sample, draw
+from friso.stage.lists import element_keys
 from friso.virtual_rig.run import SAMPLE_TIME
 
 LEAST, MOST = 20, 100_000
@@ -31,6 +32,8 @@ SPREADS: Mapping[str, float] = MappingProxyType(
         "friction.stribeck_velocity": 50.0,
         "friction.bristle_stiffness": 50.0,
         "friction.bristle_damping": 50.0,
+        "friction.breakaway_deflection": 50.0,
+        "friction.attraction": 50.0,
         "joint.stiffness": 5.0,
         "joint.damping": 50.0,
         "parasitic.frequency": 5.0,
@@ -42,6 +45,16 @@ SPREADS: Mapping[str, float] = MappingProxyType(
 """Half-widths of the 95 % intervals [%] of keys for which the stage file gives none. They are our choice: friction as
 it differs between bearings of one type and preload, masses as weighed, bristles and Stribeck velocity as badly known as
 they are identified."""
+
+ELEMENTS: Mapping[str, float] = MappingProxyType({"friction.element_stiffness": 50.0, "friction.element_damping": 50.0})
+"""The same of arrays, all elements of which vary by one common factor."""
+
+SLIP = "friction.breakaway_deflection"
+"""Deflection at which elasto-plastic bristles begin to slip. It is drawn as a share of that of sliding, F_c/sigma_0, at
+which it has to stay below: what varies by its spread is that share over what is left of it."""
+
+TINY = 1e-6
+"""What it is multiplied by while the others are drawn, so that it rules out none of them."""
 
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
 """Keys that follow the preload together, and their correlation, where neither is uncertain in the file: our choice."""
@@ -104,6 +117,8 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
         notes += [f"{sample.left_out} draws that no stage may have were left out and others drawn"]
     numbers = np.arange(count)
     keys = {key: values for key, values in sample.keys.items() if not key.startswith(HELD)}
+    if SLIP in spreads:
+        keys[SLIP] = _slipping(clocked.flat(), keys)
     if clocked.rail:
         keys["rail.seed"] = clocked.rail.seed + numbers
     else:
@@ -126,16 +141,33 @@ def _spreads(stage: Stage) -> dict[str, float]:
     """Default spreads [%] of keys that the stage has, not 0, and calls certain."""
     flat, uncertain = stage.flat(), stage.uncertain()
     follow = FROM_LEAVES if stage.flexure else ()
-    return {
+    single = {key: spread for key, spread in SPREADS.items() if key not in uncertain and not key.startswith(follow)}
+    several = {
         key: spread
-        for key, spread in SPREADS.items()
-        if flat.get(key) and key not in uncertain and not key.startswith(follow)
+        for array, spread in ELEMENTS.items()
+        for key in element_keys(flat, array)
+        if not uncertain.keys() & {*element_keys(flat, array)}
     }
+    return {key: spread for key, spread in (single | several).items() if flat.get(key)}
+
+
+def _slipping(flat: Mapping[str, Any], keys: Mapping[str, np.ndarray]) -> np.ndarray:
+    """The deflections [m] at which drawn bristles begin to slip."""
+
+    def most(values: Mapping[str, Any]) -> Any:
+        weaker = 1 - np.abs(values.get("friction.asymmetry", 0.0))
+        return values["friction.coulomb"] * weaker / values["friction.bristle_stiffness"]
+
+    share = flat[SLIP] / most(flat)
+    odds = share / (1 - share) * keys[SLIP] / (TINY * flat[SLIP])
+    return np.asarray(most({**flat, **keys}) * odds / (1 + odds))
 
 
 def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
     """The stage with these spreads [%] written into it."""
     flat = stage.flat()
+    if SLIP in spreads:
+        flat[SLIP] *= TINY
     fields_of_keys = numeric_keys(flat)
     return stage.replace(
         {key: f"{flat[key]!r} {fields_of_keys[key].unit} +/- {part} %" for key, part in spreads.items()}
@@ -144,8 +176,13 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
 
 def _joined(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
     """Those given, and those of the keys with default spreads."""
-    if not all(key in spreads for key in TOGETHER):
+    arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
+    levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()
+    groups = [(levels, TOGETHER_BY), *((array, 1.0) for array in arrays)]
+    groups = [(keys, by) for keys, by in groups if keys]
+    if not groups:
         return correlations
-    lengths = np.array([[1.0, TOGETHER_BY], [TOGETHER_BY, 1.0]])
-    matrix = np.asarray(block_diag(correlations.matrix, lengths)) if correlations.keys else lengths
-    return Correlations((*correlations.keys, *TOGETHER), matrix)
+    blocks = [np.where(np.eye(len(keys), dtype=bool), 1.0, by) for keys, by in groups]
+    given = [correlations.matrix] if correlations.keys else []
+    names = tuple(key for keys, _ in groups for key in keys)
+    return Correlations((*correlations.keys, *names), np.asarray(block_diag(*given, *blocks)))

@@ -332,4 +332,6 @@ def assumptions(tuning: Advice) -> list[str]:
     if machines.spreads:
         spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
         lines.append(f"Default spreads (95 % of the machines): {spreads}.")
+    if machines.left_out:
+        lines.append(f"{machines.left_out} draws that no stage may have were left out and others drawn.")
     return lines
