@@ -12,7 +12,20 @@ from hypothesis import strategies as st
 from refusals import Refused
 from scipy.integrate import solve_ivp
 from scipy.special import dawsn
-from variants import DAHL, HOLD, NO_FRICTION, free, lugre, maxwell, stage, stribeck, van_dijk
+from variants import (
+    DAHL,
+    HOLD,
+    NO_FRICTION,
+    elasto_plastic,
+    free,
+    gms,
+    lugre,
+    maxwell,
+    rolling,
+    stage,
+    stribeck,
+    van_dijk,
+)
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.imposed import imposed_form
@@ -24,7 +37,15 @@ from friso.frequency.describing.steady import Imposition, steady
 from friso.stage import Stage
 from friso.stage.tables import FRICTION
 
-LAWS = {"lugre": lugre(2), "dahl": DAHL, "stribeck": stribeck(2) + "asymmetry = 0.2\n", "maxwell_slip": maxwell()}
+LAWS = {
+    "lugre": lugre(2),
+    "dahl": DAHL,
+    "stribeck": stribeck(2) + "asymmetry = 0.2\n",
+    "maxwell_slip": maxwell(),
+    "elasto_plastic": elasto_plastic(),
+    "gms": gms(),
+    "rolling": rolling(),
+}
 STEADY = settings(max_examples=25, deadline=None, derandomize=True)
 DESCRIBING = pytest.mark.xdist_group("describing")
 pytestmark = DESCRIBING

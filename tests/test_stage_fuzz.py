@@ -52,11 +52,11 @@ def check(text: str) -> None:
         return
     file, flat = tomllib.loads(text.removeprefix("\ufeff")), stage.flat()
     units = {key: field.unit for key, field in numeric_keys(flat).items()}
-    for key, value in flattened(file).items():
+    for key, value in one_by_one(flattened(file)).items():
         if key in ("name", "source"):
             assert getattr(stage, key) == value
-        elif isinstance(value, list) and value and isinstance(value[0], dict):
-            assert all(f"{key}.{number}.{name}" in flat for number, table in enumerate(value, 1) for name in table)
+        elif isinstance(value, dict):
+            assert all(f"{key}.{name}" in flat for name in value)
         elif isinstance(value, str) and key in units:
             assert flat[key] == pytest.approx(
                 si_value(value, units[key]), rel=1e-12, abs=5e-318
@@ -73,6 +73,13 @@ def flattened(file: dict[str, Any]) -> dict[str, Any]:
         f"{name}.{key}": item for name, table in file.items() if isinstance(table, dict) for key, item in table.items()
     }
     return tables | {key: value for key, value in file.items() if not isinstance(value, dict)}
+
+
+def one_by_one(values: dict[str, Any]) -> dict[str, Any]:
+    """The values with an entry for each element of an array, numbered from 1."""
+    arrays = {key: array for key, array in values.items() if isinstance(array, list)}
+    elements = {f"{key}.{number}": item for key, array in arrays.items() for number, item in enumerate(array, 1)}
+    return {key: value for key, value in values.items() if key not in arrays} | elements
 
 
 snippets = st.one_of(

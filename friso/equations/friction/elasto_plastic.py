@@ -74,7 +74,8 @@ class ElastoPlastic(StribeckSection):
             turns = (side * deflection - (limit + begins) / 2) / (limit - begins) / 2
             swelling: Any = sine(turns)
             rising = (1 + swelling) / 2
-            shares.append(plastic.beyond * (rising + full.beyond * (1 - rising)))
+            # beyond z_max the deflection is beyond z_ba too, as z_max > z_ba: neither kink's own jump hangs on the other
+            shares.append(plastic.beyond * rising + full.beyond * (1 - rising))
             kinks += [plastic, full]
         ahead, behind = shares
         alpha = forward.beyond * ahead + (1 - forward.beyond) * behind

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 import numpy as np
 
 from friso.equations.friction.common import (
-    TINY,
     Friction,
     StribeckCurve,
     StribeckSection,
@@ -31,13 +30,18 @@ from friso.stage import register_friction
 if TYPE_CHECKING:
     import sympy as sp
 
+ROUNDED = 1e-4
+"""Share of the level, r, below which bristles give way in proportion to what they lack, at the rate ROUNDED^(i - 1). A
+bare power has no slope at r = 0: while the body rolls steadily the bristles would not follow a small change of the
+level at all, so that the linearised law would miss the Stribeck curve, and would change abruptly as i leaves 1."""
+
 from_1_to_4 = Bound("from 1 to 4", lambda value: (value >= 1) & (value <= 4))
 
 
 @register_friction
 class Rolling(StribeckSection):
     """Bristles that give way by a power of what they lack: z' = v r abs(r)^(i - 1), r = 1 - sigma_0 z sgn(v)/g(v),
-    F = sigma_0 z + sigma_1 z' + sigma_2 v."""
+    F = sigma_0 z + sigma_1 z' + sigma_2 v; abs(r) is sqrt(r^2 + ROUNDED^2)."""
 
     model: Literal["rolling"]
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
@@ -57,7 +61,7 @@ class Rolling(StribeckSection):
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         lacking = 1 - stiffness * forward.sign * deflection / level
-        rate = velocity * lacking * (lacking**2 + TINY) ** ((key("friction.rolling_exponent") - 1) / 2)
+        rate = velocity * lacking * (lacking**2 + ROUNDED**2) ** ((key("friction.rolling_exponent") - 1) / 2)
         force = (
             stiffness * deflection
             + key("friction.bristle_damping") * rate
