@@ -5,7 +5,7 @@ Nothing here is shared with friso but the names of states and of the keys of the
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from math import exp, pi, sin, sqrt, tanh
+from math import exp, hypot, pi, sin, sqrt, tanh
 from typing import Any
 
 Flat = Mapping[str, Any]
@@ -62,8 +62,9 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
         alpha = 0.0 if abs(z) < begins or z * v < 0 else 1.0 if abs(z) >= limit else rising
         z_rate = v * (1 - alpha * abs(z) / limit)
     if law == "rolling":
+        more = flat["friction.rolling_exponent"] - 1
         lacking = 1 - (1 if v > 0 else -1) * sigma_0 * z / stribeck_level(flat, v)
-        z_rate = v * lacking * abs(lacking) ** (flat["friction.rolling_exponent"] - 1)
+        z_rate = v * lacking * hypot(lacking, 1e-4) ** more / hypot(1, 1e-4) ** more
     return sigma_0 * z + flat["friction.bristle_damping"] * z_rate + viscous, z_rate
 
 

@@ -107,7 +107,8 @@ def test_small_motions(law: str) -> None:
     assert stuck.a[0, 1, :2] == pytest.approx([-1e5 / 1.7, -(316.2277660168379 + 0.5) / 1.7], rel=1e-12)
     gives_way = sliding.a[0, sliding.states.index("bristle_deflection"), sliding.states.index("bristle_deflection")]
     level = 1 + 2 * np.exp(-((2 / 1.6) ** 2))
-    assert gives_way == pytest.approx({"elasto_plastic": -2e-3 * 1e5 / level, "rolling": 0.0}[law], abs=1e-4)
+    softer = {"elasto_plastic": 1.0, "rolling": 1e-4**0.5}[law]  # where nothing is lacking, rounded
+    assert gives_way == pytest.approx(-2e-3 * 1e5 / level * softer, rel=1e-6)
 
 
 @settings(max_examples=50, deadline=None, derandomize=True)
@@ -117,7 +118,9 @@ def test_passive_laws_create_no_energy(law: str, speed: float, bent: float, expo
     are states in which it is less."""
     flat = {**HUNTING[law].flat(), "friction.coulomb": 3 * share, "friction.rolling_exponent": exponent}
     flat["friction.breakaway_deflection"] = 0.5 * flat["friction.coulomb"] / 1e5
-    least = 316.2277660168379 * (1 / share - 1) ** (exponent if law == "rolling" else 1)
+    over, more = 1 / share - 1, exponent - 1
+    softer = np.hypot(over, 1e-4) ** more / np.hypot(1, 1e-4) ** more if law == "rolling" else 1.0
+    least = 316.2277660168379 * over * softer
     assert bool(friction_law(law).active({**flat, "friction.viscous": 0.999 * least})) == (least > 0)
     passive = {**flat, "friction.viscous": least * (1 + 1e-9)}
     assert not friction_law(law).active(passive)

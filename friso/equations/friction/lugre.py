@@ -73,14 +73,14 @@ class LuGre(StribeckSection):
         return bristles_active(flat)
 
 
-def bristles_active(flat: Mapping[str, Any], exponent: float = 1.0) -> str:
-    """The condition under which damped bristles on a Stribeck curve are passive, where it is not met."""
+def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
+    """The condition under which damped bristles on a Stribeck curve are passive, where it is not met. Those bent most
+    give way `softer` times as fast as LuGre's; `power` writes that in the condition."""
     levels, damping = levels_of(flat), flat["friction.bristle_damping"]
-    least = damping * (levels.static / levels.coulomb - 1) ** exponent
+    least = damping * (levels.static / levels.coulomb - 1) * softer
     viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less
     if viscous >= least:
         return ""
-    power = "" if exponent == 1 else f"^{exponent:g}"
     return (
         f"viscous >= bristle_damping ((static - coulomb)/coulomb){power} = {least:.4g} N*s/m; "
         f"it is {viscous:.4g} N*s/m{' in one direction' if levels.viscous_asymmetry else ''}"

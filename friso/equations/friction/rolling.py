@@ -23,17 +23,12 @@ from friso.equations.friction.common import (
     viscous_force,
 )
 from friso.equations.friction.lugre import bristles_active
-from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, on_bristles
+from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, levels_of, on_bristles
 from friso.quantities import Bound, Number, Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
 if TYPE_CHECKING:
     import sympy as sp
-
-ROUNDED = 1e-4
-"""Share of the level, r, below which bristles give way in proportion to what they lack, at the rate ROUNDED^(i - 1). A
-bare power has no slope at r = 0: while the body rolls steadily the bristles would not follow a small change of the
-level at all, so that the linearised law would miss the Stribeck curve, and would change abruptly as i leaves 1."""
 
 from_1_to_4 = Bound("from 1 to 4", lambda value: (value >= 1) & (value <= 4))
 
@@ -41,7 +36,7 @@ from_1_to_4 = Bound("from 1 to 4", lambda value: (value >= 1) & (value <= 4))
 @register_friction
 class Rolling(StribeckSection):
     """Bristles that give way by a power of what they lack: z' = v r abs(r)^(i - 1), r = 1 - sigma_0 z sgn(v)/g(v),
-    F = sigma_0 z + sigma_1 z' + sigma_2 v; abs(r) is sqrt(r^2 + ROUNDED^2)."""
+    F = sigma_0 z + sigma_1 z' + sigma_2 v, the power rounded at r = 0 (`softening`)."""
 
     model: Literal["rolling"]
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
@@ -61,7 +56,7 @@ class Rolling(StribeckSection):
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         lacking = 1 - stiffness * forward.sign * deflection / level
-        rate = velocity * lacking * (lacking**2 + ROUNDED**2) ** ((key("friction.rolling_exponent") - 1) / 2)
+        rate = velocity * lacking * softening(lacking, key("friction.rolling_exponent"))
         force = (
             stiffness * deflection
             + key("friction.bristle_damping") * rate
@@ -97,8 +92,23 @@ class Rolling(StribeckSection):
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
-        """Passive where sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i: z' v >= -v^2 ((F_s - F_c)/F_c)^i."""
-        return bristles_active(flat, flat["friction.rolling_exponent"])
+        """Passive where sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i: z' v >= -v^2 ((F_s - F_c)/F_c)^i; the power rounded."""
+        levels, exponent = levels_of(flat), flat["friction.rolling_exponent"]
+        softer = softening(levels.static / levels.coulomb - 1, exponent)
+        return bristles_active(flat, softer, "" if exponent == 1 else f"^{exponent:g}")
+
+
+ROUNDED = 1e-4
+"""Share of the level that bristles lack below which they give way in proportion to it."""
+
+
+def softening(lacking: Any, exponent: Any) -> Any:
+    """abs(r)^(i - 1), rounded at r = 0 and still 1 at rest: ((r^2 + d^2)/(1 + d^2))^((i - 1)/2), d being ROUNDED.
+
+    A bare power is 0 at r = 0: while the body rolls steadily, bristles would not follow a small change of the level at
+    all, and the linearised law would change abruptly as i leaves 1. Rounding changes the force by less than d F_s.
+    """
+    return ((lacking**2 + ROUNDED**2) / (1 + ROUNDED**2)) ** ((exponent - 1) / 2)
 
 
 def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
