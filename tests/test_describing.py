@@ -46,6 +46,9 @@ LAWS = {
     "gms": gms(),
     "rolling": rolling(),
 }
+STICKING = {"maxwell_slip", "elasto_plastic", "gms"}
+"""Those of which all or a part follows small motions as a spring."""
+
 STEADY = settings(max_examples=25, deadline=None, derandomize=True)
 DESCRIBING = pytest.mark.xdist_group("describing")
 pytestmark = DESCRIBING
@@ -227,16 +230,17 @@ def test_sampled_harmonics_converge_with_the_square_of_the_samples() -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_whole_and_half_period_agree(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A symmetric law followed over a whole period has the harmonics of half a period and no even ones; elements that
-    stick throughout bear a constant force, which depends on where they started."""
+    """A symmetric law followed over a whole period has the harmonics of half a period and no even ones; what sticks
+    throughout, as some of it does at less than 1 mm, bears a constant force, which depends on where it started."""
     amplitudes, frequencies = np.array([1e-6, 3e-5, 1e-3]), [0.5, 20.0]
     half = describing(rigid(LAWS[law]), amplitudes, frequencies, 5)
     monkeypatch.setattr(Imposition, "symmetric", False)
     whole = describing(rigid(LAWS[law]), amplitudes, frequencies, 5)
     assert set(np.ravel(whole["status"])) == {"done"}
-    first = 1 if law == "maxwell_slip" else 0
-    assert np.max(np.abs(half["force"] - whole["force"]).sel(harmonic=slice(first, None))) < 1e-6
-    even = np.abs(whole["force"].sel(harmonic=[0, 2, 4][first:])).values
+    off, even = np.abs(half["force"] - whole["force"]).values, np.abs(whole["force"].values[..., ::2])
+    if law in STICKING:
+        off[:2, :, 0] = even[:2, :, 0] = 0.0
+    assert np.max(off) < 1e-6
     assert (np.max(even) < 1e-6) == (law != "stribeck")
 
 

@@ -74,7 +74,7 @@ class ElastoPlastic(StribeckSection):
             turns = (side * deflection - (limit + begins) / 2) / (limit - begins) / 2
             swelling: Any = sine(turns)
             rising = (1 + swelling) / 2
-            # beyond z_max the deflection is beyond z_ba too, as z_max > z_ba: neither kink's own jump hangs on the other
+            # beyond z_max z is beyond z_ba too; so written, neither kink jumps at its surface whatever the other's side
             shares.append(plastic.beyond * rising + full.beyond * (1 - rising))
             kinks += [plastic, full]
         ahead, behind = shares
