@@ -96,7 +96,7 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     """
     checked_rtol(rtol)
     variants = stage.variants()
-    kernels(set().union(*map(_needed, variants.values())))
+    kernels(needed_kernels(stage))
     different: list[Stage] = []
     different += (variant for variant in variants.values() if variant not in different)
     done = Tally(progress, len(different) * len(PARTS))
@@ -107,6 +107,11 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
             judged.append((variant, _case(variant, rtol, traces, done, left / (len(different) - len(judged)))))
         left -= spent.used
     return {name: next(case for stage, case in judged if stage == variant) for name, variant in variants.items()}
+
+
+def needed_kernels(stage: Stage) -> set[KernelRequest]:
+    """The kernels for all cases: who checks several stages has those of all compiled side by side."""
+    return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
 def _is_free(stage: Stage) -> bool:

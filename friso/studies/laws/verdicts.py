@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
-from friso.hunting.check import LONG, Case, check
+from friso.hunting.check import LONG, Case, check, needed_kernels
 from friso.hunting.criteria import ATTRACTED
 from friso.hunting.verdict import BANDWIDTHS
 from friso.progress import Progress, silent
@@ -153,6 +154,7 @@ def verdicts_by_law(
     conversions, left_out = _conversions(stage, elements)
     planned = [(conversion, list(_drawn(conversion))) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
+    kernels(set[KernelRequest]().union(*(needed_kernels(conversion.stage) for conversion in conversions)))
     verdicts = []
     for conversion, draws in planned:
         trials = []
