@@ -18,12 +18,13 @@ from friso.drives.conversions import conversions
 from friso.drives.format import FORMATS
 from friso.drives.gains import gains_of
 from friso.drives.questions import UserAnswers
-from friso.drives.read import MOST_BYTES, stage_from
+from friso.drives.read import stage_from
 from friso.equations.blocks import Loop
 from friso.equations.component import state
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
+from friso.stage.files import MOST_BYTES
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 

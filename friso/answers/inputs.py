@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeAlias
 
 from friso.errors import InputError
-from friso.quantities import Quantity, positive
+from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, beside, read_correlations
 from friso.stage.plausible import doubts
@@ -43,7 +44,13 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
 
 def changes_of(changes: Changes) -> dict[str, Any]:
     """Keys to their new values, from a dictionary or texts KEY=VALUE. Raises InputError."""
-    return dict(changes) if isinstance(changes, Mapping) else dict(parse_set(text) for text in changes or ())
+    if changes is None:
+        return {}
+    keys = [*changes] if isinstance(changes, Iterable) and not isinstance(changes, str | bytes) else [None]
+    if not all(isinstance(key, str) for key in keys):
+        expected = "a dictionary of keys, or texts KEY=VALUE"
+        raise wrong("set", type(changes).__name__, expected, '{"masses.stage": "0.6 kg"}')
+    return dict(changes) if isinstance(changes, Mapping) else dict(map(parse_set, keys))
 
 
 def read_stage(
@@ -115,8 +122,10 @@ def seconds_of(value: str | float, name: str, example: str = "1 ms") -> float:
 
 def whole_number(value: int, name: str, least: int, most: int, example: str) -> int:
     """A whole number within limits. Raises InputError."""
-    if not least <= value <= most:
-        raise wrong(name, str(value), f"a whole number from {least} to {most}", example)
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if not whole or not least <= value <= most:
+        actual = str(value) if not whole or abs(value) < 10**18 else "a number of many digits"
+        raise wrong(name, quoted(actual), f"a whole number from {least} to {most}", example)
     return value
 
 

@@ -108,7 +108,11 @@ def init(
         key = "set" if values else "axis"
         raise InputError(key, "no --from", "a parameter file that it is about", "--from machine.ini")
     refuse_device("STAGE.toml", place)
-    if place.exists() and not overwrite:
+    for source in (spec, from_):
+        if source is not None and place.exists() and Path(source).exists() and place.samefile(source):
+            expected = "another file than the one that is read; nothing was overwritten"
+            raise InputError("STAGE.toml", str(place), expected, "friso init new.toml")
+    if os.path.lexists(place) and not (overwrite and place.is_file()):
         expected = "a new file, or --overwrite; nothing was overwritten"
         raise InputError("STAGE.toml", f"{place}, which already exists", expected, "friso init new.toml")
     text = _start(spec, from_, axis, values)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import isfinite, pi, sqrt
 from typing import Any
 
 from friso.axis import LINEAR, axis_of
 from friso.drives.questions import UserAnswers
+from friso.errors import InputError
 from friso.quantities import Quantity, positive
 
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
@@ -28,6 +29,11 @@ class Conversion:
     name: str
     symbol: str
     values: tuple[tuple[float, str], ...]
+
+    @property
+    def finite(self) -> bool:
+        """Whether all its values are finite numbers."""
+        return all(isfinite(value) for value, _ in self.values)
 
 
 @dataclass(frozen=True)
@@ -57,6 +63,15 @@ class Turn:
 def conversions(flat: Mapping[str, Any], answers: UserAnswers) -> tuple[Conversion, ...]:
     """The gains of a stage given as flat keys, by what is known of motor and screw. Raises InputError."""
     turn = Turn.of(flat, answers)
+    try:
+        return tuple(row for row in _rows(flat, turn) if row.finite)
+    except (ArithmeticError, ValueError):
+        actual = "gains or a travel that are too large or too small for the conversions"
+        raise InputError("controller", actual, "numbers that a drive could take", 'kp = "500 N*s/m"') from None
+
+
+def _rows(flat: Mapping[str, Any], turn: Turn) -> tuple[Conversion, ...]:
+    """The gains of each kind of controller."""
     key = {name.removeprefix("controller."): v for name, v in flat.items() if name.startswith("controller.")}
     if key["kind"] == "cascade":
         return _of_cascade(key, turn, flat)

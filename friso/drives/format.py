@@ -33,7 +33,7 @@ class AxisParameters:
             if isinstance(entry, bool):
                 raise TypeError
             value = float(entry)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InputError(name, quoted(str(entry)[:80]), "a number", f"{name} = 1.0") from None
         if abs(value) > MOST or value != value:
             raise InputError(name, f"{value:g}", f"a number of at most {MOST:g}", f"{name} = 1.0")

@@ -10,12 +10,10 @@ from typing import Any
 from friso.drives.format import FORMATS, AsStage, AxisParameters, ParameterFormat
 from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError
+from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.stage.files import text_of
-
-MOST_BYTES = 4_000_000
-"""Size of a parameter file at most."""
 
 
 @dataclass(frozen=True)
@@ -30,9 +28,9 @@ class Drawn:
 
     def text(self) -> str:
         """The stage file, at its head what it leaves out."""
-        lines = [f"# From {self.path.name}, {self.axis}, by friso init --from."]
-        lines += [f"# Left out: {sentence}" for sentence in self.left_out]
-        return "\n".join([*lines, self.stage.to_toml()])
+        sentences = [f"From {self.path.name}, {self.axis}, by friso init --from."]
+        sentences += [f"Left out: {sentence}" for sentence in self.left_out]
+        return "\n".join([*(f"# {one_line(sentence)}" for sentence in sentences), self.stage.to_toml()])
 
 
 def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) -> Drawn:
@@ -55,14 +53,6 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
     """The kind of a parameter file, and its axes that have gains. Raises InputError."""
     titles = ", ".join(FORMATS[name].title for name in FORMATS)
     expected = f"a parameter file: {titles}"
-    try:
-        size = path.stat().st_size
-    except (OSError, ValueError):
-        size = 0  # whatever is wrong is said where it is opened
-    if size > MOST_BYTES:
-        raise InputError(
-            "", f"a file of {size / 1e6:.3g} MB", f"{expected}, of at most {MOST_BYTES / 1e6:g} MB", "", str(path)
-        )
     text = text_of(path, expected, "friso init stage.toml --from machine.ini")
     for name in FORMATS:
         kind = FORMATS[name]
@@ -99,7 +89,10 @@ def _with_answers(
     for key, value in user_answers.items():
         table, dot, name = key.partition(".")
         if dot:
-            tables.setdefault(table, {})[name] = value
+            keys = tables.setdefault(table, {})
+            if not isinstance(keys, dict):
+                raise InputError(key, quoted(str(value)), "a key of a table of the stage", 'masses.stage="3 kg"')
+            keys[name] = value
     friction: dict[str, Any] = tables.get("friction", {})
     if friction.get("model") == "none":
         tables.pop("friction")

@@ -90,6 +90,8 @@ def content_of(path: Path, options: Mapping, folder: Path | None = None) -> LogC
     mapping = options.over(load(path, folder) or Mapping())
     table = with_user_units(FORMATS[name].read(path), mapping, FORMATS[name].times, str(path))
     reading = Reading(table, mapping, False, not FORMATS[name].units, str(path))
+    if not table.channels:
+        raise LogError("", "no channel of numbers", "a log with columns of numbers", "", str(path))
     proposal = propose(table, mapping.roles, str(path))
     channels = tuple(_content(channel, proposal, reading) for channel in table.channels)
     try:

@@ -2,6 +2,7 @@
 
 import os
 import re
+import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +13,11 @@ from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.stage import Stage
 from friso.whole_file import whole_file
+
+MOST_BYTES = 4_000_000
+"""Size of a text file at most."""
+
+_READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -73,7 +79,7 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
 
 def write_whole(text: str, path: Path, overwrite: bool) -> None:
     """Write a text file, all of it or nothing. Raises InputError as `save` does."""
-    if path.exists() and not overwrite:
+    if os.path.lexists(path) and not (overwrite and path.is_file()):
         raise InputError("", "a file that already exists", "a new file, or permission to overwrite", origin=str(path))
     try:
         with whole_file(path) as file:
@@ -103,14 +109,24 @@ def _value(text: str) -> Any:
 
 
 def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
-    """What stands in a text file, which is to be what is `expected`. Raises InputError."""
+    """What stands in a text file, which is to be what is `expected`. Raises InputError, also for a device, for a pipe
+    and for more than MOST_BYTES."""
     try:
-        return path.read_bytes().decode("utf-8-sig")
+        with open(os.open(path, _READING), "rb") as file:
+            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+                raise InputError("", "a device or a pipe", expected, example, str(path))
+            content = file.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            actual, most = f"a file of {path.stat().st_size / 1e6:.3g} MB", f"of at most {MOST_BYTES / 1e6:g} MB"
+            raise InputError("", actual, f"{expected}, {most}", example, str(path))
+        return content.decode("utf-8-sig")
+    except InputError:
+        raise
     except UnicodeDecodeError as error:
         text = f"byte {error.start + 1} is not UTF-8"
         raise InputError("", text, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
     except (OSError, ValueError) as error:
-        text = "a folder" if path.is_dir() else _reason(error)
+        text = "a folder" if os.path.isdir(path) else _reason(error)
         raise InputError("", text, expected, example, str(path)) from None
 
 

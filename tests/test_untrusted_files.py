@@ -1,0 +1,114 @@
+"""Files and values that are no stage files: devices, pipes, foreign names, wrong types."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from inside import friso_inside
+
+import friso
+from friso.errors import InputError
+from friso.stage.files import MOST_BYTES
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+AXIS = EXAMPLES / "drives" / "linuxcnc_torque_axis.ini"
+MACHINE = {
+    **{"torque_per_output": "1 N*m", "travel_per_turn": "10 mm", "force_per_output": "10 N"},
+    **{"masses.stage": "3 kg", "friction.model": "none"},
+    **{"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "30 ms"},
+}
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="devices and pipes of POSIX")
+
+
+@posix
+@pytest.mark.parametrize("place", ["/dev/zero", "pipe"])
+def test_devices_and_pipes_are_refused_at_once(place: str, tmp_path: Path) -> None:
+    file = Path(place) if place.startswith("/") else tmp_path / place
+    if not file.exists():
+        os.mkfifo(file)
+    for read in (
+        friso.load,
+        lambda path: friso.export("gains", path),
+        lambda path: friso.init(tmp_path / "new.toml", from_=path),
+    ):
+        with pytest.raises(InputError, match="a device or a pipe"):
+            read(file)
+
+
+def test_a_text_file_has_a_largest_size_and_a_name_a_longest(tmp_path: Path) -> None:
+    with (tmp_path / "huge.toml").open("wb") as file:
+        file.truncate(MOST_BYTES + 1)
+    for name, reason in (("huge.toml", "MB"), ("x" * 5000, "name")):
+        with pytest.raises(InputError, match=reason):
+            friso.load(tmp_path / name)
+
+
+@posix
+def test_the_name_of_a_parameter_file_writes_no_table(tmp_path: Path) -> None:
+    source = tmp_path / "a\n[evil]\nx = 1\x1b.ini"
+    source.write_bytes(AXIS.read_bytes())
+    place = friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)
+    assert "evil" not in {table for table in place.read_text("utf-8").splitlines() if table.startswith("[")}
+    assert friso.load(place).masses.stage is not None
+
+
+def test_init_does_not_replace_what_it_reads(tmp_path: Path) -> None:
+    stage = tmp_path / "stage.toml"
+    stage.write_bytes((EXAMPLES / "lugre_stick_slip.toml").read_bytes())
+    done = friso_inside(tmp_path, "init", "stage.toml", "--spec", "stage.toml", "--overwrite")
+    assert done.returncode == 2
+    assert stage.read_bytes() == (EXAMPLES / "lugre_stick_slip.toml").read_bytes()
+
+
+@posix
+def test_a_dangling_link_is_a_file_that_exists(tmp_path: Path) -> None:
+    (tmp_path / "new.toml").symlink_to("nowhere")
+    with pytest.raises(InputError, match="already exists"):
+        friso.init(tmp_path / "new.toml")
+    assert (tmp_path / "new.toml").is_symlink()
+
+
+@pytest.mark.parametrize(
+    "changes", [3.0, True, [float("nan")], [b"x"], np.array([1.0, 2.0]), {3: 4}, "masses.cart=1 kg"]
+)
+def test_overrides_of_another_type_are_refused(changes: object) -> None:
+    with pytest.raises(InputError):
+        friso.export("gains", EXAMPLES / "thesis_rig.toml", set=changes)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("elements", ["6", b"3", None, True, 2.5, pytest.param(10**5000, id="long")])
+def test_a_whole_number_of_another_type_is_refused(elements: object) -> None:
+    with pytest.raises(InputError):
+        friso.convert(EXAMPLES / "thesis_rig.toml", "gms", elements=elements)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "gains",
+    [
+        {"kp": "1e200 N/m", "ki": "1 N/(m*s)", "kd": "1 N*s/m"},
+        {"kp": "1e10 N/m", "ki": "1 N/(m*s)", "kd": "1e-200 N*s/m"},
+        {"kp": "1e-300 N/m", "ki": "1e-300 N/(m*s)", "kd": "1e-200 N*s/m"},
+        {"kp": "1e200 N/m", "ki": "1e-300 N/(m*s)", "kd": "1e-200 N*s/m"},
+    ],
+)
+def test_gains_beyond_all_drives_are_refused_or_left_out(gains: dict[str, str]) -> None:
+    controller = {"kind": "pid", **gains, "derivative_on": "measurement"}
+    stage = friso.load(EXAMPLES / "lugre_stick_slip.toml").replace({"controller": controller})
+    try:
+        document = friso.export("gains", stage).to_dict()
+    except InputError:
+        return
+    json.dumps(document, allow_nan=False)
+
+
+def test_numbers_of_a_parameter_file_may_overflow(tmp_path: Path) -> None:
+    source = tmp_path / "axis.ini"
+    text = AXIS.read_text("utf-8")
+    line = next(line for line in text.splitlines() if line.startswith("P "))
+    source.write_text(text.replace(line, "P = 1" + 400 * "0"), "utf-8")
+    with pytest.raises(InputError):
+        friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)
