@@ -1,7 +1,6 @@
 """The command line run in the process of the tests, which need not import everything anew."""
 
 import io
-import logging
 import subprocess
 import sys
 from contextlib import redirect_stderr, redirect_stdout
@@ -15,11 +14,9 @@ from friso.cli import main
 def friso_inside(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     """Status and output of `friso ARGUMENTS` in a folder. What would end in a traceback there is raised here."""
     out, err, command = io.StringIO(), io.StringIO(), ["friso", *map(str, arguments)]
-    log = logging.getLogger("friso")
     with pytest.MonkeyPatch.context() as patch, redirect_stdout(out), redirect_stderr(err):
         patch.chdir(folder)
         patch.setattr(sys, "argv", command)
-        patch.setattr(log, "handlers", [*log.handlers])
         with pytest.raises(SystemExit) as left:
             main()
     return subprocess.CompletedProcess(command, int(left.value.code or 0), out.getvalue(), err.getvalue())

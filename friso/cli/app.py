@@ -112,13 +112,16 @@ def _status() -> int:
 
 def _run() -> int:
     """Run the command; its status."""
-    messages = logging.StreamHandler(sys.stderr)
+    messages, log = logging.StreamHandler(sys.stderr), logging.getLogger("friso")
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
-    logging.getLogger("friso").addHandler(messages)
-    app = command_line()
-    if {"-h", "--help"} & {*sys.argv[1:2]}:
-        app.info.epilog = _plug_ins()
-    return copy_context().run(app, standalone_mode=False) or 0
+    log.addHandler(messages)
+    try:
+        app = command_line()
+        if {"-h", "--help"} & {*sys.argv[1:2]}:
+            app.info.epilog = _plug_ins()
+        return copy_context().run(app, standalone_mode=False) or 0
+    finally:  # another run in this process has another standard error
+        log.removeHandler(messages)
 
 
 def _failed(error: BaseException) -> int:
