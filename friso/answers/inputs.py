@@ -46,7 +46,7 @@ def changes_of(changes: Changes) -> dict[str, Any]:
     """Keys to their new values, from a dictionary or texts KEY=VALUE. Raises InputError."""
     if changes is None:
         return {}
-    keys = [*changes] if isinstance(changes, Iterable) and not isinstance(changes, str | bytes) else [None]
+    keys: list[Any] = [*changes] if isinstance(changes, Iterable) and not isinstance(changes, str | bytes) else [None]
     if not all(isinstance(key, str) for key in keys):
         expected = "a dictionary of keys, or texts KEY=VALUE"
         raise wrong("set", type(changes).__name__, expected, '{"masses.stage": "0.6 kg"}')
@@ -124,8 +124,9 @@ def whole_number(value: int, name: str, least: int, most: int, example: str) -> 
     """A whole number within limits. Raises InputError."""
     whole = isinstance(value, Integral) and not isinstance(value, bool)
     if not whole or not least <= value <= most:
-        actual = str(value) if not whole or abs(value) < 10**18 else "a number of many digits"
-        raise wrong(name, quoted(actual), f"a whole number from {least} to {most}", example)
+        long = whole and abs(value) >= 10**18
+        actual = "a number of many digits" if long else str(value) if whole else quoted(str(value))
+        raise wrong(name, actual, f"a whole number from {least} to {most}", example)
     return value
 
 

@@ -157,7 +157,7 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
     which kicks do, and whose runs were completed."""
     tried = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
     hunting, completed = hunts(tried)
-    kicks, hunting, unknown = tried[completed], hunting[completed], np.count_nonzero(~completed)
+    kicks, hunting, unknown = tried[completed], hunting[completed], int(np.count_nonzero(~completed))
     if not kicks.size:
         return Kick((), (float(tried[0]), float(tried[-1])), unknown)
     edges = np.flatnonzero(hunting[1:] != hunting[:-1])
@@ -165,7 +165,7 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
     while edges.size and np.any(high > (1 + EDGE) * low):
         between = np.geomspace(low, high, BETWEEN + 2, axis=1)
         ends, completed = (part.reshape(-1, BETWEEN) for part in hunts(between[:, 1:-1].ravel()))
-        unknown += np.count_nonzero(~completed)
+        unknown += int(np.count_nonzero(~completed))
         unlike = completed & (ends != hunting[edges, None])
         last = np.where(unlike.any(axis=1), unlike.argmax(axis=1), BETWEEN)
         low, high = (between[np.arange(len(edges)), last + step] for step in (0, 1))
