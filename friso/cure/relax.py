@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -94,8 +94,3 @@ def _value(name: str, settings: SettingsTried, number: int) -> float:
         "within": np.nan,
     }
     return float(values[name])
-
-
-def with_relaxed(goal: Goal, relaxed: Relaxed) -> Goal:
-    """The goal as relaxed."""
-    return replace(goal, **relaxed.values)

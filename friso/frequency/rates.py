@@ -82,11 +82,6 @@ def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tu
     return tuple(systems)
 
 
-def samples_in_period(flat: Mapping[str, Any]) -> int:
-    """Samples after which all loops are due again, 1 where all are carried out at every sample."""
-    return max(_samples(flat, name) for name in LOOPS)
-
-
 def _samples(flat: Mapping[str, Any], name: str) -> int:
     """Samples after which a loop is due again."""
     key = f"drive.{name}_sample_time"

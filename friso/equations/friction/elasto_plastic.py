@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
+from friso.equations.friction.bristles import bristle_friction, bristles_active, keeping_bristle
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
     Friction,
@@ -15,9 +16,7 @@ from friso.equations.friction.common import (
     direction,
     stribeck_level,
     stribeck_level_from_speed,
-    viscous_force,
 )
-from friso.equations.friction.lugre import bristles_active
 from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, on_bristles
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import Rule, register_friction
@@ -57,7 +56,7 @@ class ElastoPlastic(StribeckSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from friso.equations.component import Component, Kink, Output, Role, State, key, sine, state
+        from friso.equations.component import Kink, key, sine, state
 
         forward = direction(velocity, key("friction.stribeck_velocity"))
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
@@ -80,15 +79,7 @@ class ElastoPlastic(StribeckSection):
         ahead, behind = shares
         alpha = forward.beyond * ahead + (1 - forward.beyond) * behind
         rate = velocity * (1 - alpha * forward.sign * deflection / limit)
-        force = (
-            stiffness * deflection
-            + key("friction.bristle_damping") * rate
-            + viscous_force(velocity, forward.sign, variant)
-        )
-        static = key("friction.static")
-        bristles = State(deflection, rate, "m", static / stiffness, Role.BRISTLE)
-        outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
-        return Friction(force, static, Component((bristles,), tuple(kinks), outputs), sliding)
+        return bristle_friction(velocity, variant, rate, kinks, sliding)
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
@@ -100,12 +91,7 @@ class ElastoPlastic(StribeckSection):
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """Bristles as stiff and damped as measured; the break-away deflection fits the virgin curve best."""
-        return {
-            **measured.levels.keys,
-            "friction.bristle_stiffness": measured.stiffness,
-            "friction.bristle_damping": measured.damping,
-            "friction.breakaway_deflection": best(*_tried(measured)),
-        }
+        return keeping_bristle(measured, breakaway_deflection=best(*_tried(measured)))
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:

@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
+from friso.equations.friction.bristles import bristle_friction, bristles_active, keeping_bristle
 from friso.equations.friction.common import (
     Friction,
     StribeckCurve,
     StribeckSection,
     direction,
     stribeck_level,
-    viscous_force,
 )
-from friso.equations.friction.lugre import bristles_active
 from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, levels_of, on_bristles
 from friso.quantities import Bound, Number, Quantity, Value, non_negative, positive
 from friso.stage import register_friction
@@ -50,23 +49,15 @@ class Rolling(StribeckSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from friso.equations.component import Component, Output, Role, State, key, state
+        from friso.equations.component import key, state
 
         forward = direction(velocity, key("friction.stribeck_velocity"))
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         lacking = 1 - stiffness * forward.sign * deflection / level
         rate = velocity * lacking * softening(lacking, key("friction.rolling_exponent"))
-        force = (
-            stiffness * deflection
-            + key("friction.bristle_damping") * rate
-            + viscous_force(velocity, forward.sign, variant)
-        )
-        static = key("friction.static")
-        bristles = State(deflection, rate, "m", static / stiffness, Role.BRISTLE)
-        outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
         sliding = {deflection: forward.sign * level / stiffness}
-        return Friction(force, static, Component((bristles,), (forward,), outputs), sliding)
+        return bristle_friction(velocity, variant, rate, (forward,), sliding)
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
@@ -78,12 +69,7 @@ class Rolling(StribeckSection):
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """Bristles as stiff and damped as measured; the exponent fits the virgin curve best."""
-        return {
-            **measured.levels.keys,
-            "friction.bristle_stiffness": measured.stiffness,
-            "friction.bristle_damping": measured.damping,
-            "friction.rolling_exponent": best(*_tried(measured)),
-        }
+        return keeping_bristle(measured, rolling_exponent=best(*_tried(measured)))
 
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:

@@ -41,6 +41,7 @@ from friso.identification.readings.common import (
     correlation_of,
     deflections,
     jackknife,
+    stribeck_curve,
 )
 
 BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
@@ -121,7 +122,7 @@ class _Equation:
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
         stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
         speed = np.abs(self.velocity)
-        ends = (coulomb + more * np.exp(-((speed / stribeck) ** self.contact.exponent))) / stiffness
+        ends = stribeck_curve(speed, coulomb, coulomb + more, stribeck, self.contact.exponent) / stiffness
         z = deflections(self.moves, (ends[1:] + ends[:-1]) / 2, start / stiffness)
         return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
 

@@ -1,0 +1,61 @@
+"""What laws with one damped bristle share: how it gives way is each law's own, the rest is that of LuGre."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from friso.equations.friction.common import Friction, StribeckCurve, viscous_force
+from friso.equations.friction.measured import MeasuredFriction, levels_of
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.component import Kink
+
+
+def bristle_friction(
+    velocity: sp.Symbol,
+    variant: StribeckCurve,
+    rate: sp.Expr,
+    kinks: Sequence[Kink],
+    sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
+) -> Friction:
+    """Friction of a bristle that deflects at `rate` [m/s]: F = sigma_0 z + sigma_1 z' + sigma_2 v. The first of the
+    `kinks` is that of the direction; `sliding` are states and modes of steady sliding, where they do not follow."""
+    from friso.equations.component import Component, Output, Role, State, key, state
+
+    deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
+    force = (
+        stiffness * deflection
+        + key("friction.bristle_damping") * rate
+        + viscous_force(velocity, kinks[0].sign, variant)
+    )
+    static = key("friction.static")
+    bristle = State(deflection, rate, "m", static / stiffness, Role.BRISTLE)
+    outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
+    return Friction(force, static, Component((bristle,), tuple(kinks), outputs), sliding)
+
+
+def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any]:
+    """Keys of a law whose bristle is as stiff and damped as measured, with those of the `shape` of its virgin curve."""
+    return {
+        **measured.levels.keys,
+        "friction.bristle_stiffness": measured.stiffness,
+        "friction.bristle_damping": measured.damping,
+        **{f"friction.{name}": value for name, value in shape.items()},
+    }
+
+
+def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
+    """The condition under which damped bristles on a Stribeck curve are passive, where it is not met. Those bent most
+    give way `softer` times as fast as LuGre's; `power` writes that in the condition."""
+    levels, damping = levels_of(flat), flat["friction.bristle_damping"]
+    least = damping * (levels.static / levels.coulomb - 1) * softer
+    viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less
+    if viscous >= least:
+        return ""
+    return (
+        f"viscous >= bristle_damping ((static - coulomb)/coulomb){power} = {least:.4g} N*s/m; "
+        f"it is {viscous:.4g} N*s/m{' in one direction' if levels.viscous_asymmetry else ''}"
+    )
