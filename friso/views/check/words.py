@@ -241,7 +241,9 @@ def _faster(case: Case, edge: Margin) -> str:
     controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
     apart = _distance(case, edge)
     kept = (
-        f", {apart:g} times the edge of hunting" if apart > 1 else ", just above the edge: hunting begins again closely"
+        f", at least {apart:g} times the edge of hunting"
+        if apart > 1
+        else ", just above the edge: hunting begins again closely"
     )
     doubt = "" if edge.certain else f" (not certain: hunting was found up to {highest})"
     if edge.crossover is not None:
