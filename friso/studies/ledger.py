@@ -33,7 +33,7 @@ class Ledger:
     def is_whole(self, number: str) -> bool:
         """Whether all chunks of a block are what was written."""
         try:
-            return self._file(number).read_bytes() == self._entry(number)
+            return self._file(number).is_file() and self._file(number).read_bytes() == self._entry(number)
         except OSError:
             return False
 

@@ -139,7 +139,9 @@ def put(file: Path, content: bytes) -> None:
 
 
 def digest_of(file: Path) -> str | None:
-    """The SHA-256 of a file; None where it cannot be read."""
+    """The SHA-256 of a file; None where it cannot be read, or is a device or a pipe, which may have no end."""
+    if not file.is_file():
+        return None
     try:
         with file.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
@@ -148,9 +150,9 @@ def digest_of(file: Path) -> str | None:
 
 
 def _bytes(file: Path) -> bytes:
-    """What is in a file; nothing where it cannot be read."""
+    """What is in a file; nothing where it cannot be read, or is a device or a pipe."""
     try:
-        return file.read_bytes()
+        return file.read_bytes() if file.is_file() else b""
     except OSError:
         return b""
 
