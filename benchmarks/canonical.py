@@ -70,13 +70,13 @@ Flat = Mapping[str, Any]
 @cache
 def reference_numbers() -> dict[str, dict[str, list[float]]]:
     """Outputs [SI] of each stage at the instants kept, to 12 digits."""
-    found = {}
+    numbers = {}
     for name, stage in STAGES.items():
         flat = stage.flat()
-        found[name] = _followed(assemble(structure(flat)), flat)
+        numbers[name] = _followed(assemble(structure(flat)), flat)
     flat = {**as_built_keys(BUILT.replace({"drive": DRIVE})), "drive.seed": 1.0}
-    found["free, drive as built"] = _followed(as_built(AsBuilt.of(flat)), flat)
-    return found
+    numbers["free, drive as built"] = _followed(as_built(AsBuilt.of(flat)), flat)
+    return numbers
 
 
 def differ(numbers: Mapping[str, Mapping[str, list[float]]], tolerance: float = 1e-7) -> list[str]:
@@ -92,25 +92,25 @@ def differ(numbers: Mapping[str, Mapping[str, list[float]]], tolerance: float = 
 
 def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
     """Outputs of a run from rest, whose flags of kinks follow their surfaces at every stage of the method."""
-    names = [str(each) for each in model.parameters]
+    names = [str(parameter) for parameter in model.parameters]
     values = {**flat, "motion.size": float(motion.size(flat))}
     numbers = [float(values[name]) for name in names]
     flags = [kink.beyond for kink in model.kinks]
     seen = model.clock.seen if model.clock else {}
     arguments = [*model.symbols, *flags, *model.fixed, *seen, TIME, TICK, *model.parameters]
-    known = {"quantised": _quantised, "gaussian": lambda seed, tick: 0.0}
-    known |= {
+    functions = {"quantised": _quantised, "gaussian": lambda seed, tick: 0.0}
+    functions |= {
         "clipped": lambda value, end: min(max(value, -end), end),
         "sine": lambda turn: math.sin(2 * math.pi * turn),
     }
 
     def compiled(expressions: Any) -> Any:
-        return sp.lambdify([*arguments], list(expressions), modules=[known, "math"], cse=True)
+        return sp.lambdify([*arguments], list(expressions), modules=[functions, "math"], cse=True)
 
     shown = [name for name in OUTPUTS if name in model.outputs]
     rhs, surfaces = compiled(model.rhs), compiled(kink.surface for kink in model.kinks)
     outputs = compiled(model.outputs[name].expression for name in shown)
-    updates = compiled(each.update for each in model.held)
+    updates = compiled(value.update for value in model.held)
     rows = motion.pieces(flat, 1)[0]
     period = round(float(flat["drive.sample_time"]) / STEP) if model.clock else 0
     tabled = _neutral(model)
@@ -120,21 +120,21 @@ def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
         since, reference, tick = number * STEP - row[0], row[1:], float(number // period) if period else 0.0
 
         def all_of(x: np.ndarray, later: float) -> list[Any]:
-            given = [*reference, *held, *tabled]  # noqa: B023
+            constant = [*reference, *held, *tabled]  # noqa: B023
             measured = [x[model.symbols.index(state)] for state in seen.values()]
-            rest = [*given, *measured, since + later, tick, *numbers]  # noqa: B023
+            rest = [*constant, *measured, since + later, tick, *numbers]  # noqa: B023
             off = [0.0] * len(flags)
-            return [*x, *(float(each > 0) for each in surfaces(*x, *off, *rest)), *rest]
+            return [*x, *(float(side > 0) for side in surfaces(*x, *off, *rest)), *rest]
 
         if period and number % period == 0:
-            held = [float(each) for each in updates(*all_of(x, 0.0))]
+            held = [float(value) for value in updates(*all_of(x, 0.0))]
         k_1 = np.array(rhs(*all_of(x, 0.0)), float)
         k_2 = np.array(rhs(*all_of(x + STEP / 2 * k_1, STEP / 2)), float)
         k_3 = np.array(rhs(*all_of(x + STEP / 2 * k_2, STEP / 2)), float)
         k_4 = np.array(rhs(*all_of(x + STEP * k_3, STEP)), float)
         x = x + STEP / 6 * (k_1 + 2 * k_2 + 2 * k_3 + k_4)
         if (number + 1) % (STEPS // KEPT) == 0:
-            kept.append([float(each) for each in outputs(*all_of(x, STEP))])
+            kept.append([float(value) for value in outputs(*all_of(x, STEP))])
     return {name: [float(f"{value:.12g}") for value in column] for name, *column in zip(shown, *kept, strict=True)}
 
 

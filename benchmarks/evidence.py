@@ -63,10 +63,10 @@ def rig_in_position() -> Values:
 
 
 def rig_hunting() -> Values:
-    found = rig("hunting")
-    rows, locked, free = found["crossovers_hz"], *(found["cases"][case]["counted"] for case in ("locked", "free"))
-    rails = len(found["rail_seeds"])
-    last = max(row for row, each in enumerate(locked) if each["share"] > 0)
+    document = rig("hunting")
+    rows, locked, free = document["crossovers_hz"], *(document["cases"][case]["counted"] for case in ("locked", "free"))
+    rails = len(document["rail_seeds"])
+    last = max(row for row, counted in enumerate(locked) if counted["share"] > 0)
     return {
         "rails": rails,
         "locked_at_8_hz": round(rails * locked[rows.index(8.0)]["share"]),
@@ -77,39 +77,41 @@ def rig_hunting() -> Values:
 
 
 def rig_stiffness() -> Values:
-    found = rig("stiffness")
-    low, high = found["interval_n_per_m"]
-    return {"stiffness_n_per_m": found["stiffness_n_per_m"], "low_n_per_m": low, "high_n_per_m": high}
+    document = rig("stiffness")
+    low, high = document["interval_n_per_m"]
+    return {"stiffness_n_per_m": document["stiffness_n_per_m"], "low_n_per_m": low, "high_n_per_m": high}
 
 
 def rig_presliding() -> Values:
     places = rig("presliding")["places"]
     names = ("stiffness_n_per_m", "damping_n_s_per_m", "mass_kg")
     values = {name: [place[name][0] for place in places] for name in names}
-    return {f"{end.__name__}_{name}": end(each) for name, each in values.items() for end in (min, max)}
+    return {f"{end.__name__}_{name}": end(numbers) for name, numbers in values.items() for end in (min, max)}
 
 
 def rig_frf() -> Values:
-    found = rig("frf")
-    low, high = found["locked"]["mass_interval_kg"]
+    document = rig("frf")
+    low, high = document["locked"]["mass_interval_kg"]
     return {
-        "locked_kg": found["locked"]["mass_kg"],
+        "locked_kg": document["locked"]["mass_kg"],
         "locked_low_kg": low,
         "locked_high_kg": high,
-        "free_kg": found["free"]["mass_kg"],
-        "locked_weak_motor_kg": found["apparent_mass_locked_kg"][1],
-        "free_weak_motor_kg": found["apparent_mass_free_kg"][1],
-        "locked_strong_motor_kg": found["apparent_mass_locked_kg"][2],
-        "free_crossing_hz": found["free_loop"]["crossings_hz"][-1],
-        "highest_stable_hz": found["highest_stable_hz"],
+        "free_kg": document["free"]["mass_kg"],
+        "locked_weak_motor_kg": document["apparent_mass_locked_kg"][1],
+        "free_weak_motor_kg": document["apparent_mass_free_kg"][1],
+        "locked_strong_motor_kg": document["apparent_mass_locked_kg"][2],
+        "free_crossing_hz": document["free_loop"]["crossings_hz"][-1],
+        "highest_stable_hz": document["highest_stable_hz"],
     }
 
 
 def rig_slow_cycles() -> Values:
-    found = rig("measured-cycles")
-    levels, (lopsided,) = found["levels"], [each for each in found["by_asymmetry"] if each["from"] == 0.05]
+    document = rig("measured-cycles")
+    levels, (lopsided,) = document["levels"], [entry for entry in document["by_asymmetry"] if entry["from"] == 0.05]
     row, column = levels["static_over_file"].index(1.0), levels["coulomb_over_file"].index(2.0)
-    weak = {name: levels[name][1][row][column] / found["even_rail"][name][0] for name in ("period_s", "peak_to_peak_m")}
+    weak = {
+        name: levels[name][1][row][column] / document["even_rail"][name][0] for name in ("period_s", "peak_to_peak_m")
+    }
     return {
         "lopsided_period": lopsided["period_over_even"],
         "weak_motor_period": weak["period_s"],
@@ -118,8 +120,8 @@ def rig_slow_cycles() -> Values:
 
 
 def rig_constant_speed() -> Values:
-    found = rig("constant-speed")
-    shown = [place["shown"] for place in found["many_speeds"]["places"]]
+    document = rig("constant-speed")
+    shown = [place["shown"] for place in document["many_speeds"]["places"]]
     names = {
         "friction.stribeck_velocity": "stribeck_m_per_s",
         "friction.viscous": "viscous_n_s_per_m",
@@ -128,24 +130,24 @@ def rig_constant_speed() -> Values:
     }
     values = {short: [place[key]["value"] for place in shown if key in place] for key, short in names.items()}
     key = "friction.stribeck_velocity"
-    slow = [place["shown"][key]["value"] for place in found["slow_sliding"] if key in place["shown"]]
+    slow = [place["shown"][key]["value"] for place in document["slow_sliding"] if key in place["shown"]]
     values["slow_stribeck_m_per_s"] = slow
-    return {f"{end.__name__}_{name}": end(each) for name, each in values.items() for end in (min, max)}
+    return {f"{end.__name__}_{name}": end(numbers) for name, numbers in values.items() for end in (min, max)}
 
 
 def compare_thesis_rig() -> Values:
     slow = ("--set", "drive.sample_time=200 us", "--set", "drive.delay=200 us")
     options = friso("compare", DRIVE, *slow)["options"]
     values = {"machines": 2000.0}
-    for letter, each in options.items():
+    for letter, option in options.items():
         values |= {
-            f"{letter}_swings": each["swings"]["probability"],
-            f"{letter}_in_position": each["in_position"]["probability"],
-            f"{letter}_force_rms_n": each["force_rms_n"]["value"],
-            f"{letter}_unstable": each["unstable"],
+            f"{letter}_swings": option["swings"]["probability"],
+            f"{letter}_in_position": option["in_position"]["probability"],
+            f"{letter}_force_rms_n": option["force_rms_n"]["value"],
+            f"{letter}_unstable": option["unstable"],
         }
-        if each["settling_time_s"]["value"] is not None:
-            values[f"{letter}_settling_s"] = each["settling_time_s"]["value"]
+        if option["settling_time_s"]["value"] is not None:
+            values[f"{letter}_settling_s"] = option["settling_time_s"]["value"]
     return values
 
 
@@ -153,18 +155,18 @@ def frequency_delays() -> Values:
     from friso.frequency.crossover import limits
     from friso.stage import load
 
-    stage, found = load(ROOT / "examples" / "thesis_rig.toml"), {}
+    stage, edges = load(ROOT / "examples" / "thesis_rig.toml"), {}
     for delay in (0, 50, 100, 200, 500, 1000):
         for name, locked in (("locked", True), ("free", False)):
             drive = {"drive": {"sample_time": "50 us", "delay": f"{delay} us"}, "joint.locked": locked}
-            found[f"{name}_{delay}_us_hz"] = limits(stage.replace(drive).flat()).highest_stable or 0.0
-    return found
+            edges[f"{name}_{delay}_us_hz"] = limits(stage.replace(drive).flat()).highest_stable or 0.0
+    return edges
 
 
 def hunting_locked_rig() -> Values:
     crossovers = ("--set", "joint.locked=true", "--x", "controller.crossover=1 Hz..40 Hz")
     points = friso("boundary", "examples/thesis_rig.toml", *crossovers)["points"]
-    symmetric = {kind: [each["value"] for each in points if (each["cycle"], each["kind"]) == ("symmetric", kind)]
+    symmetric = {kind: [point["value"] for point in points if (point["cycle"], point["kind"]) == ("symmetric", kind)]
                  for kind in ("flip", "fold")}  # fmt: skip
     return {"edge_hz": min(symmetric["flip"]), "fold_hz": max(symmetric["fold"])}
 
@@ -248,13 +250,13 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join([*QUICK, *LONG])}; or: quick")
     parser.add_argument("--equations", action="store_true", help="compare the equations with the revision on file")
-    given = parser.parse_args()
+    arguments = parser.parse_args()
     entries, equations = dict(evidence.entries()), evidence.equations()
-    if given.equations and (changed := differ(equations.numbers)):
+    if arguments.equations and (changed := differ(equations.numbers)):
         print("The equations have changed:", *changed, sep="\n  ")
         equations = Equations(equations.revision + 1, date.today(), reference_numbers())
         FILE.write_text(written(entries, equations), encoding="utf-8")
-    for name in [*QUICK] if given.names == ["quick"] else given.names:
+    for name in [*QUICK] if arguments.names == ["quick"] else arguments.names:
         before, entries[name] = entries[name], renewed(entries[name], {**QUICK, **LONG}[name]())
         FILE.write_text(written(entries, equations), encoding="utf-8")
         changed = [

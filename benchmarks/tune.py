@@ -86,10 +86,10 @@ def axes() -> Iterator[tuple[str, Stage]]:
             yield f"{name}, friction x {level:g}, mode", stage.replace({"joint": joint, "parasitic": mode})
 
 
-def brute(found: Cure, stage: Stage, goal: Goal, machines: Fleet, count: int) -> float:
+def brute(cure: Cure, stage: Stage, goal: Goal, machines: Fleet, count: int) -> float:
     """The best settling time [s] of so many settings that keep all constraints and have nothing that attracts."""
-    search = Search(found.way, goal, machines, stage, Budget(), lambda label: None)
-    shares = qmc.Sobol(len(found.way.variables), rng=0).random(count)
+    search = Search(cure.way, goal, machines, stage, Budget(), lambda label: None)
+    shares = qmc.Sobol(len(cure.way.variables), rng=0).random(count)
     for first in range(0, count, CHUNK):
         search.tried.append(search.measured(shares[first : first + CHUNK]))
     best = next(search.surveyed(), None)
@@ -107,7 +107,7 @@ def thesis() -> None:
     advice = tune(locked, goal, chosen=["bandwidth", "isolator"])
     print(f"{perf_counter() - begun:.0f} s")
     listed = {"locked": advice.present, "thesis, Sec. 3.4": measure(free, advice.machines, goal, free)}
-    listed |= {found.way.name: found.measured for found in advice.answers if found.measured}
+    listed |= {cure.way.name: cure.measured for cure in advice.answers if cure.measured}
     head = ("", "meet the goal", "95 % settle in", "median", "force", "margin", "stiffness")
     rows = [
         (
@@ -119,8 +119,8 @@ def thesis() -> None:
         for name, part in listed.items()
     ]
     print_table(head, rows)
-    for found in advice.answers:
-        print(found.way.name, found.sure, found.doubts, found.stage and changes(advice.stage, found.stage))
+    for cure in advice.answers:
+        print(cure.way.name, cure.sure, cure.doubts, cure.stage and changes(advice.stage, cure.stage))
 
 
 def main() -> None:
@@ -144,17 +144,17 @@ def main() -> None:
         seconds = perf_counter() - begun
         machines = drawn(stage, Correlations(), Budget().machines, advice.seed)
         fresh = drawn(stage, Correlations(), options.fresh, 77)
-        for found in advice.answers:
-            if found.sure != "works" or found.stage is None:
-                rows.append((name, found.way.name, found.sure, *[""] * 4, f"{seconds:.0f} s"))
+        for cure in advice.answers:
+            if cure.sure != "works" or cure.stage is None:
+                rows.append((name, cure.way.name, cure.sure, *[""] * 4, f"{seconds:.0f} s"))
                 continue
-            search = Search(found.way, goal, machines, stage, Budget(), lambda label: None)
-            tuned = float(search.measured(found.shares[None]).settling[0])
-            best = brute(found, stage, goal, machines, options.settings)
-            share = measure(found.stage, fresh, goal, stage).share(goal)
+            search = Search(cure.way, goal, machines, stage, Budget(), lambda label: None)
+            tuned = float(search.measured(cure.shares[None]).settling[0])
+            best = brute(cure, stage, goal, machines, options.settings)
+            share = measure(cure.stage, fresh, goal, stage).share(goal)
             worst, least = max(worst, tuned / best), min(least, share.probability)
             cells = (f"{tuned:.4g} s", f"{best:.4g} s", f"{tuned / best:.3f}", f"{100 * share.probability:.1f} %")
-            rows.append((name, found.way.name, "works", *cells, f"{seconds:.0f} s"))
+            rows.append((name, cure.way.name, "works", *cells, f"{seconds:.0f} s"))
         print_table(("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "time"), rows[-2:])
     print_table(("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "time"), rows)
     print_goals(

@@ -16,11 +16,11 @@ HUNTS, FAILED = 7, -1
 """Peaks of a run that hunts; of one that failed, which says nothing."""
 
 
-def rail_runs(peaks: Any, **given: Any) -> RailRuns:
-    """Runs of so many peaks, which swing by 1 mm in 0.5 s to the end, evenly, unless `given` otherwise."""
+def rail_runs(peaks: Any, **keys: Any) -> RailRuns:
+    """Runs of so many peaks, which swing by 1 mm in 0.5 s to the end, evenly, unless `keys` otherwise."""
     counts = np.array(peaks)
     every = {"swing": 1e-3, "period": 0.5, "above": 5e-4, "below": 5e-4, "rising": 0.5}
-    every |= {"period_scatter": 0.0, "height_scatter": 0.0, **given}
+    every |= {"period_scatter": 0.0, "height_scatter": 0.0, **keys}
     swings = np.broadcast_to(np.array(every.pop("swings", True)), counts.shape)
     words = np.where(counts == FAILED, "failed", np.where(swings, "swings", "rests"))
     whole = {name: np.broadcast_to(np.array(value, float), counts.shape) for name, value in every.items()}

@@ -73,9 +73,9 @@ def through_files(logs: Iterable[RigLog], folder: Path) -> list[LogFile]:
     return read_all(paths, Mapping(), folder)
 
 
-def sources(given: Iterable[LogFile]) -> list[tuple[Source, str]]:
+def sources(logs: Iterable[LogFile]) -> list[tuple[Source, str]]:
     """What `identify` takes."""
-    return [(item.source, item.kind) for item in given]
+    return [(item.source, item.kind) for item in logs]
 
 
 def mean_level(logs: Iterable[RigLog], key: str) -> float:

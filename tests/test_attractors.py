@@ -62,7 +62,7 @@ def held(chosen: Stage) -> Ensemble:
 
 
 @cache
-def known(name: str) -> Attractors:
+def attractors_of(name: str) -> Attractors:
     return attractors(held(HUNTING[name][0]), thorough=True)
 
 
@@ -70,10 +70,10 @@ def known(name: str) -> Attractors:
 def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
     """Amplitudes and periods are those of simulations at two tolerances (see the next test), to 1 %."""
     _, _, amplitude, period = HUNTING[name]
-    (motion,) = known(name).motions
+    (motion,) = attractors_of(name).motions
     assert motion.amplitude == pytest.approx(amplitude, rel=0.01)
     assert motion.period == pytest.approx(period, rel=0.01)
-    assert known(name).decided.all()
+    assert attractors_of(name).decided.all()
 
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])

@@ -82,9 +82,9 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
     ],
     ids=lambda text: text[:40],
 )
-def test_values(value: str, given: str) -> None:
+def test_values(value: str, shown: str) -> None:
     assert message(edited('stiffness = "2.4 N/mm"', f"stiffness = {value}")) == (
-        f"rig.toml: joint.stiffness\n  given:    {given}\n  expected: {NUMBER_AND_UNIT}\n  example:  {STIFFNESS}"
+        f"rig.toml: joint.stiffness\n  given:    {shown}\n  expected: {NUMBER_AND_UNIT}\n  example:  {STIFFNESS}"
     )
 
 

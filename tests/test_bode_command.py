@@ -57,7 +57,7 @@ def run(folder: Path, *arguments: str, stage: Path = RIG) -> subprocess.Complete
 
 
 @pytest.fixture(scope="module")
-def found(rig: Stage) -> Bode:
+def response(rig: Stage) -> Bode:
     return bode(rig)
 
 
@@ -207,8 +207,8 @@ def test_an_unstable_loop_is_a_plain_statement(unstable: Bode) -> None:
 # ---------------------------------------------------------------- what is said
 
 
-def test_the_table_says_where_there_is_no_limit_and_no_margin(found: Bode) -> None:
-    shown = shown_states(found)
+def test_the_table_says_where_there_is_no_limit_and_no_margin(response: Bode) -> None:
+    shown = shown_states(response)
     table = {name: dict(zip([item.label for item in shown], texts, strict=True)) for name, texts in rows(shown)}
     assert table["Gain margin"]["Sliding"] == "no limit"
     assert table["Gain margin downwards"]["Sliding"] == "−18.2 dB"
@@ -220,11 +220,11 @@ def test_the_table_says_where_there_is_no_limit_and_no_margin(found: Bode) -> No
     assert "Unstable" not in dict(rows(shown[:4]))
 
 
-def test_friction_that_rises_is_not_blamed(found: Bode) -> None:
-    assert all(item.falling for item in found.unstable)
-    risen = replace(found, unstable=(Unstable(1e-2, 1.0, False, True, falling=False),))
+def test_friction_that_rises_is_not_blamed(response: Bode) -> None:
+    assert all(item.falling for item in response.unstable)
+    risen = replace(response, unstable=(Unstable(1e-2, 1.0, False, True, falling=False),))
     assert not any("Stribeck" in sentence for sentence in stability(risen))
-    assert any("Stribeck" in sentence for sentence in stability(found))
+    assert any("Stribeck" in sentence for sentence in stability(response))
 
 
 def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode, snapshots: Snapshots) -> None:
@@ -244,10 +244,10 @@ def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
         assert "sliding at 1.6" in text[joint].partition(highest)[2]
 
 
-def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage, snapshots: Snapshots) -> None:
-    (bare,) = caveats(found)
+def test_what_the_stage_file_lacks_is_named(response: Bode, rig: Stage, snapshots: Snapshots) -> None:
+    (bare,) = caveats(response)
     assert [key for key in ("10.0 kHz", "drive.sample_time", "drive.delay") if key not in bare] == []
-    (sampled,) = caveats(replace(found, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"})))
+    (sampled,) = caveats(replace(response, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"})))
     assert "drive." not in sampled
     snapshots.check("bode", "caveats", f"{bare}\n{sampled}")
 
@@ -297,65 +297,65 @@ def drawn_on_the_page(figure: Figure) -> list[list[np.ndarray]]:
 
 
 @pytest.mark.parametrize("name", FIGURES)
-def test_both_renderers_draw_the_same_arrays(found: Bode, name: str) -> None:
-    (figure,) = (figure for figure in bode_figures(found) if figure.name == name)
+def test_both_renderers_draw_the_same_arrays(response: Bode, name: str) -> None:
+    (figure,) = (figure for figure in bode_figures(response) if figure.name == name)
     paper, page = drawn_on_paper(figure), drawn_on_the_page(figure)
     assert [len(panel) for panel in paper] == [len(panel) for panel in page]
     for one, other in zip(chain(*paper), chain(*page), strict=True):
         assert np.array_equal(one, other, equal_nan=True)
 
 
-def _figures(found: Bode) -> Mapping[str, Figure]:
-    return {figure.name: figure for figure in bode_figures(found)}
+def _figures(response: Bode) -> Mapping[str, Figure]:
+    return {figure.name: figure for figure in bode_figures(response)}
 
 
-def test_the_plant_is_drawn_with_its_mass_lines(found: Bode) -> None:
-    magnitude, phase = _figures(found)["bode_plant"].panels
+def test_the_plant_is_drawn_with_its_mass_lines(response: Bode) -> None:
+    magnitude, phase = _figures(response)["bode_plant"].panels
     lines = {line.label: line for line in magnitude.series}
     assert [*lines] == [
         *("Stuck", "Sliding", "Stuck, limiter touched", "Sliding, limiter touched"),
         *("mass of 1.7 kg", "mass of 0.5 kg"),
     ]
-    assert lines["Sliding"].y == pytest.approx(np.abs(found.cases["sliding"].plant))
-    assert lines["mass of 0.5 kg"].y * found.omega**2 == pytest.approx(2.0)
-    assert drawable(_figures(found)["bode_plant"]).panels[0].y.label == "Magnitude [m/N]"
+    assert lines["Sliding"].y == pytest.approx(np.abs(response.cases["sliding"].plant))
+    assert lines["mass of 0.5 kg"].y * response.omega**2 == pytest.approx(2.0)
+    assert drawable(_figures(response)["bode_plant"]).panels[0].y.label == "Magnitude [m/N]"
     starts = [line.y[0] for line in phase.series]
-    viscous = -90 - np.degrees(np.arctan(found.omega[0] * 1.7 / 0.5))
+    viscous = -90 - np.degrees(np.arctan(response.omega[0] * 1.7 / 0.5))
     assert starts == pytest.approx([0, viscous, 0, viscous], abs=1)
     assert [line.y[-1] for line in phase.series] == pytest.approx([-180] * 4, abs=2)
 
 
-def test_loops_cross_0_db_where_the_table_says(found: Bode) -> None:
-    magnitude, phase = _figures(found)["bode_loop"].panels
+def test_loops_cross_0_db_where_the_table_says(response: Bode) -> None:
+    magnitude, phase = _figures(response)["bode_loop"].panels
     (sliding,) = (line for line in magnitude.series if line.label == "Sliding")
     passes = np.flatnonzero(np.diff(np.sign(sliding.y)))
-    expected = found.cases["sliding"].margins.crossovers
+    expected = response.cases["sliding"].margins.crossovers
     assert sliding.x[passes] == pytest.approx(expected, rel=0.02)
     assert [limit.values for limit in (*magnitude.limits, *phase.limits)] == [(0.0,), (-180.0,)]
 
 
-def test_loops_at_prescribed_speeds(found: Bode, unstable: Bode) -> None:
-    magnitude, phase = _figures(found)["bode_speeds"].panels
+def test_loops_at_prescribed_speeds(response: Bode, unstable: Bode) -> None:
+    magnitude, phase = _figures(response)["bode_speeds"].panels
     assert [(line.label, line.dash) for line in magnitude.series] == [
         *(("stuck", "solid"), ("1 µm/s", "solid"), ("10 µm/s", "solid"), ("100 µm/s", "solid")),
         *(("1 mm/s (unstable)", "dashed"), ("10 mm/s", "solid"), ("100 mm/s", "solid")),
     ]
-    assert magnitude.series[3].y == pytest.approx(20 * np.log10(np.abs(found.prescribed[3].loop)))
+    assert magnitude.series[3].y == pytest.approx(20 * np.log10(np.abs(response.prescribed[3].loop)))
     assert len({line.colour for line in magnitude.series}) == 7
     assert [line.y[-1] for line in phase.series] == pytest.approx([-180] * 7, abs=2)
     assert all(line.label.endswith("(unstable)") for line in _figures(unstable)["bode_speeds"].panels[0].series)
 
 
-def test_nyquist_has_equal_scales_the_point_and_the_circle(found: Bode) -> None:
-    figure = _figures(found)["bode_nyquist"]
+def test_nyquist_has_equal_scales_the_point_and_the_circle(response: Bode) -> None:
+    figure = _figures(response)["bode_nyquist"]
     (panel,) = figure.panels
     (circle,) = (line for line in panel.series if line.label == "modulus margin 0.5")
     assert np.hypot(circle.x + 1, circle.y) == pytest.approx(0.5)
     assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (-1, 0)
     (stuck,) = (line for line in panel.series if line.label == "Stuck")
-    assert stuck.x + 1j * stuck.y == pytest.approx(found.cases["stuck"].loop)
+    assert stuck.x + 1j * stuck.y == pytest.approx(response.cases["stuck"].loop)
     least = min(np.hypot(stuck.x + 1, stuck.y))
-    assert least == pytest.approx(found.cases["stuck"].margins.modulus_margin, rel=1e-3)
+    assert least == pytest.approx(response.cases["stuck"].margins.modulus_margin, rel=1e-3)
     assert {"stable states of the family", "unstable states of the family"} <= {line.label for line in panel.series}
     canvas = matplotlib_renderer.render(figure)
     canvas.draw_without_rendering()
@@ -365,12 +365,12 @@ def test_nyquist_has_equal_scales_the_point_and_the_circle(found: Bode) -> None:
     assert plotly_renderer.render(figure).layout.yaxis.scaleanchor == "x"
 
 
-def test_the_band_of_the_sensitivity_holds_the_stable_states(found: Bode) -> None:
-    figure = _figures(found)["bode_sensitivity"]
+def test_the_band_of_the_sensitivity_holds_the_stable_states(response: Bode) -> None:
+    figure = _figures(response)["bode_sensitivity"]
     (panel,) = figure.panels
     (band,) = panel.bands
-    stable = found.scan.stable
-    sensitivity = 1 / np.abs(1 + found.loops[stable])
+    stable = response.scan.stable
+    sensitivity = 1 / np.abs(1 + response.loops[stable])
     assert 10 ** (band.low / 20) == pytest.approx(sensitivity.min(axis=0))
     assert 10 ** (band.high / 20) == pytest.approx(sensitivity.max(axis=0))
     assert f"of {stable.sum()} stable states" in figure.note
@@ -477,7 +477,7 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
         ("1 Hz..2 Hz..3 Hz", "is not a unit", "convertible to Hz, rad/s or rpm"),
     ],
 )
-def test_frequencies_that_are_refused(text: str, given: str, expected: str, refused: Refused) -> None:
+def test_frequencies_that_are_refused(text: str, shown: str, expected: str, refused: Refused) -> None:
     with refused():
         command(RIG, frequencies=text)
 

@@ -29,13 +29,13 @@ def over_crossover() -> Diagram:
     return diagram(Space.of(RIGID, [CROSSOVER]))
 
 
-def special(found: Diagram, symmetric: bool) -> dict[str, list[tuple[float, LocatedPoint]]]:
+def special(diagram: Diagram, symmetric: bool) -> dict[str, list[tuple[float, LocatedPoint]]]:
     """The special points of the symmetric or of the asymmetric branches by kind, with their values."""
     points: dict[str, list[tuple[float, LocatedPoint]]] = {"flip": [], "fold": [], "torus": []}
-    for branch, own in zip(found.branches, found.special, strict=True):
+    for branch, own in zip(diagram.branches, diagram.special, strict=True):
         if (branch.sign < 0) == symmetric:
             for item in own:
-                points[item.kind].append((found.value(item.point.place), item))
+                points[item.kind].append((diagram.value(item.point.place), item))
     return points
 
 
@@ -131,9 +131,9 @@ def test_curves_in_two_keys_pass_through_the_points_in_one(over_friction: Plane)
             assert min(abs(np.array(crossings) - value)) < 0.01
 
 
-def at_1_n(found: Plane, curve: Any) -> list[float]:
+def at_1_n(plane: Plane, curve: Any) -> list[float]:
     """Static friction [N] where a curve crosses a Coulomb friction of 1 N."""
-    values = found.space.values(curve.points)
+    values = plane.space.values(curve.points)
     static, coulomb = values["friction.static"], values["friction.coulomb"] - 1.0
     at = np.flatnonzero(coulomb[:-1] * coulomb[1:] <= 0)
     return [float(static[i] - coulomb[i] * (static[i + 1] - static[i]) / (coulomb[i + 1] - coulomb[i])) for i in at]

@@ -206,7 +206,7 @@ def point(place: float, multiplier: float, distance: float = 0.0) -> Point:
     return Point(place, distance, 0.0, cycles([multiplier]))
 
 
-def found(kind: Kind, place: float, multiplier: float, distance: float = 0.0) -> LocatedPoint:
+def located(kind: Kind, place: float, multiplier: float, distance: float = 0.0) -> LocatedPoint:
     return LocatedPoint(kind, point(place, multiplier, distance), np.array([1.0, 0.0, 0.0]), 1e-6)
 
 
@@ -221,7 +221,7 @@ MM = ShownKey("joint.stroke", "mm", 1e-3)
 def round_a_fold() -> Diagram:
     """A cycle that attracts from the low end, flips in the middle and turns back at a fold, attracting just before."""
     points = (point(0, -0.5), point(0.4, -0.9), point(0.6, -1.5), point(0.7, 5, 1.0), point(0.5, 8, 2.0))
-    special = (found("flip", 0.45, -1), found("flip", 0.72, -1, 0.5), found("fold", 0.73, 1, 0.6))
+    special = (located("flip", 0.45, -1), located("flip", 0.72, -1, 0.5), located("fold", 0.73, 1, 0.6))
     return Diagram(
         Space((STROKE,), dict),
         (Branch(-1.0, points, ("end of the range", "it could not be followed farther (multiplier 8)")),),
@@ -281,7 +281,7 @@ def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: D
 def crossing() -> Plane:
     """Two by two nodes, one of each verdict, and a flip between the low ones and the high ones."""
     across = np.array([1.0, 0.0])
-    spots = tuple(Spot(np.array([0.5, y]), found("flip", 0.0, -1), across) for y in (0.0, 0.5, 1.0))
+    spots = tuple(Spot(np.array([0.5, y]), located("flip", 0.0, -1), across) for y in (0.0, 0.5, 1.0))
     curve = Curve("flip", -1.0, spots, ("end of the range", "end of the range"))
     stable = np.zeros(3, bool)
     expected = cycles([-0.5, np.inf, -2]), np.array([True, False, False]), np.array([True, False, True]), stable

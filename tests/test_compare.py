@@ -487,7 +487,7 @@ def test_command_writes_page_and_figures(
 
 
 def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
-    def stop(*given: object) -> None:
+    def stop(*arguments: object) -> None:
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
@@ -500,7 +500,7 @@ def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, m
 
 
 @pytest.mark.parametrize(
-    "given",
+    "arguments",
     [
         ["--machines", 19],
         ["--seed", -1],
@@ -511,8 +511,8 @@ def test_interrupted_it_leaves_nothing(tmp_path: Path, comparison: Comparison, m
         ["--set", 'drive.sample_time="20 ms"'],
     ],
 )
-def test_bad_input(tmp_path: Path, given: list[object], refused: Refused) -> None:
-    done = friso_inside(tmp_path, "compare", EXAMPLE, *given)
+def test_bad_input(tmp_path: Path, arguments: list[object], refused: Refused) -> None:
+    done = friso_inside(tmp_path, "compare", EXAMPLE, *arguments)
     assert (done.returncode, done.stdout) == (2, "")
     refused.says(done.stderr)
 

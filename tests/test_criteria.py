@@ -55,10 +55,10 @@ def one(end: End, k: int) -> End:
 
 
 @given(st.tuples(*[st.booleans()] * 4))
-def test_a_stage_has_just_one_verdict(known: tuple[bool, bool, bool, bool]) -> None:
+def test_a_stage_has_just_one_verdict(facts: tuple[bool, bool, bool, bool]) -> None:
     """By the table of `friso.hunting.criteria.stage_verdict`, entry by entry."""
-    sure, attracts, in_cycle, rests = known
-    (word,) = verdicts(*(np.array([flag]) for flag in known))
+    sure, attracts, in_cycle, rests = facts
+    (word,) = verdicts(*(np.array([flag]) for flag in facts))
     assert word in VERDICTS
     assert (word == "failed") == (not sure)
     assert (word in ATTRACTED) == (sure and attracts)

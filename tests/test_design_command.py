@@ -82,20 +82,20 @@ def small() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def found(rig: Stage, spec: Path, small: None) -> Design:
+def designed(rig: Stage, spec: Path, small: None) -> Design:
     """A small design, computed once."""
     return method.design(rig, load_spec(spec))
 
 
 @pytest.fixture(scope="module")
-def finished(found: Design) -> Iterator[list[str]]:
+def finished(designed: Design) -> Iterator[list[str]]:
     """The command finds this design; what it tells of its progress is kept."""
     labels: list[str] = []
 
     def design(stage: Stage, spec: Spec, progress: Progress) -> Design:
         progress(0, 1, "leaf springs")
         labels.append(stage.name)
-        return found
+        return designed
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(method, "design", design)
@@ -143,20 +143,20 @@ def _strict(text: str) -> dict[str, Any]:
     return json.loads(text, parse_constant=refuse)
 
 
-def _figures(found: Design) -> dict[str, Figure]:
-    return {figure.name: figure for figure in design_figures(found)}
+def _figures(designed: Design) -> dict[str, Figure]:
+    return {figure.name: figure for figure in design_figures(designed)}
 
 
 # ---------------------------------------------------------------- files and document
 
 
-def test_all_files_are_written_and_the_stages_load(found: Design, folder: Path) -> None:
+def test_all_files_are_written_and_the_stages_load(designed: Design, folder: Path) -> None:
     pictures = {f"{name}.svg" for name in FIGURES}
     own = {"design.toml", "worst.toml", "design.html", "design_drawing.svg"}
     assert {path.name for path in folder.iterdir()} == pictures | own | {MARKER}
     stage, worst = friso.load(folder / "design.toml"), friso.load(folder / "worst.toml")
-    assert stage.flat()["joint.stiffness"] == pytest.approx(found.fitted.choice.beams.drive[0], rel=0.02)
-    assert worst.flat()["friction.static"] == found.verification.worst.flat()["friction.static"]
+    assert stage.flat()["joint.stiffness"] == pytest.approx(designed.fitted.choice.beams.drive[0], rel=0.02)
+    assert worst.flat()["friction.static"] == designed.verification.worst.flat()["friction.static"]
     assert ElementTree.parse(folder / "design_drawing.svg").getroot().tag.endswith("svg")
 
 
@@ -166,7 +166,7 @@ def test_a_design_may_be_written_again(spec: Path, folder: Path, quick: None, ca
 
 
 def test_the_document_has_the_agreed_keys(
-    spec: Path, folder: Path, quick: None, found: Design, capsys: pytest.CaptureFixture
+    spec: Path, folder: Path, quick: None, designed: Design, capsys: pytest.CaptureFixture
 ) -> None:
     command(RIG, spec, out=folder, as_json=True)
     shown = capsys.readouterr()
@@ -189,7 +189,7 @@ def test_the_document_has_the_agreed_keys(
     }
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
     assert document["files"][0] == str(folder / "design.toml")
-    assert document["without"]["corners"] == found.without.population.count
+    assert document["without"]["corners"] == designed.without.population.count
     assert document["without"]["worst_corner"].keys() == {
         *("masses_cart_kg", "masses_stage_kg", "friction_static_n", "friction_coulomb_n"),
     }
@@ -202,25 +202,25 @@ def test_the_document_has_the_agreed_keys(
     assert all(requirement["excess"] <= 1 for requirement in leaves["requirements"])
 
 
-def test_the_document_tells_front_controller_and_moves(found: Design) -> None:
-    document = design_document(found)
+def test_the_document_tells_front_controller_and_moves(designed: Design) -> None:
+    document = design_document(designed)
     asked = [item for item in document["front"] if item["beams_hz"] is not None]
-    assert len(document["front"]) == len(found.candidates)
+    assert len(document["front"]) == len(designed.candidates)
     assert 0 < len(asked) <= 3
     tuned = document["controller"]
-    assert tuned["least_modulus_margin"] == found.controller.corners.min()
+    assert tuned["least_modulus_margin"] == designed.controller.corners.min()
     assert tuned["kp_n_per_m"] == pytest.approx(1.5 * tuned["k_p_n_per_m"])  # beta = 2
-    assert parallel_gains(found)[1:] == (tuned["ki_n_per_m_s"], tuned["kd_n_s_per_m"])
+    assert parallel_gains(designed)[1:] == (tuned["ki_n_per_m_s"], tuned["kd_n_s_per_m"])
     moves = document["verification"]
     assert (moves["moves"], moves["not_at_rest"], moves["settling_time_met"]) == (64, 0, True)
     assert moves["locked"]["moves"] == 64
     assert moves["settling_median_s"] <= moves["settling_95_s"]
 
 
-def test_what_is_not_finite_is_null(found: Design) -> None:
-    never = replace(found.verification.free, settling=np.full(64, np.nan), words=np.full(64, "swings"))
-    nowhere = replace(found.without, edges=np.zeros(found.without.population.count), unknown=1)
-    other = replace(found, without=nowhere, verification=replace(found.verification, free=never))
+def test_what_is_not_finite_is_null(designed: Design) -> None:
+    never = replace(designed.verification.free, settling=np.full(64, np.nan), words=np.full(64, "swings"))
+    nowhere = replace(designed.without, edges=np.zeros(designed.without.population.count), unknown=1)
+    other = replace(designed, without=nowhere, verification=replace(designed.verification, free=never))
     document = design_document(other)
     json.dumps(document, allow_nan=False)
     assert document["verification"]["settling_95_s"] is None
@@ -240,35 +240,35 @@ def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snaps
     assert max(map(len, sentences)) <= shutil.get_terminal_size().columns
 
 
-def test_an_isolator_that_is_not_needed_is_weighed(found: Design, snapshots: Snapshots) -> None:
-    (_, first), *_ = headline(found)
-    text = isolator_step(found).sentences
+def test_an_isolator_that_is_not_needed_is_weighed(designed: Design, snapshots: Snapshots) -> None:
+    (_, first), *_ = headline(designed)
+    text = isolator_step(designed).sentences
     assert any("0.3 to 0.85 N" in sentence for sentence in text)
     snapshots.check("design", "isolator not needed", "\n".join([first, *text]))
 
 
-def test_an_isolator_that_is_needed_says_why(found: Design, snapshots: Snapshots) -> None:
-    limit = replace(found.without, edges=np.full(found.without.population.count, 60.0))
-    needed = replace(found, without=limit)
+def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapshots) -> None:
+    limit = replace(designed.without, edges=np.full(designed.without.population.count, 60.0))
+    needed = replace(designed, without=limit)
     (_, first), *_ = headline(needed)
     assert [fact for fact in ("72.0 Hz", "1.2 times", "48.0 Hz") if fact not in first] == []
     step = isolator_step(needed)
-    assert len(step.sentences) < len(isolator_step(found).sentences)  # nothing to compare it with
+    assert len(step.sentences) < len(isolator_step(designed).sentences)  # nothing to compare it with
     snapshots.check("design", "isolator needed", "\n".join([first, step.title, *step.sentences]))
 
 
-def test_the_joint_is_held_below_the_static_friction(found: Design, wording: Wording) -> None:
-    text = " ".join(joint_step(found).sentences)
+def test_the_joint_is_held_below_the_static_friction(designed: Design, wording: Wording) -> None:
+    text = " ".join(joint_step(designed).sentences)
     allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
     for fact in ("no less than 1 N", "factor of 1.1", "error of 10%", f"{allowed:.3g} N", "stroke of 1 mm"):
         assert fact in text
-    unknown = replace(found.edges, unknown=2)
-    wording(" ".join(joint_step(replace(found, edges=unknown)).sentences))
+    unknown = replace(designed.edges, unknown=2)
+    wording(" ".join(joint_step(replace(designed, edges=unknown)).sentences))
 
 
-def test_edges_in_words(found: Design, snapshots: Snapshots) -> None:
-    def some(*known: float) -> str:
-        return edge(Corners(found.without.population, np.array(known), (1.2, 144.0)))
+def test_edges_in_words(designed: Design, snapshots: Snapshots) -> None:
+    def some(*edges: float) -> str:
+        return edge(Corners(designed.without.population, np.array(edges), (1.2, 144.0)))
 
     texts = [some(0.0, 0.0), some(0.0, np.inf), some(0.0, 7.62)]
     for facts, text in zip((("1.20 Hz", "144 Hz"), ("144 Hz",), ("7.62 Hz",)), texts, strict=True):
@@ -276,40 +276,40 @@ def test_edges_in_words(found: Design, snapshots: Snapshots) -> None:
     snapshots.check("design", "edges", "\n".join(texts))
 
 
-def test_leaves_and_what_binds_them(found: Design, wording: Wording) -> None:
+def test_leaves_and_what_binds_them(designed: Design, wording: Wording) -> None:
     excess = np.array([0.985, 0.2, 0.1, 0.6, 0.99])
-    tight = replace(found.fitted.choice, excess=excess)
-    found = replace(found, fitted=replace(found.fitted, choice=tight))
-    text = " ".join(leaves_step(found).sentences)
-    rows = requirement_rows(found)
+    tight = replace(designed.fitted.choice, excess=excess)
+    designed = replace(designed, fitted=replace(designed.fitted, choice=tight))
+    text = " ".join(leaves_step(designed).sentences)
+    rows = requirement_rows(designed)
     for name, *_, spare in rows:
         assert (name in text) == spare.endswith("binds")
-    assert f"{len(found.candidates)} geometries" in text
-    broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
-    other = replace(found, confirmed=(broken, *found.confirmed[1:]))
+    assert f"{len(designed.candidates)} geometries" in text
+    broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
+    other = replace(designed, confirmed=(broken, *designed.confirmed[1:]))
     wording(" ".join(leaves_step(other).sentences))
     assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
     assert [row[3] for row in rows] == ["98.5 %, binds", "20.0 %", "10.0 %", "60.0 %", "99.0 %, binds"]
-    loose = replace(found.fitted, choice=replace(tight, excess=excess / 2))
-    spared = " ".join(leaves_step(replace(found, fitted=loose)).sentences)
+    loose = replace(designed.fitted, choice=replace(tight, excess=excess / 2))
+    spared = " ".join(leaves_step(replace(designed, fitted=loose)).sentences)
     assert [name for name, *_ in rows if name in spared] == []
 
 
-def test_the_window_of_the_crossover(found: Design) -> None:
-    above, below = upper(found), lower(found)
+def test_the_window_of_the_crossover(designed: Design) -> None:
+    above, below = upper(designed), lower(designed)
     assert [item.value for item in above] == sorted(item.value for item in above)
-    assert {48.0, stiffest(found)} <= {entry.value for entry in above}
-    assert 1.2 * found.edges.highest in {each.value for each in below}
-    assert below[0].value < found.controller.crossover <= above[0].value
-    text = " ".join(controller_step(found).sentences)
+    assert {48.0, stiffest(designed)} <= {entry.value for entry in above}
+    assert 1.2 * designed.edges.highest in {limit.value for limit in below}
+    assert below[0].value < designed.controller.crossover <= above[0].value
+    text = " ".join(controller_step(designed).sentences)
     for bound in (*above, *below):
         assert f"{hertz(bound.value)} ({bound.reason})" in text
 
 
-def test_damping_that_is_worth_adding_or_not(found: Design, snapshots: Snapshots) -> None:
+def test_damping_that_is_worth_adding_or_not(designed: Design, snapshots: Snapshots) -> None:
     def damped(*margins: float) -> str:
-        other = replace(found.controller.damping, margins=np.array(margins))
-        return controller_step(replace(found, controller=replace(found.controller, damping=other))).sentences[-1]
+        other = replace(designed.controller.damping, margins=np.array(margins))
+        return controller_step(replace(designed, controller=replace(designed.controller, damping=other))).sentences[-1]
 
     worth, not_worth = damped(0.3, 0.58, 0.6), damped(0.57, 0.59, 0.6)
     assert [fact for fact in ("0.5 N·s/m", "0.58") if fact not in worth] == []
@@ -323,59 +323,59 @@ def restless(count: int) -> np.ndarray:
     return words
 
 
-def test_moves_that_swing_or_take_too_long(found: Design, snapshots: Snapshots) -> None:
+def test_moves_that_swing_or_take_too_long(designed: Design, snapshots: Snapshots) -> None:
     off = np.arange(64) < 2
     free = replace(
-        found.verification.free,
+        designed.verification.free,
         words=restless(2),
         settling=np.where(off, np.nan, 2.0),
         swing=off * np.arange(64) * 1e-3,
     )
-    other = replace(found, verification=replace(found.verification, free=free))
+    other = replace(designed, verification=replace(designed.verification, free=free))
     step = moves_step(other)
     assert [fact for fact in ("64 moves", "2 do not", "1 swing", "1 creep") if fact not in step.title] == []
     text = " ".join(step.sentences)
     assert [fact for fact in ("95 %", "1.00 s", "Not met", "1 mm") if fact not in text] == []
     snapshots.check("design", "moves that swing", "\n".join([*step.sentences, headline(other)[-1][1]]))
     lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
-    step = moves_step(replace(found, verification=replace(found.verification, free=lost)))
+    step = moves_step(replace(designed, verification=replace(designed.verification, free=lost)))
     assert "4 moves" in " ".join(step.sentences)
 
 
-def test_moves_of_a_locked_joint_that_swings(found: Design, snapshots: Snapshots, wording: Wording) -> None:
+def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapshots, wording: Wording) -> None:
     off = np.arange(64) < 20
-    locked = replace(found.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
-    other = replace(found, verification=replace(found.verification, locked=locked))
+    locked = replace(designed.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
+    other = replace(designed, verification=replace(designed.verification, locked=locked))
     text = " ".join(moves_step(other).sentences)
     assert [fact for fact in ("3.00 s", "95 %", "20 do not") if fact not in text] == []
     wording(headline(other)[-1][1])
     snapshots.check("design", "moves of a locked joint", "\n".join([text, headline(other)[-1][1]]))
     never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
     assert not re.search(r"\d", settling(never))
-    assert "never" in brings(replace(found, verification=replace(found.verification, locked=never)))
+    assert "never" in brings(replace(designed, verification=replace(designed.verification, locked=never)))
 
 
 # ---------------------------------------------------------------- figures and page
 
 
-def test_the_page_stands_alone_and_shows_all(found: Design, folder: Path) -> None:
+def test_the_page_stands_alone_and_shows_all(designed: Design, folder: Path) -> None:
     page = Page((folder / "design.html").read_text(encoding="utf-8"))
     assert all(address.startswith("data:") for address in page.loads)
     assert page.tags.count("img") == len(FIGURES)
     assert page.tags.count("svg") >= 1
-    for step in steps(found):
+    for step in steps(designed):
         assert all(sentence in page.text for sentence in (step.title, *step.sentences))
-    for _, sentence in headline(found):
+    for _, sentence in headline(designed):
         assert sentence in page.text
-    for words in ("Requirements", "safety.parasitic", "worst.toml", "Scale", "[flexure]", found.spec.name):
+    for words in ("Requirements", "safety.parasitic", "worst.toml", "Scale", "[flexure]", designed.spec.name):
         assert words in page.text
-    named = [name for step in steps(found) for name in step.figures]
+    named = [name for step in steps(designed) for name in step.figures]
     assert sorted(named) == sorted(FIGURES)
 
 
 @pytest.mark.parametrize("name", [name for name in FIGURES if name not in ("design_map", "design_modes")])
-def test_both_renderers_draw_the_same_arrays(found: Design, name: str) -> None:
-    figure = _figures(found)[name]
+def test_both_renderers_draw_the_same_arrays(designed: Design, name: str) -> None:
+    figure = _figures(designed)[name]
     (axes,) = matplotlib_renderer.render(figure).axes
     paper = [part for patch in axes.patches for part in np.asarray(patch.get_xy()).T]  # type: ignore[attr-defined]
     paper += [np.asarray(part, float) for line in axes.lines for part in line.get_data()]
@@ -385,46 +385,46 @@ def test_both_renderers_draw_the_same_arrays(found: Design, name: str) -> None:
         assert np.array_equal(one, other, equal_nan=True)
 
 
-def test_front_with_chosen_and_failed_points(found: Design) -> None:
-    broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
-    other = replace(found, confirmed=(broken, *found.confirmed[1:]))
+def test_front_with_chosen_and_failed_points(designed: Design) -> None:
+    broken = replace(designed.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
+    other = replace(designed, confirmed=(broken, *designed.confirmed[1:]))
     (panel,) = _figures(other)["design_front"].panels
     by_label = {marker.label: marker for marker in panel.markers}
     assert [*by_label] == ["by beams", "beams failed", "chosen, by the beam model"]
     assert by_label["beams failed"].y == pytest.approx([broken.candidate.frequency])
-    assert by_label["chosen, by the beam model"].x == pytest.approx(found.fitted.choice.beams.drive[:1] / 1e3)
-    assert [limit.values for limit in panel.limits] == [(10 * found.controller.crossover,), (480.0,)]
+    assert by_label["chosen, by the beam model"].x == pytest.approx(designed.fitted.choice.beams.drive[:1] / 1e3)
+    assert [limit.values for limit in panel.limits] == [(10 * designed.controller.crossover,), (480.0,)]
 
 
-def test_map_with_the_chosen_point_and_cells_of_all_kinds(found: Design) -> None:
-    share = np.zeros_like(found.map.share)
+def test_map_with_the_chosen_point_and_cells_of_all_kinds(designed: Design) -> None:
+    share = np.zeros_like(designed.map.share)
     share[0, 0], share[1, 1] = 0.5, np.nan
-    figure = _figures(replace(found, map=replace(found.map, share=share)))["design_map"]
+    figure = _figures(replace(designed, map=replace(designed.map, share=share)))["design_map"]
     (panel,) = figure.panels
     (field,) = panel.maps
     assert field.z[0, 0] == 50.0
     assert field.codes is not None
     assert (field.codes[1, 1], field.codes[2, 2]) == (1.0, 0.0)
     assert np.isnan(field.codes[0, 0])
-    assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (found.controller.crossover, 1.0)
+    assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (designed.controller.crossover, 1.0)
     assert [line.label.split(":")[0] for line in panel.series] == ["edge of hunting at 1 mm", "machine's limit"]
 
 
-def test_window_with_edges_beyond_the_search(found: Design) -> None:
-    endless = replace(found.without, edges=np.where(np.arange(len(found.without.edges)) == 0, np.inf, 5.0))
-    (panel,) = _figures(replace(found, without=endless))["design_window"].panels
+def test_window_with_edges_beyond_the_search(designed: Design) -> None:
+    endless = replace(designed.without, edges=np.where(np.arange(len(designed.without.edges)) == 0, np.inf, 5.0))
+    (panel,) = _figures(replace(designed, without=endless))["design_window"].panels
     assert panel.y.words == ("without", "isolator", "margin", "leaves", "machine")
     assert panel.x.limits is not None
     reach = [band.x.max() for band in panel.bands if band.low[0] < 0]
     assert reach == [panel.x.limits[1]]
-    assert panel.series[0].x == pytest.approx([found.controller.crossover] * 2)
+    assert panel.series[0].x == pytest.approx([designed.controller.crossover] * 2)
 
 
-def test_settling_ends_where_moves_do_not_rest(found: Design) -> None:
+def test_settling_ends_where_moves_do_not_rest(designed: Design) -> None:
     off = np.arange(64) < 16
-    free = replace(found.verification.free, words=restless(16), settling=np.where(off, np.nan, 0.2))
+    free = replace(designed.verification.free, words=restless(16), settling=np.where(off, np.nan, 0.2))
     none = replace(free, settling=np.full(64, np.nan))
-    other = replace(found, verification=replace(found.verification, free=free, locked=none))
+    other = replace(designed, verification=replace(designed.verification, free=free, locked=none))
     (panel,) = _figures(other)["design_settling"].panels
     assert panel.series[0].y.max() == 75.0
     assert [line.label for line in panel.series] == ["joint free", "joint locked", "specified"]
@@ -557,14 +557,14 @@ def test_a_specification_that_is_not_met_is_told(
     spec: Path,
     folder: Path,
     quick: None,
-    found: Design,
+    designed: Design,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture,
     wording: Wording,
 ) -> None:
     """What there is is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
-    less = replace(found, spec=found.spec.model_copy(update={"position": hurried}))
+    less = replace(designed, spec=designed.spec.model_copy(update={"position": hurried}))
     monkeypatch.setattr(method, "design", lambda stage, spec, progress: less)
     with pytest.raises(typer.Exit) as left:
         command(RIG, spec, out=folder, as_json=True)

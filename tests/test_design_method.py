@@ -134,9 +134,9 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     )
 
 
-def replace_leaves(it: Mechanism) -> Mechanism:
+def replace_leaves(mechanism: Mechanism) -> Mechanism:
     """One leaf in the middle instead of two, whose moment at its root is asked for."""
-    return replace(it, leaves=1.0)
+    return replace(mechanism, leaves=1.0)
 
 
 def test_a_geometry_at_which_beams_fail_is_marked(
@@ -147,11 +147,11 @@ def test_a_geometry_at_which_beams_fail_is_marked(
 
     calls = []
 
-    def sometimes(it: object, stroke: float) -> object:
-        calls.append(it)
+    def sometimes(mechanism: object, stroke: float) -> object:
+        calls.append(mechanism)
         if len(calls) % 2:
             raise BeamFailure("The beams gave up.")
-        return beams_module.beams(it, stroke)  # type: ignore[arg-type]
+        return beams_module.beams(mechanism, stroke)  # type: ignore[arg-type]
 
     monkeypatch.setattr(choice_module, "beams", sometimes)
     result = list(confirmed(task, candidates))

@@ -126,11 +126,11 @@ def test_the_decisive_key_comes_first() -> None:
     assert 0.1 < separation["some"] < 0.5
 
 
-def draws(found: Fates) -> Draws:
-    count = len(found.verdicts)
+def draws(fates: Fates) -> Draws:
+    count = len(fates.verdicts)
     drawn = Sample({"friction.coulomb": np.linspace(0.5, 1.5, count)}, count, 2, {"a rule": 3})
     stage = friso.load(Path(__file__).parents[1] / "examples" / "lugre_stick_slip.toml")
-    return Draws(stage, drawn, 7, {"given": found})
+    return Draws(stage, drawn, 7, {"given": fates})
 
 
 def test_document_rows_and_sentences(wording: Wording) -> None:

@@ -98,7 +98,7 @@ def stage(path: Path) -> Stage:
 
 
 @pytest.fixture(scope="module")
-def found(stage: Stage) -> BothModels:
+def models(stage: Stage) -> BothModels:
     return evaluated(stage)
 
 
@@ -148,8 +148,8 @@ def test_the_document_has_the_agreed_keys(path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize("model", ["beams", "closed forms"])
-def test_the_document_tells_what_textbooks_and_shells_say(found: BothModels, model: str) -> None:
-    document = flexure_document(found)
+def test_the_document_tells_what_textbooks_and_shells_say(models: BothModels, model: str) -> None:
+    document = flexure_document(models)
     expected = document if model == "beams" else document["closed_forms"]
     assert expected["model"] == model
     assert expected["drive_stiffness_n_per_m"] == pytest.approx(2540, rel=0.01)  # shells; a beam has 2362.5
@@ -167,8 +167,8 @@ def test_the_document_tells_what_textbooks_and_shells_say(found: BothModels, mod
     assert expected["forces_n"][-1] == pytest.approx(expected["drive_stiffness_n_per_m"] * 1e-3, rel=5e-3)
 
 
-def test_modes_that_interfere_with_control_are_told_from_the_drive(found: BothModels) -> None:
-    document = flexure_document(found)
+def test_modes_that_interfere_with_control_are_told_from_the_drive(models: BothModels) -> None:
+    document = flexure_document(models)
     assert document["names"][0] == "drive"
     assert document["interferes"][0] is False
     first = document["interferes"].index(True)
@@ -204,16 +204,16 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
 # ---------------------------------------------------------------- what is said
 
 
-def test_the_table_has_a_row_for_each_mode_by_name(found: BothModels) -> None:
-    table = dict(rows(found))
+def test_the_table_has_a_row_for_each_mode_by_name(models: BothModels) -> None:
+    table = dict(rows(models))
     assert table["Drive stiffness"] == ["2.54 N/mm", "2.54 N/mm"]
     assert table["Support stiffness x, straight"] == ["96.1 N/µm", "96.1 N/µm"]
     assert table["Margin to fatigue"] == ["unknown", "unknown"]
     assert table["Concentration factor at the clamp"] == ["1.5", "1.5"]
     assert "interferes" not in "".join(table["Mode: drive"])
     assert all(text.endswith("Hz (interferes)") for text in table["Mode: leaf bending, in phase"])
-    assert {f"Mode: {mode.name}" for mode in found.best.modes} <= table.keys()
-    assert sum(name.startswith("Mode: ") for name in table) >= len(found.best.modes)
+    assert {f"Mode: {mode.name}" for mode in models.best.modes} <= table.keys()
+    assert sum(name.startswith("Mode: ") for name in table) >= len(models.best.modes)
 
 
 def test_a_sound_joint_has_no_warnings_and_a_largest_stroke(stage: Stage) -> None:
@@ -238,10 +238,10 @@ def test_what_the_leaves_do_not_bear_is_a_warning(
     assert any(warning in text for text in warnings(evaluated(stage.replace(changes), stroke)))
 
 
-def test_models_that_differ_are_a_warning(found: BothModels) -> None:
-    assert not any("differ" in said for said in warnings(found))
-    assert found.beams is not None
-    other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
+def test_models_that_differ_are_a_warning(models: BothModels) -> None:
+    assert not any("differ" in said for said in warnings(models))
+    assert models.beams is not None
+    other = replace(models, beams=replace(models.beams, stress=models.beams.stress * 0.8, drive=models.beams.drive * 2))
     (text,) = (texts for texts in warnings(other) if "differ" in texts)
     assert "-50 %" in text
     assert "+2" in text
@@ -272,9 +272,9 @@ def test_only_what_is_left_out_is_assumed(stage: Stage, wording: Wording) -> Non
     assert "0.5 kg" in texts
 
 
-def test_without_a_mode_that_interferes_there_is_no_limit(found: BothModels, snapshots: Snapshots) -> None:
-    quiet = tuple(replace(mode, peak=0.0) for mode in found.closed.modes)
-    alone = BothModels(found.stage, replace(found.closed, modes=quiet), None, "singular at step 7")
+def test_without_a_mode_that_interferes_there_is_no_limit(models: BothModels, snapshots: Snapshots) -> None:
+    quiet = tuple(replace(mode, peak=0.0) for mode in models.closed.modes)
+    alone = BothModels(models.stage, replace(models.closed, modes=quiet), None, "singular at step 7")
     assert flexure_document(alone)["first_interfering_hz"] is None
     assert "singular at step 7" in Page(flexure_html(alone, ())).text
     snapshots.check("flexure", "closed forms alone", "\n".join(sentences(alone)))
@@ -296,20 +296,20 @@ def test_files_and_page(folder: Path) -> None:
     assert "thickness = " in page.text
 
 
-def test_force_and_supports_are_drawn_by_both_models(found: BothModels) -> None:
-    force, support, _ = flexure_figures(found)
+def test_force_and_supports_are_drawn_by_both_models(models: BothModels) -> None:
+    force, support, _ = flexure_figures(models)
     (panel,) = force.panels
     assert [line.label for line in panel.series] == [BEAMS, CLOSED, "initial stiffness"]
-    assert (panel.series[0].x[-1], panel.series[0].y[-1]) == pytest.approx((1e-3, found.best.forces[-1]))
-    assert panel.series[2].y[-1] == pytest.approx(found.best.drive[0] * 1e-3)
-    for panel, expected in zip(support.panels, (found.best.support_x, found.best.support_y), strict=True):
+    assert (panel.series[0].x[-1], panel.series[0].y[-1]) == pytest.approx((1e-3, models.best.forces[-1]))
+    assert panel.series[2].y[-1] == pytest.approx(models.best.drive[0] * 1e-3)
+    for panel, expected in zip(support.panels, (models.best.support_x, models.best.support_y), strict=True):
         assert [line.label for line in panel.series] == [BEAMS, CLOSED]
         assert panel.markers[0].y * 1e6 == pytest.approx(expected)
         assert (panel.series[0].y[0] * 1e6, panel.series[0].y[-1] * 1e6) == pytest.approx((expected[0], expected[-1]))
 
 
-def test_modes_are_drawn_with_their_names_and_who_sees_them(found: BothModels) -> None:
-    figure = modes_figure(found.best)
+def test_modes_are_drawn_with_their_names_and_who_sees_them(models: BothModels) -> None:
+    figure = modes_figure(models.best)
     titles = [panel.title for panel in figure.panels]
     assert titles[0].startswith("drive, 11.3 Hz")
     assert not any("torsion" in title for title in titles)  # whose middle lines rest
@@ -335,14 +335,14 @@ def test_modes_are_drawn_with_their_names_and_who_sees_them(found: BothModels) -
         ((0, 0, 0, 20, 0, 0), "along the leaves"),
     ],
 )
-def test_a_mode_is_seen_from_where_it_moves(found: BothModels, stage_motion: tuple[float, ...], view: str) -> None:
+def test_a_mode_is_seen_from_where_it_moves(models: BothModels, stage_motion: tuple[float, ...], view: str) -> None:
     mode = Mode("some", 1.0, 0.0, 0.0, 0.0, np.array(stage_motion, float), np.zeros((2, 17, 3)))
-    assert best_view(found.mechanism, mode) == view
+    assert best_view(models.mechanism, mode) == view
     assert view in VIEWS
 
 
-def test_the_drive_mode_shifts_the_stage_up_or_down(found: BothModels) -> None:
-    rest, moved = modes_figure(found.best).panels[0].series
+def test_the_drive_mode_shifts_the_stage_up_or_down(models: BothModels) -> None:
+    rest, moved = modes_figure(models.best).panels[0].series
     shift = moved.y - rest.y
     block = slice(-6, -1)
     assert np.ptp(shift[block]) < 0.1 * abs(shift[block]).max()  # as a whole
@@ -351,8 +351,8 @@ def test_the_drive_mode_shifts_the_stage_up_or_down(found: BothModels) -> None:
 
 
 @pytest.mark.parametrize("render", [matplotlib_renderer.render, plotly_renderer.render])
-def test_both_renderers_draw_the_figures(found: BothModels, render: Callable[[Figure], Any]) -> None:
-    for figure in flexure_figures(found):
+def test_both_renderers_draw_the_figures(models: BothModels, render: Callable[[Figure], Any]) -> None:
+    for figure in flexure_figures(models):
         drawn = render(figure)
         assert len(getattr(drawn, "axes", figure.panels)) == len(figure.panels)
 
@@ -440,8 +440,8 @@ def test_a_stage_without_leaves_is_shown_a_table_that_works(refused: Refused) ->
         ("", '""', "convertible to m"),
     ],
 )
-def test_strokes_that_are_refused(path: Path, stroke: str, given: str, expected: str) -> None:
-    with pytest.raises(InputError, match=rf'(?s)--stroke\n.*{given}.*{expected}.*--stroke "1 mm"'):
+def test_strokes_that_are_refused(path: Path, stroke: str, shown: str, expected: str) -> None:
+    with pytest.raises(InputError, match=rf'(?s)--stroke\n.*{shown}.*{expected}.*--stroke "1 mm"'):
         command(path, stroke=stroke)
 
 
@@ -491,8 +491,8 @@ def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_interfering_modes_are_those_of_the_evaluation(found: BothModels) -> None:
-    for model in found.models.values():
+def test_interfering_modes_are_those_of_the_evaluation(models: BothModels) -> None:
+    for model in models.models.values():
         first = next((mode for mode in model.modes[1:] if mode.interferes), None)
         assert first is model.interfering
         assert [model.interferes(mode) for mode in model.modes] == [

@@ -128,8 +128,8 @@ def test_what_ends_in_the_hunting_that_was_found_hunts_whatever_else_there_is() 
         ((NONE, NONE, MoveShare(100, 0, (1.0, 2.0), (0.1, 0.2))), False),
     ],
 )
-def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, known: bool) -> None:
-    assert (STARTS in judged(starts=starts).given_up) == (not known)
+def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, certain: bool) -> None:
+    assert (STARTS in judged(starts=starts).given_up) == (not certain)
 
 
 def test_a_longer_run_that_is_given_up_tells_nothing_of_settling() -> None:

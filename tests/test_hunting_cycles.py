@@ -50,13 +50,13 @@ def rig(crossover: float, joint: str) -> Stage:
 
 
 @cache
-def known(chosen: Stage, rtol: float = RTOL) -> Hunting:
+def hunting_of(chosen: Stage, rtol: float = RTOL) -> Hunting:
     return hunting(chosen, rtol)
 
 
 def only(chosen: Stage, rtol: float = RTOL) -> Cycle:
     """The one cycle there is."""
-    (cycle,) = known(chosen, rtol).cycles
+    (cycle,) = hunting_of(chosen, rtol).cycles
     return cycle
 
 
@@ -130,18 +130,18 @@ def test_flip_of_the_rigid_mass(crossover: float, attracting: bool) -> None:
     assert edge.crossover is not None
     assert 9.76 < edge.crossover < 9.78
     assert edge.factor == pytest.approx(edge.crossover / crossover, rel=1e-12)
-    assert only_symmetric(known(rigid(edge.crossover))).multiplier == pytest.approx(-1, abs=1e-5)
+    assert only_symmetric(hunting_of(rigid(edge.crossover))).multiplier == pytest.approx(-1, abs=1e-5)
 
 
-def only_symmetric(found: Hunting) -> Cycle:
-    (cycle,) = (item for item in found.cycles if item.symmetric)
+def only_symmetric(survey: Hunting) -> Cycle:
+    (cycle,) = (item for item in survey.cycles if item.symmetric)
     return cycle
 
 
 @RIGID
 def test_cycle_attracts_below_the_flip_only() -> None:
-    assert only_symmetric(known(rigid(9.76))).attracts
-    assert not only_symmetric(known(rigid(9.78))).attracts
+    assert only_symmetric(hunting_of(rigid(9.76))).attracts
+    assert not only_symmetric(hunting_of(rigid(9.78))).attracts
 
 
 @LOCKED_RIG
@@ -166,7 +166,7 @@ def test_edge_of_the_free_rig() -> None:
 def test_asymmetric_pair_between_its_fold_and_the_flip(crossover: float, multiplier: float) -> None:
     """Between 8.47 and 9.77 Hz an unstable pair of cycles beside the symmetric one, which it meets at the flip: it
     bounds what the symmetric one attracts. Its multiplier is of a whole period, its turns differ."""
-    result = known(rigid(crossover))
+    result = hunting_of(rigid(crossover))
     beside = next(cycle for cycle in result.cycles if not cycle.symmetric)
     assert beside.multiplier == pytest.approx(multiplier, rel=1e-3)
     assert not beside.attracts
@@ -184,7 +184,7 @@ def test_asymmetric_pair_shrinks_into_the_flip() -> None:
     """Its multiplier falls to 1 and its turns approach each other like the root of the distance to the flip."""
     off = {}
     for crossover in (9.65, 9.74):
-        result = known(rigid(crossover))
+        result = hunting_of(rigid(crossover))
         (beside,) = (cycle for cycle in result.cycles if not cycle.symmetric)
         off[crossover] = float(beside.trace.position.max() + beside.trace.position.min())
     assert off[9.65] / off[9.74] == pytest.approx(np.sqrt((9.77 - 9.65) / (9.77 - 9.74)), rel=0.02)
@@ -193,7 +193,7 @@ def test_asymmetric_pair_shrinks_into_the_flip() -> None:
 @RIGID
 @pytest.mark.parametrize("crossover", [4, 8.3, 9.9, 12])
 def test_no_asymmetric_pair_elsewhere(crossover: float) -> None:
-    assert [cycle.symmetric for cycle in known(rigid(crossover)).cycles] == [True]
+    assert [cycle.symmetric for cycle in hunting_of(rigid(crossover)).cycles] == [True]
     stages = Ensemble.held(rigid(crossover).flat(), 1)
     beside = asymmetric_cycles(stages, return_map(stages, 1e-6))
     assert not beside.closed[0]
@@ -208,7 +208,7 @@ def test_unstable_cycle_above_the_flip_and_none_at_17_hz() -> None:
     assert not cycle.attracts
     assert cycle.multiplier == pytest.approx(-1.1335, rel=1e-4)
     assert cycle.time_constant == pytest.approx(cycle.period / 2 / np.log(1.1335), rel=1e-3)
-    none = known(rigid(17))
+    none = hunting_of(rigid(17))
     assert none.cycles == ()
     assert none.reason == NO_RETURN
     assert none.certain
@@ -227,7 +227,7 @@ CONVERGING = [
 def test_results_do_not_depend_on_the_tolerance(chosen: Stage) -> None:
     """From rtol 1e-9 to 1e-11: period and amplitude to 1e-6 (to 1e-7 in the free rig at 3 Hz, 1e-8 elsewhere), and the
     multiplier that decides to 1e-4."""
-    for rough, fine in zip(known(chosen).cycles, known(chosen, TIGHT).cycles, strict=True):
+    for rough, fine in zip(hunting_of(chosen).cycles, hunting_of(chosen, TIGHT).cycles, strict=True):
         assert rough.period == pytest.approx(fine.period, rel=1e-6)
         assert rough.amplitude == pytest.approx(fine.amplitude, rel=1e-6)
         assert rough.multiplier == pytest.approx(fine.multiplier, rel=1e-4)
@@ -277,7 +277,7 @@ def test_multipliers_of_machines_drawn_at_random() -> None:
 
     The slope is that of 1 % of the amplitude, hence 1 %; it agrees to some 1e-5.
     """
-    cycles = [only_symmetric(known(item)) for item in machines() if known(item).cycles]
+    cycles = [only_symmetric(hunting_of(item)) for item in machines() if hunting_of(item).cycles]
     judged = [cycle for cycle in cycles if abs(cycle.multiplier) < 2]
     assert len(judged) >= 6
     for cycle in judged:
@@ -293,7 +293,7 @@ def test_machines_drawn_at_random_hunt_as_their_cycles_say() -> None:
     attracts comes to rest from all; one that has one swings as far as it from some, to what is left of the transient,
     and rests after the others."""
     for item in machines():
-        result = known(item)
+        result = hunting_of(item)
         period = result.cycles[0].period if result.cycles else 4.0
         swing = last_swing(item, np.geomspace(1e-4, 3e-2, 32), 100 * period, 2 * period)
         going = swing[swing > item.flat()["friction.static"] / item.flat()["friction.bristle_stiffness"]]
@@ -350,7 +350,7 @@ def moving_parts(trace: xr.Dataset) -> dict[str, np.ndarray]:
 )
 def test_trace_of_an_asymmetric_cycle_is_periodic(chosen: Stage) -> None:
     """To 1e-6 of the range of each signal; the orbit closes to 1e-8 and its trace is followed at rtol 1e-8."""
-    (cycle,) = (item for item in known(chosen).cycles if not item.symmetric)
+    (cycle,) = (item for item in hunting_of(chosen).cycles if not item.symmetric)
     for name, signal in moving_parts(cycle.trace).items():
         assert abs(signal[-1] - signal[0]) < 1e-6 * np.ptp(signal), name
 
@@ -410,7 +410,7 @@ def test_mirrored_friction_mirrors_the_cycle() -> None:
 def test_much_unequal_friction_ends_hunting() -> None:
     """At 8 Hz, where the cycle attracts less, 5 % of difference is too much: simulations come to rest from anywhere."""
     chosen = rigid(8, friction__asymmetry=0.05)
-    result = known(chosen)
+    result = hunting_of(chosen)
     assert result.cycles == ()
     assert result.reason == NO_RETURN
     assert np.all(last_swing(chosen, np.geomspace(1e-4, 3e-2, 32), 150, 4) < BRISTLES)
@@ -528,7 +528,7 @@ def test_newton_does_not_slide_onto_the_rest_line() -> None:
 
 @RIGID
 def test_no_cycle_at_18_hz() -> None:
-    result = known(rigid(18))
+    result = hunting_of(rigid(18))
     assert result.cycles == ()
     assert result.reason == NO_RETURN
     assert result.certain
@@ -542,7 +542,7 @@ def test_cycles_of_many_stages_are_those_of_each() -> None:
     together = hunting_cycles(Ensemble.held(flat, crossovers.size))
     assert together.closed.tolist() == [True, True, False, True]
     for k in np.flatnonzero(together.closed):
-        alone = only_symmetric(known(rigid(float(crossovers[k]))))
+        alone = only_symmetric(hunting_of(rigid(float(crossovers[k]))))
         assert together.period[k] == pytest.approx(alone.period, rel=1e-9)
         assert together.multiplier[k] == pytest.approx(alone.multiplier, rel=1e-6)
 

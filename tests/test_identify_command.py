@@ -107,7 +107,7 @@ def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapsho
     files = {Path(item) for item in answer["files"]}
     assert {out / "identified.toml", out / "identify.html", beside(out / "identified.toml")} <= files
     assert all(entry.stat().st_size > 0 for entry in files)
-    assert {each.suffix for each in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
+    assert {file.suffix for file in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
     page = (out / "identify.html").read_text()
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=.https?:", page)
     snapshots.check("identify", "page", Page(page).lines)

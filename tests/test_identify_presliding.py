@@ -51,8 +51,8 @@ def shaken(
     return record("small", step, **signals, **more)
 
 
-def shown(found: Presliding) -> list[float]:
-    return [found.stiffness.value, found.damping.value, found.mass.value]
+def shown(result: Presliding) -> list[float]:
+    return [result.stiffness.value, result.damping.value, result.mass.value]
 
 
 @given(st.integers(0, 2**31), st.floats(1.0, 1e6))

@@ -56,12 +56,12 @@ def sliding(
     return record("slow", DT, position=seen + noise * rng.standard_normal(len(seen)), force=force[::FINE])
 
 
-def values(found: SlowSliding) -> list[float]:
-    return [estimate.value for estimate in found.estimates]
+def values(result: SlowSliding) -> list[float]:
+    return [estimate.value for estimate in result.estimates]
 
 
-def holds(found: SlowSliding) -> list[bool]:
-    return [estimate.holds(true) for estimate, true in zip(found.estimates, TRUE, strict=True)]
+def holds(result: SlowSliding) -> list[bool]:
+    return [estimate.holds(true) for estimate, true in zip(result.estimates, TRUE, strict=True)]
 
 
 @given(st.floats(0.4, 1.8), st.floats(0.7e-3, 2.5e-3))
@@ -138,8 +138,8 @@ def test_a_contact_is_taken_off() -> None:
     assert values(stribeck_from_slow_sliding(seen, stiff, KNOWN)) == pytest.approx(TRUE, rel=0.02)
 
 
-def reason(log: Log, known: MassOnBristles | None = KNOWN) -> str:
-    sliding_fit = stribeck_from_slow_sliding(log, THERE, known)
+def reason(log: Log, bristles: MassOnBristles | None = KNOWN) -> str:
+    sliding_fit = stribeck_from_slow_sliding(log, THERE, bristles)
     assert not sliding_fit.estimates[2].determined
     return sliding_fit.estimates[2].reason
 

@@ -277,8 +277,8 @@ def figures(case: tuple[Identification, list[LogFile], list[Prediction]]) -> lis
         (Estimate.unknown("friction.static", "N", "", "too fast", 20.0), "not identified (too fast)"),
     ],
 )
-def test_a_value_has_the_digits_of_its_interval(found: Estimate, said: str) -> None:
-    assert with_interval(found) == said
+def test_a_value_has_the_digits_of_its_interval(estimate: Estimate, said: str) -> None:
+    assert with_interval(estimate) == said
 
 
 @pytest.mark.parametrize(
@@ -309,8 +309,8 @@ def test_what_is_left_possible(low: float, high: float, unit: str, said: str) ->
         ("", ""),
     ],
 )
-def test_units_as_prefixes_know_them(unit: str, known: str) -> None:
-    assert unit_of(unit) == known
+def test_units_as_prefixes_know_them(unit: str, prefixed: str) -> None:
+    assert unit_of(unit) == prefixed
 
 
 @given(st.floats(1e-7, 1e7), st.floats(1e-5, 0.9), st.sampled_from(["kg", "N", "m", "N s/m", "Hz"]), st.booleans())

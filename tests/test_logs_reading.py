@@ -38,7 +38,7 @@ def log_of(
     return read_log(log_files.write_text(tmp_path / "a.csv", names, values), mapping, strict)
 
 
-def told(lines: tuple[str, ...], text: str) -> bool:
+def recognised(lines: tuple[str, ...], text: str) -> bool:
     return any(text in line for line in lines)
 
 
@@ -92,7 +92,7 @@ def test_an_exact_name_wins(first: str, others: list[str], tmp_path: Path) -> No
     values = [*columns()[:3], *(2 * M["force"] for _ in others), M["force"]]
     log = log_of(tmp_path, names, values)
     assert log["force"] == pytest.approx(M["force"])
-    assert told(log.read, f'the name is "{first}"')
+    assert recognised(log.read, f'the name is "{first}"')
 
 
 def test_two_names_that_are_alike_are_still_asked_for(tmp_path: Path, wording: Wording) -> None:
@@ -103,7 +103,7 @@ def test_velocities_of_which_none_is_needed_are_left_out(tmp_path: Path) -> None
     names = ["time [s]", "position [mm]", "vel a [mm/s]", "vel b [mm/s]", "force [N]"]
     log = log_of(tmp_path, names, [*columns()[:3], M["velocity"], M["force"]])
     assert "velocity" not in log
-    assert told(log.warnings, '--map velocity="vel a"')
+    assert recognised(log.warnings, '--map velocity="vel a"')
 
 
 def test_everything_that_is_open_is_told_at_once(tmp_path: Path) -> None:
@@ -334,7 +334,7 @@ def test_values_held(tmp_path: Path, wording: Wording) -> None:
 )
 def test_velocity_against_position(tmp_path: Path, factor: float, said: str) -> None:
     log = log_of(tmp_path, NAMES, [*columns()[:2], factor * columns()[2], columns()[3]])
-    assert told(log.warnings, said)
+    assert recognised(log.warnings, said)
 
 
 def test_velocity_of_another_body(tmp_path: Path, wording: Wording) -> None:
@@ -364,7 +364,7 @@ def test_delay_with_its_interval(true: float) -> None:
 def test_friction_is_no_delay(tmp_path: Path) -> None:
     """A force with much viscous friction leads the acceleration; that is not taken for a late instrument."""
     force = M["force"] + 80 * M["velocity"] + 5 * np.sign(M["velocity"])
-    assert not told(log_of(tmp_path, NAMES, [*columns()[:3], force]).warnings, "come after")
+    assert not recognised(log_of(tmp_path, NAMES, [*columns()[:3], force]).warnings, "come after")
     late = np.r_[np.zeros(4), force[:-4]]
     result = [line for line in log_of(tmp_path, NAMES, [*columns()[:3], late]).warnings if "come after" in line]
     assert len(result) == 1

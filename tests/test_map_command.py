@@ -128,8 +128,8 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
         assert process.wait(30) == 130
     assert time.monotonic() - start < 20
     assert b"to resume: friso map a.zarr" in seen
-    with xr.open_zarr(tmp_path / "a.zarr") as found:
-        kept = int((found.outcome != "").sum())
+    with xr.open_zarr(tmp_path / "a.zarr") as stored:
+        kept = int((stored.outcome != "").sum())
     assert 0 < kept < 12000
 
 
@@ -195,9 +195,9 @@ def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
     links = ("--link", "masses.cart=0.7 * mass", "--link", "masses.stage=0.3 * mass", "--set", "parasitic.mass=0.1 kg")
     done = friso(tmp_path, "map", RIG, *options, *links, "--workers", "2", "--out", "a.zarr", "--json")
     assert done.returncode == 0, done.stderr
-    with xr.open_zarr(tmp_path / "a.zarr") as found:
-        assert found["mass"].dims == ("sample",)
-        assert found.outcome.shape == (16,)
+    with xr.open_zarr(tmp_path / "a.zarr") as stored:
+        assert stored["mass"].dims == ("sample",)
+        assert stored.outcome.shape == (16,)
     again = friso_inside(tmp_path, "map", RIG, *options, *links, "--out", "b.zarr", "--json")
     assert json.loads(again.stdout)["outcomes"] == json.loads(done.stdout)["outcomes"]
 
@@ -235,8 +235,8 @@ def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict
     other = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--out", "a.zarr", "--verify", "0")
     assert friso_inside(tmp_path, *other).returncode == 2
     assert friso_inside(tmp_path, *other, "--overwrite").returncode == 0
-    with xr.open_zarr(tmp_path / "a.zarr") as found:
-        assert found.outcome.shape == (2,)
+    with xr.open_zarr(tmp_path / "a.zarr") as stored:
+        assert stored.outcome.shape == (2,)
 
 
 def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict], tmp_path: Path) -> None:

@@ -597,16 +597,16 @@ def swinging(where: np.ndarray) -> xr.Dataset:
     ],
 )
 def test_a_map_says_first_where_runs_swing(
-    name: str, rows: slice, columns: slice, told: list[float], snapshots: Snapshots
+    name: str, rows: slice, columns: slice, expected: list[float], snapshots: Snapshots
 ) -> None:
     """The share of the map [%], and the ranges in Hz and um."""
     where = np.zeros((4, 5), bool)
     where[rows, columns] = True
     runs = swinging(where)
-    assert numbers(headline(runs, "outcome")) == told
+    assert numbers(headline(runs, "outcome")) == expected
     snapshots.check("map", f"swings, {name}", headline(runs, "outcome"))
     assert headline(runs, "period") == headline(runs, "outcome")
-    assert numbers(headline(runs, "peaks")) == told
+    assert numbers(headline(runs, "peaks")) == expected
     assert map_figure(runs).note.splitlines()[0] == headline(runs, "outcome")
     backwards = runs.isel({CROSSOVER: slice(None, None, -1)})
     assert headline(backwards, "outcome") == headline(runs, "outcome")

@@ -70,13 +70,13 @@ def compiled() -> None:
 # simulate
 
 
-def path(found: Any) -> tuple[np.ndarray, np.ndarray]:
+def path(result: Any) -> tuple[np.ndarray, np.ndarray]:
     """Positions [m] at samples and at turning points, in order, and which of them are samples."""
-    reference = np.interp(found.turning_time, found.time, found.reference)
-    times = np.concatenate([found.time, found.turning_time])
-    positions = np.concatenate([found.position, found.turning_deviation + reference])
+    reference = np.interp(result.turning_time, result.time, result.reference)
+    times = np.concatenate([result.time, result.turning_time])
+    positions = np.concatenate([result.position, result.turning_deviation + reference])
     order = np.argsort(times, kind="stable")
-    return positions[order], order < found.sizes["time"]
+    return positions[order], order < result.sizes["time"]
 
 
 def closures(displacement: np.ndarray) -> int:

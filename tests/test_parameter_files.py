@@ -116,9 +116,9 @@ def test_all_that_is_not_in_the_file_is_asked_for_at_once(tmp_path: Path) -> Non
         ("deg", "TYPE = ANGULAR", "3 N*m", ROTARY),
     ],
 )
-def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force: str, told: dict[str, Any]) -> None:
+def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force: str, answers: dict[str, Any]) -> None:
     more = {"force_per_output": force}
-    drawn = stage_from(ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}, unit, joint), None, {**told, **more})
+    drawn = stage_from(ini(tmp_path, {**GAINS, "MAX_ERROR_I": 0.01}, unit, joint), None, {**answers, **more})
     back = gains_of(friso.loads(drawn.text()), {**more, "machine_unit": unit}, "linuxcnc").parameters
     assert back is not None
     assert {name: back[name] for name in GAINS} == pytest.approx(GAINS)
@@ -266,9 +266,9 @@ def test_export_writes_page_and_parameters(tmp_path: Path) -> None:
         ({}, "siemens", "one of"),
     ],
 )
-def test_what_export_cannot_do(told: dict[str, Any], to: str | None, part: str) -> None:
+def test_what_export_cannot_do(answers: dict[str, Any], to: str | None, part: str) -> None:
     with pytest.raises(InputError, match=part):
-        gains_of(friso.load(EXAMPLES / "twincat_cascade.toml"), told, to)
+        gains_of(friso.load(EXAMPLES / "twincat_cascade.toml"), answers, to)
 
 
 @pytest.mark.parametrize("name", ["thesis_rig", "ball_screw_axis"])

@@ -74,20 +74,20 @@ def test_poles_are_those_of_the_difference_equations() -> None:
 
 
 @pytest.fixture(scope="module")
-def found() -> Margins:
+def of_machine() -> Margins:
     return margins(machine().flat(), member_of(machine()))
 
 
 @pytest.mark.parametrize("which", ["gain_margin", "gain_reduction"])
-def test_gain_margins_are_where_it_becomes_unstable(found: Margins, which: str) -> None:
-    edge = getattr(found, which)
+def test_gain_margins_are_where_it_becomes_unstable(of_machine: Margins, which: str) -> None:
+    edge = getattr(of_machine, which)
     assert 0 < edge < np.inf
     sizes = [np.abs(np.linalg.eigvals(by_hand(machine(), edge * factor))).max() for factor in (0.999, 1.001)]
     assert min(sizes) < 1 < max(sizes)
     assert (sizes[0] < sizes[1]) == (which == "gain_margin")
 
 
-def test_with_all_loops_at_one_rate_the_loci_are_the_loop(found: Margins) -> None:
+def test_with_all_loops_at_one_rate_the_loci_are_the_loop(of_machine: Margins) -> None:
     """A period of four samples of a controller that is the same at all of them, against python-control."""
     case = machine("1 ms")
     flat, omega = case.flat(), np.geomspace(1.0, 0.98 * np.pi / FAST, 60)

@@ -116,8 +116,8 @@ ADDED = {
 """Parts that the loops of the rig as built add to F17, F18, F22 and F23."""
 
 
-def evidence(**found: Any) -> Evidence:
-    return Evidence({}, {}, identified=cast(Experiments, SimpleNamespace(**found)))
+def evidence(**results: Any) -> Evidence:
+    return Evidence({}, {}, identified=cast(Experiments, SimpleNamespace(**results)))
 
 
 def judged(what: str, made: Any) -> Finding:

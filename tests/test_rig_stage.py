@@ -210,11 +210,11 @@ def message(stage: Stage, changes: dict[str, object]) -> str:
         ("floor.level", "1", "an unknown key", "one of frequency, acceleration"),
     ],
 )
-def test_wrong_values(built: Stage, key: str, value: object, given: str, expected: str) -> None:
+def test_wrong_values(built: Stage, key: str, value: object, shown: str, expected: str) -> None:
     head, *lines = message(built, {key: value}).split("\n")
     assert key.rsplit(".", 1)[0] in head
     assert lines[0].startswith("  given:    ")
-    assert given in lines[0]
+    assert shown in lines[0]
     assert expected in lines[1]
     assert lines[2].startswith("  example:  ")
 

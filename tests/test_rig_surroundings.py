@@ -94,17 +94,17 @@ def test_deviation_and_correlation_length_along_one_rail(seed: int, length: floa
     lags = np.arange(9)
     values = np.array([np.mean(field[: count - lag] * field[lag:]) for lag in lags])
     far = np.arange(-40, 41)
-    error = np.sqrt([np.sum(known(far) ** 2 + known(far + lag) * known(far - lag)) / count for lag in lags])
-    correlation = known(lags)
+    error = np.sqrt([np.sum(of_theory(far) ** 2 + of_theory(far + lag) * of_theory(far - lag)) / count for lag in lags])
+    correlation = of_theory(lags)
     assert np.all(np.abs(values - correlation) < SURE * error)
     # The factor itself: a lognormal field's covariance, exp(s^2 rho) - 1, tells the variance of its mean.
-    mean_error = np.sqrt(np.sum(np.expm1(width * known(far))) / count)
+    mean_error = np.sqrt(np.sum(np.expm1(width * of_theory(far))) / count)
     assert abs(factor.mean() - 1) < SURE * mean_error
     for wrong in (0.95, 1.05):  # the bounds tell a length that is 5 % off
-        assert np.any(np.abs(known(lags, wrong) - correlation) > SURE * error)
+        assert np.any(np.abs(of_theory(lags, wrong) - correlation) > SURE * error)
 
 
-def known(lags: np.ndarray, length: float = 1.0) -> np.ndarray:
+def of_theory(lags: np.ndarray, length: float = 1.0) -> np.ndarray:
     """The correlation that the stage file states, at lags of half a length."""
     return np.exp(-((0.5 * lags / length) ** 2) / 2)
 
@@ -180,7 +180,7 @@ def test_a_field_too_fine_for_its_rail() -> None:
 
 
 points = st.lists(
-    st.tuples(st.floats(0.5, 200.0), st.floats(1e-6, 1e-2)), min_size=2, max_size=5, unique_by=lambda each: each[0]
+    st.tuples(st.floats(0.5, 200.0), st.floats(1e-6, 1e-2)), min_size=2, max_size=5, unique_by=lambda sample: sample[0]
 ).filter(lambda several: min(np.diff(sorted(f for f, _ in several))) > 1e-3)
 
 

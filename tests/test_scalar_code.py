@@ -25,7 +25,7 @@ class Given(NamedTuple):
     share: float
 
 
-def given(seed: int) -> tuple[Given, np.ndarray, np.ndarray, np.ndarray]:
+def drawn_arguments(seed: int) -> tuple[Given, np.ndarray, np.ndarray, np.ndarray]:
     """Numbers, arrays of all types, and room for results."""
     rng = np.random.default_rng(seed)
     inner = Inner(float(rng.normal()), rng.integers(-9, 9, (2, 3, 4)))
@@ -134,9 +134,9 @@ CODE = [arithmetic, choices, loops, of_parts, with_returns, of_a_queue]
 
 @pytest.mark.parametrize("function", CODE)
 def test_compiled_loops_do_what_plain_python_does(function: Callable[..., None]) -> None:
-    run = compiled(function, *given(0))
+    run = compiled(function, *drawn_arguments(0))
     for seed in range(20):
-        plain, fast = given(seed), given(seed)
+        plain, fast = drawn_arguments(seed), drawn_arguments(seed)
         function(*plain)
         run(*fast)
         for one, other in zip((plain[0].square, *plain[1:]), (fast[0].square, *fast[1:]), strict=True):
@@ -178,11 +178,11 @@ REFUSED = [changing_kind, sliced, called, of_floats, unknown_field, with_otherwi
 @pytest.mark.parametrize("function", REFUSED)
 def test_what_the_language_does_not_have_is_refused(function: Callable[..., None]) -> None:
     with pytest.raises(TypeError, match="not in the language of plain loops"):
-        compiled(function, *given(0))
+        compiled(function, *drawn_arguments(0))
 
 
 def test_other_arguments_than_those_compiled_for_are_refused() -> None:
-    numbers, x, whole, marks = given(0)
+    numbers, x, whole, marks = drawn_arguments(0)
     run = compiled(arithmetic, numbers, x, whole, marks)
     for others in (
         (numbers, x.astype(np.float32), whole, marks),

@@ -107,11 +107,11 @@ def test_ctrl_c_keeps_what_is_done_and_repeats_the_rest(
     written: list[int] = []
     write = Store.write
 
-    def interrupted(self: Store, block: tuple[slice, ...], found: dict[str, np.ndarray]) -> None:
+    def interrupted(self: Store, block: tuple[slice, ...], results: dict[str, np.ndarray]) -> None:
         if len(written) == 3:
             raise KeyboardInterrupt
         written.append(1)
-        write(self, block, found)
+        write(self, block, results)
 
     monkeypatch.setattr(Store, "write", interrupted)
     with pytest.raises(KeyboardInterrupt), local_crew(2) as crew:
@@ -311,10 +311,10 @@ def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     from friso.studies.export import export
 
     export(whole, tmp_path / "map.nc")
-    with xr.open_dataset(tmp_path / "map.nc") as found:
-        assert np.array_equal(found.peaks, whole.peaks)
-        assert found.attrs["stage"] == rig.to_toml()
-        assert found.outcome.astype(str).values.tolist() == whole.outcome.values.tolist()
+    with xr.open_dataset(tmp_path / "map.nc") as exported:
+        assert np.array_equal(exported.peaks, whole.peaks)
+        assert exported.attrs["stage"] == rig.to_toml()
+        assert exported.outcome.astype(str).values.tolist() == whole.outcome.values.tolist()
     export(whole, tmp_path / "map.csv")
     table = pd.read_csv(tmp_path / "map.csv")
     assert len(table) == 12 * 16

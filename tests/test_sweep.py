@@ -31,12 +31,12 @@ MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.ma
 pytestmark = pytest.mark.xdist_group("rig")
 
 
-def judged(stage: Stage, found: Measures) -> str:
+def judged(stage: Stage, measures: Measures) -> str:
     """The verdict of a check; of a stage whose motion ends in its cycle without what a check tells of that besides."""
     expected = hunting(stage)
     if expected.target and ends_in(stage.flat(), 1, expected.target)[0][0]:
         return "hunts"
-    return judge(stage, found, 1e-6).verdict
+    return judge(stage, measures, 1e-6).verdict
 
 
 @pytest.mark.usefixtures("own_bandwidth")

@@ -81,15 +81,15 @@ def flow_by_differences(stages: Ensemble, start: np.ndarray, time: float, step: 
     return np.tensordot(list(DIFFERENCES.values()), ends, 1).T / step / scales[:, None]
 
 
-def off(stages: Ensemble, start: np.ndarray, time: float, found: np.ndarray) -> np.ndarray:
+def off(stages: Ensemble, start: np.ndarray, time: float, flows: np.ndarray) -> np.ndarray:
     """By how much each column of a derivative is off, as a share of its norm, or of a tenth where deviations shrink to
     less.
 
     Each against the step that suits it best: differences suffer from curvature at large steps, and at small ones from
     the noise of the runs, which is largest where one of them sees a kink once more or less than its neighbours.
     """
-    gaps = [np.linalg.norm(found - flow_by_differences(stages, start, time, step), axis=0) for step in STEPS]
-    return np.min(gaps, axis=0) / np.maximum(np.linalg.norm(found, axis=0), 0.1)
+    gaps = [np.linalg.norm(flows - flow_by_differences(stages, start, time, step), axis=0) for step in STEPS]
+    return np.min(gaps, axis=0) / np.maximum(np.linalg.norm(flows, axis=0), 0.1)
 
 
 def velocities(stages: Ensemble, start: np.ndarray, time: float) -> np.ndarray:

@@ -77,9 +77,9 @@ def _attacked(arguments: argparse.Namespace, numbers: Any) -> Iterator[dict[str,
 def _line(record: dict[str, Any]) -> str:
     said = "; ".join(claim["says"] for claim in record["claims"])
     lines = [f"  {record['number']:5d}  {record['cpu']:6.2f} s  {said}"]
-    for each in record["refuted"]:
-        word = "WRONG" if each["sure"] else "wrong, but not sure"
-        lines.append(f"      {word}: {each['case']}, {each['of']}: {each['why']}")
+    for witness in record["refuted"]:
+        word = "WRONG" if witness["sure"] else "wrong, but not sure"
+        lines.append(f"      {word}: {witness['case']}, {witness['of']}: {witness['why']}")
     return "\n".join(lines)
 
 
@@ -89,8 +89,8 @@ def _summary(records: list[dict[str, Any]], seconds: float) -> None:
     claims = [claim for record in records for claim in record["claims"]]
     sure = sum(claim["sure"] for claim in claims)
     edges = [claim for claim in claims if claim["edge"] is not None]
-    wrong = [record["number"] for record in records if any(each["sure"] for each in record["refuted"])]
-    unsure_wrong = sum(any(not each["sure"] for each in record["refuted"]) for record in records)
+    wrong = [record["number"] for record in records if any(witness["sure"] for witness in record["refuted"])]
+    unsure_wrong = sum(any(not witness["sure"] for witness in record["refuted"]) for record in records)
     cpu = [record["cpu"] for record in records]
     print()
     print_table(

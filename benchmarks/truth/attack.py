@@ -23,9 +23,9 @@ def attack(seed: int, number: int, scipy_share: float, folder: Path) -> dict[str
     said = checked(stage)
     start = time.process_time()
     refuted = [
-        {"case": claim.case, "of": each.of, "sure": each.sure, "why": each.why}
+        {"case": claim.case, "of": refutation.of, "sure": refutation.sure, "why": refutation.why}
         for claim in said.claims
-        for each in _against(claim, number, scipy_share)
+        for refutation in _against(claim, number, scipy_share)
     ]
     record = {
         "seed": seed,
@@ -59,8 +59,8 @@ def _against(claim: Claim, number: int, scipy_share: float) -> Iterator[Refutati
 def _write(name: Path, stage: Stage, record: dict[str, Any]) -> None:
     """The stage file, and a note of what was said and what refutes it."""
     lines = [f"friso says {claim['says']}" for claim in record["claims"]]
-    for each in record["refuted"]:
-        word = "wrong" if each["sure"] else "wrong (not sure)"
-        lines.append(f"{word}, {each['case']}, {each['of']}: {each['why']}")
+    for refutation in record["refuted"]:
+        word = "wrong" if refutation["sure"] else "wrong (not sure)"
+        lines.append(f"{word}, {refutation['case']}, {refutation['of']}: {refutation['why']}")
     name.with_suffix(".toml").write_text(stage.to_toml())
     name.with_suffix(".txt").write_text("\n".join(lines) + "\n")

@@ -132,7 +132,7 @@ class _Draw:
         """Known keys from what bearings are like; others about their examples."""
         law = FRICTION.classes[self.form.friction]
         bristles = self.static / self.log(2e-7, 1e-4)
-        known: dict[str, Any] = {
+        keys: dict[str, Any] = {
             "static": _text(self.static, "N"),
             "coulomb": _text(self.static * self.rng.uniform(0.2, 1.0), "N"),
             "stribeck_velocity": _text(self.log(1e-4, 5e-2), "m/s"),
@@ -143,11 +143,11 @@ class _Draw:
             "regularisation_velocity": _text(self.log(1e-6, 1e-3), "m/s"),
         }
         if self.form.asymmetry:
-            known["asymmetry"] = self.sign() * self.log(0.01, 0.4)
+            keys["asymmetry"] = self.sign() * self.log(0.01, 0.4)
         table: dict[str, Any] = {"model": self.form.friction}
         for name, field in numeric_fields(law).items():
-            if name in known:
-                table[name] = known[name]
+            if name in keys:
+                table[name] = keys[name]
             elif law.model_fields[name].is_required():
                 table[name] = self.about(field)
         return table

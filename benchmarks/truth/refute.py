@@ -76,7 +76,7 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
 def _may_hunt(bench: Bench, trial: Trial, kicks: tuple[float, ...] = ()) -> bool:
     """Whether any start swings on, or might: the kicks that are said to, then all of the trial."""
     trials = (bench.released(np.array(kicks)), trial) if kicks else (trial,)
-    runs = (bench.follow(each, rtol) for rtol in (ROUGH, FINE) for each in trials)
+    runs = (bench.follow(begun, rtol) for rtol in (ROUGH, FINE) for begun in trials)
     return any(np.isin(run.words.astype(str), (SWINGS, UNSURE)).any() for run in runs)
 
 

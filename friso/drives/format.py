@@ -39,7 +39,7 @@ class AxisParameters:
             raise InputError(name, f"{value:g}", f"a number of at most {MOST:g}", f"{name} = 1.0")
         return value
 
-    def given(self, name: str) -> bool:
+    def is_set(self, name: str) -> bool:
         """Whether there is such a parameter, and it is neither 0 nor infinite."""
         entry = self.values.get(name)
         return entry is not None and str(entry).strip().lower() not in ENDLESS and self.number(name) != 0

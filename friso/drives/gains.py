@@ -34,18 +34,18 @@ class Gains:
         return self.kind.text(self.parameters) if self.kind and self.parameters else ""
 
 
-def gains_of(stage: Stage, told: Mapping[str, Any], to: str | None = None) -> Gains:
+def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None) -> Gains:
     """The gains of a stage, also as the parameters of the kind of drive `to`. Raises InputError for a controller that
     the drive does not have, and for all that is still to be said, together."""
     flat = stage.flat()
-    answers = UserAnswers(told)
+    answers = UserAnswers(user_values)
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
-    known = {TRAVEL, MOTOR_CONSTANT}
+    askable = {TRAVEL, MOTOR_CONSTANT}
     if kind is not None:
-        known |= {question.key for question in kind.questions_back(flat, UserAnswers({}))}
-    for key in told:
-        if key not in known:
-            raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(known))}")
+        askable |= {question.key for question in kind.questions_back(flat, UserAnswers({}))}
+    for key in user_values:
+        if key not in askable:
+            raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(askable))}")
     if kind is None:
         return Gains(stage, drawing(flat), conversions(flat, answers))
     refuse_open(kind.questions_back(flat, answers), f"--to {to}")
@@ -57,8 +57,8 @@ def _lost(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
     """Keys of [controller] that parameters have no place for: a filter once, and nothing that is 0 or a mere choice."""
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]
-    told = [name for name in names if name not in held and (not isinstance(flat[before + name], str))]
-    return tuple(dict.fromkeys(before + ".".join(name.split(".")[:2]) for name in told if not _within(name, held)))
+    named = [name for name in names if name not in held and (not isinstance(flat[before + name], str))]
+    return tuple(dict.fromkeys(before + ".".join(name.split(".")[:2]) for name in named if not _within(name, held)))
 
 
 def _within(name: str, held: frozenset[str]) -> bool:

@@ -130,10 +130,10 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     """Controller, drive and move of an axis. Raises InputError for what friso cannot describe."""
     kind = _kind(axis)
     unit = _metres(axis, answers, kind)
-    left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.given(key)]
+    left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.is_set(key)]
     in_torque = FORCE in answers
     controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
-    if axis.given("DEADBAND"):
+    if axis.is_set("DEADBAND"):
         controller["error_deadband"] = si(axis.number("DEADBAND") * unit, kind.unit("m"))
     drive = {}
     if "SERVO_PERIOD" in axis.machine:
@@ -143,7 +143,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
         tables["drive"] = drive
     if kind != LINEAR:
         tables["axis"] = {"kind": kind.name}
-    if axis.given("MAX_ACCELERATION") and axis.given("MAX_VELOCITY"):
+    if axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY"):
         fastest, acceleration = axis.number("MAX_VELOCITY"), axis.number("MAX_ACCELERATION")
         back = max(5.0, 4 * fastest / acceleration)
         tables["motion"] = {
@@ -176,9 +176,9 @@ def _torque(
         table["viscous_feedforward"] = si(ahead, kind.unit("N*s/m"))
     if gain["FF2"]:
         table["acceleration_feedforward"] = si(gain["FF2"], kind.unit("kg"))
-    if axis.given("MAX_OUTPUT"):
+    if axis.is_set("MAX_OUTPUT"):
         table |= {"force_limit": si(axis.number("MAX_OUTPUT") * scale * unit, kind.unit("N")), "anti_windup": "clamp"}
-    if axis.given("MAX_ERROR_I") and gain["I"]:
+    if axis.is_set("MAX_ERROR_I") and gain["I"]:
         table["integral_limit"] = si(axis.number("MAX_ERROR_I") * unit * gain["I"], kind.unit("N"))
     return table, []
 
@@ -188,7 +188,7 @@ def _velocity(
 ) -> tuple[dict[str, object], list[str]]:
     """The table [controller] where the output is the velocity that the drive follows; raises InputError for a D, for
     which a cascade has no place."""
-    if axis.given("D"):
+    if axis.is_set("D"):
         expected = f"D = 0 with an output that is a velocity; or {FORCE}, with one that is a force"
         raise InputError("D", f"{axis.number('D'):g}", expected, f'--set {FORCE}="20 N"')
     p, i = axis.number("P"), axis.number("I", 0.0)
@@ -198,7 +198,7 @@ def _velocity(
     table: dict[str, object] = {"kind": "cascade", "kv": si(p * scale, "1/s")}
     if i:
         table["position_integral_time"] = si(p / i, "s")
-    if axis.given("FF1"):
+    if axis.is_set("FF1"):
         table["velocity_feedforward"] = axis.number("FF1") * scale
     left = [
         f"{name} = {axis.number(name):g}, {what}"
@@ -207,7 +207,7 @@ def _velocity(
             "MAX_OUTPUT": "the largest velocity commanded",
             "MAX_ERROR_I": "the limit of the error's integral",
         }.items()
-        if axis.given(name)
+        if axis.is_set(name)
     ]
     if VELOCITY not in answers:
         left.append(

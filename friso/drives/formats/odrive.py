@@ -135,7 +135,7 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
     else:
         what = 'what one turn of the motor moves; an angle on a rotary axis, "360 deg" without a gear'
         asked.append(OpenQuestion(TRAVEL, what, '"10 mm"'))
-    moved = all(axis.given(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
+    moved = all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
     return (*asked, *of_the_machine(answers, kind, moved))
 
 
@@ -163,13 +163,13 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     torque = min(_torque_limit(axis), inf)
     if torque < inf:
         table |= {"force_limit": si(torque * force, kind.unit("N")), "anti_windup": "clamp"}
-    if axis.given(f"{CONFIG}.vel_integrator_limit") and ki > 0:
+    if axis.is_set(f"{CONFIG}.vel_integrator_limit") and ki > 0:
         table["integral_limit"] = si(number("vel_integrator_limit") * force, kind.unit("N"))
     bandwidth = axis.number(f"{ENCODER}.bandwidth", 1000.0) / (2 * pi)
     low_pass = {"kind": "low_pass", "path": "feedback", "order": 2, "damping_ratio": 1.0}
     table["filters"] = [{**low_pass, "frequency": si(bandwidth, "Hz")}]
     drive = {"sample_time": si(1 / RATE, "s")}
-    if axis.given(f"{MOTOR}.current_control_bandwidth"):
+    if axis.is_set(f"{MOTOR}.current_control_bandwidth"):
         drive["current_bandwidth"] = si(axis.number(f"{MOTOR}.current_control_bandwidth") / (2 * pi), "Hz")
     tables: dict[str, Mapping[str, Any]] = {"controller": table, "drive": drive, **_motion(axis, kind, travel)}
     if kind != LINEAR:
@@ -179,14 +179,14 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
 def _torque_limit(axis: AxisParameters) -> float:
     """Torque [N m] that the motor gives at most."""
-    current = axis.number(f"{MOTOR}.current_lim", 0.0) if axis.given(f"{MOTOR}.current_lim") else inf
-    torque = axis.number(f"{MOTOR}.torque_lim") if axis.given(f"{MOTOR}.torque_lim") else inf
+    current = axis.number(f"{MOTOR}.current_lim", 0.0) if axis.is_set(f"{MOTOR}.current_lim") else inf
+    torque = axis.number(f"{MOTOR}.torque_lim") if axis.is_set(f"{MOTOR}.torque_lim") else inf
     return min(current * axis.number(f"{MOTOR}.torque_constant"), torque)
 
 
 def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Mapping[str, Any]]:
     """The move of the drive's own trajectories, where it has any."""
-    if not all(axis.given(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit")):
+    if not all(axis.is_set(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit")):
         return {}
     fastest, acceleration = (axis.number(f"{MOVE}.{name}") for name in ("vel_limit", "accel_limit"))
     back = max(5.0, 4 * fastest / acceleration)
@@ -210,7 +210,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
             f"enable_gain_scheduling: within {width:g} turns the gains go to 0 with the error, and what friso says of "
             "swings as small as that is not what this axis does"
         )
-    if axis.values.get(f"{CONFIG}.enable_vel_limit", True) and axis.given(f"{CONFIG}.vel_limit"):
+    if axis.values.get(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
         left.append("input_vel and input_torque of whoever commands the positions: taken as 0")
@@ -256,9 +256,9 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
         raise lacks("an integral in the position loop", "a proportional position loop")
     if flat[f"{name}proportional_on"] != "error":
         raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
-    told = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else _travel(flat)
-    assert told is not None  # it was asked for
-    travel = float(told)
+    answered = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else _travel(flat)
+    assert answered is not None  # it was asked for
+    travel = float(answered)
     force = 2 * pi / travel
     kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
     settings = {

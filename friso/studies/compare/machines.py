@@ -183,6 +183,6 @@ def _joined(correlations: Correlations, spreads: Mapping[str, float]) -> Correla
     if not groups:
         return correlations
     blocks = [np.where(np.eye(len(keys), dtype=bool), 1.0, by) for keys, by in groups]
-    given = [correlations.matrix] if correlations.keys else []
+    matrices = [correlations.matrix] if correlations.keys else []
     names = tuple(key for keys, _ in groups for key in keys)
-    return Correlations((*correlations.keys, *names), np.asarray(block_diag(*given, *blocks)))
+    return Correlations((*correlations.keys, *names), np.asarray(block_diag(*matrices, *blocks)))
