@@ -19,11 +19,11 @@ from scipy.stats import qmc
 
 from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
-from friso.cure.answers import Cure, measure
-from friso.cure.goal import Goal
-from friso.cure.machines import Fleet, drawn
-from friso.cure.method import tune
-from friso.cure.search import Budget, Search
+from friso.remedies.goal import Goal
+from friso.remedies.machines import Fleet, drawn
+from friso.remedies.method import tune
+from friso.remedies.search import Budget, Search
+from friso.remedies.verified import RemedyOutcome, measure
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
 from friso.views.tune.words import changes
@@ -86,10 +86,10 @@ def axes() -> Iterator[tuple[str, Stage]]:
             yield f"{name}, friction x {level:g}, mode", stage.replace({"joint": joint, "parasitic": mode})
 
 
-def brute(cure: Cure, stage: Stage, goal: Goal, machines: Fleet, count: int) -> float:
+def brute(outcome: RemedyOutcome, stage: Stage, goal: Goal, machines: Fleet, count: int) -> float:
     """The best settling time [s] of so many settings that keep all constraints and have nothing that attracts."""
-    search = Search(cure.way, goal, machines, stage, Budget(), lambda label: None)
-    shares = qmc.Sobol(len(cure.way.variables), rng=0).random(count)
+    search = Search(outcome.remedy, goal, machines, stage, Budget(), lambda label: None)
+    shares = qmc.Sobol(len(outcome.remedy.variables), rng=0).random(count)
     for first in range(0, count, CHUNK):
         search.tried.append(search.measured(shares[first : first + CHUNK]))
     best = next(search.surveyed(), None)
@@ -107,7 +107,7 @@ def thesis() -> None:
     advice = tune(locked, goal, chosen=["bandwidth", "isolator"])
     print(f"{perf_counter() - begun:.0f} s")
     listed = {"locked": advice.present, "thesis, Sec. 3.4": measure(free, advice.machines, goal, free)}
-    listed |= {cure.way.name: cure.measured for cure in advice.answers if cure.measured}
+    listed |= {outcome.remedy.name: outcome.measured for outcome in advice.outcomes if outcome.measured}
     head = ("", "meet the goal", "95 % settle in", "median", "force", "margin", "stiffness")
     rows = [
         (
@@ -119,8 +119,13 @@ def thesis() -> None:
         for name, part in listed.items()
     ]
     print_table(head, rows)
-    for cure in advice.answers:
-        print(cure.way.name, cure.sure, cure.doubts, cure.stage and changes(advice.stage, cure.stage))
+    for outcome in advice.outcomes:
+        print(
+            outcome.remedy.name,
+            outcome.certainty,
+            outcome.doubts,
+            outcome.stage and changes(advice.stage, outcome.stage),
+        )
 
 
 def main() -> None:
@@ -144,17 +149,17 @@ def main() -> None:
         seconds = perf_counter() - begun
         machines = drawn(stage, Correlations(), Budget().machines, advice.seed)
         fresh = drawn(stage, Correlations(), options.fresh, 77)
-        for cure in advice.answers:
-            if cure.sure != "works" or cure.stage is None:
-                rows.append((name, cure.way.name, cure.sure, *[""] * 4, f"{seconds:.0f} s"))
+        for outcome in advice.outcomes:
+            if outcome.certainty != "works" or outcome.stage is None:
+                rows.append((name, outcome.remedy.name, outcome.certainty, *[""] * 4, f"{seconds:.0f} s"))
                 continue
-            search = Search(cure.way, goal, machines, stage, Budget(), lambda label: None)
-            tuned = float(search.measured(cure.shares[None]).settling[0])
-            best = brute(cure, stage, goal, machines, options.settings)
-            share = measure(cure.stage, fresh, goal, stage).share(goal)
+            search = Search(outcome.remedy, goal, machines, stage, Budget(), lambda label: None)
+            tuned = float(search.measured(outcome.shares[None]).settling[0])
+            best = brute(outcome, stage, goal, machines, options.settings)
+            share = measure(outcome.stage, fresh, goal, stage).share(goal)
             worst, least = max(worst, tuned / best), min(least, share.probability)
             cells = (f"{tuned:.4g} s", f"{best:.4g} s", f"{tuned / best:.3f}", f"{100 * share.probability:.1f} %")
-            rows.append((name, cure.way.name, "works", *cells, f"{seconds:.0f} s"))
+            rows.append((name, outcome.remedy.name, "works", *cells, f"{seconds:.0f} s"))
         print_table(("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "time"), rows[-2:])
     print_table(("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "time"), rows)
     print_goals(

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from friso.answers.starting import example, init, schema
     from friso.answers.sweep import sweep
     from friso.answers.tune import tune
-    from friso.cure.sensitivities import Sensitivities, sensitivity
     from friso.errors import InputError, LogError, SpecError, StageError, StoreError
     from friso.frequency.analysis import linear
     from friso.frequency.describing.function import describing
@@ -33,6 +32,7 @@ if TYPE_CHECKING:
     from friso.frequency.describing.response import plant_response
     from friso.frequency.members import Members, member
     from friso.frequency.tuning import Tuning, tuning
+    from friso.remedies.sensitivities import Sensitivities, sensitivity
     from friso.stage import Stage, load, loads, save
     from friso.studies.harmonic_balance import harmonic_balance
     from friso.studies.samples import Samples
@@ -57,7 +57,7 @@ _PLACES = {
     "friso.answers.starting": ("example", "init", "schema"),
     "friso.answers.sweep": ("sweep",),
     "friso.answers.tune": ("tune",),
-    "friso.cure.sensitivities": ("Sensitivities", "sensitivity"),
+    "friso.remedies.sensitivities": ("Sensitivities", "sensitivity"),
     "friso.errors": ("InputError", "LogError", "SpecError", "StageError", "StoreError"),
     "friso.frequency.analysis": ("linear",),
     "friso.frequency.describing.function": ("describing",),

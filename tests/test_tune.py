@@ -1,4 +1,4 @@
-"""The cure: machines, ways, searches and answers, with tiny budgets."""
+"""`friso tune`: machines, remedies, searches and outcomes, with tiny budgets."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -11,17 +11,6 @@ from variants import maxwell, release, van_dijk
 from variants import stage as variant
 
 from friso import Stage, load
-from friso.cure.answers import Cure, Performance, doubts, measure
-from friso.cure.goal import Goal
-from friso.cure.machines import Fleet, drawn
-from friso.cure.method import Advice, tune
-from friso.cure.relax import relaxations
-from friso.cure.search import Budget, Search, SettingsTried
-from friso.cure.sensitivities import Sensitivities, sensitivity
-from friso.cure.suggestion import suggestion
-from friso.cure.trials import Attraction, Moves, attraction, margins, moved, quantile
-from friso.cure.variables import BANDWIDTH, crossover
-from friso.cure.ways import WayOut, ways
 from friso.design_method.isolator import isolated
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.errors import InputError
@@ -32,6 +21,17 @@ from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.margin import searched
 from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
+from friso.remedies.catalogue import Remedy, remedies
+from friso.remedies.goal import Goal
+from friso.remedies.machines import Fleet, drawn
+from friso.remedies.method import Advice, tune
+from friso.remedies.relax import relaxations
+from friso.remedies.search import Budget, Search, TriedPoints
+from friso.remedies.sensitivities import Sensitivities, sensitivity
+from friso.remedies.suggestion import suggestion
+from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile
+from friso.remedies.variables import BANDWIDTH, crossover
+from friso.remedies.verified import Performance, RemedyOutcome, doubts, measure
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.studies.compare.settings import settings_named
@@ -43,7 +43,7 @@ from friso.views.tune.sensitivity_words import ranked_sentences
 from friso.views.tune.words import DOUBTS, _without_friction, answer, changes, failing, rows
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-TINY = Budget(settings=3, generations=2, machines=4, surveyed=2, fresh=6)
+TINY = Budget(points=3, generations=2, machines=4, surveyed=2, fresh=6)
 
 
 @pytest.fixture(scope="module")
@@ -100,14 +100,14 @@ def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> N
 
 def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     fast = rigid.replace({"controller.crossover": "20 Hz"})
-    moves = moved(WayOut.settled_on("", fast), np.zeros((1, 0)), machines, goal)
+    moves = moved(Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal)
     alone = measured_run(fast)
     assert moves.settling[0, 0] == pytest.approx(alone.settling_time[0][0], rel=1e-9)
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
 
 
 def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Fleet) -> None:
-    margin = margins(WayOut.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
+    margin = margins(Remedy.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
     assert margin == pytest.approx(settled_margin(rigid.flat()), rel=0.02)
 
 
@@ -116,7 +116,7 @@ def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines
     near, far = (rigid.replace({"controller.crossover": f"{hertz} Hz"}) for hertz in (11, 14))
     one = machines.take(np.array([0]))
     results = [
-        attraction(WayOut.settled_on("", stage), np.zeros((1, 0)), one, goal).attracts[0, 0] for stage in (near, far)
+        attraction(Remedy.settled_on("", stage), np.zeros((1, 0)), one, goal).attracts[0, 0] for stage in (near, far)
     ]
     assert results == [True, False]
 
@@ -127,7 +127,7 @@ def test_a_quantile_is_a_machine_s() -> None:
 
 
 def test_ways_are_what_may_be_changed(rigid: Stage) -> None:
-    names = {name: [way.name for way in ways(rigid, goal)] for name, goal in GOALS.items()}
+    names = {name: [remedy.name for remedy in remedies(rigid, goal)] for name, goal in GOALS.items()}
     assert names["all"] == [*names["controller"], *names["joint"], "isolator and gains"]
     assert names["joint"] == ["isolator"]
     assert names["controller"][:2] == ["bandwidth", "gains"]
@@ -138,14 +138,14 @@ def test_friction_of_any_law_counts() -> None:
     own = variant(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
     assert breakaway(own.flat()) == least_breakaway(own.flat()) == pytest.approx(2.82)
     assert sliding(own.flat()) == pytest.approx(0.4 * 2.82)
-    assert {"isolator", "integral limit"} <= {way.name for way in ways(own, Goal())}
+    assert {"isolator", "integral limit"} <= {remedy.name for remedy in remedies(own, Goal())}
     (limit,) = settings_named(("limit",))
     assert limit.numbers(own.flat(), 1e-6) == {"controller.integral_limit": pytest.approx(1.2 * 2.82)}
     screw = load(EXAMPLES / "ball_screw_axis.toml")
     at_motor = screw.flat()["motor_friction.static"]
     assert breakaway(screw.flat()) == pytest.approx(screw.flat()["friction.static"] + at_motor)
     free = screw.replace({"friction": {"model": "none"}})
-    names = {way.name for way in ways(free, Goal())}
+    names = {remedy.name for remedy in remedies(free, Goal())}
     assert "integral limit" in names
     assert "isolator" not in names
     assert breakaway(free.flat()) == sliding(free.flat()) + at_motor - free.flat()["motor_friction.coulomb"] == at_motor
@@ -163,9 +163,9 @@ GOALS = {"all": Goal(), "controller": Goal(joint=False), "joint": Goal(controlle
 
 
 def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal) -> None:
-    way = ways(rigid, goal)[0]
-    fastest = way.tuned(np.ones(1))
-    assert [variable.name for variable in way.variables] == [BANDWIDTH]
+    remedy = remedies(rigid, goal)[0]
+    fastest = remedy.tuned(np.ones(1))
+    assert [variable.name for variable in remedy.variables] == [BANDWIDTH]
     assert crossover(fastest) == pytest.approx(25.0)
 
 
@@ -229,20 +229,21 @@ def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning:
 
 def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None:
     assert tuning.interrupted
-    assert [result.sure for result in tuning.answers] == ["works", "unsure"]
+    assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
     wording(answer(tuning)[0])
 
 
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
     """With a modulus margin of 0.9, that is what has to give."""
     goal = Goal(margin=0.9, bandwidth_limit=25.0, joint=False)
-    search = Search(ways(rigid, goal)[0], goal, machines, rigid, TINY, lambda label: None)
+    search = Search(remedies(rigid, goal)[0], goal, machines, rigid, TINY, lambda label: None)
     search.optimise()
     assert not [*search.surveyed()]
-    (relaxed,) = relaxations([Cure(search.way, None, None, None, (), (), search.settings)], goal, machines)
-    assert [*relaxed.values] == ["margin"]
-    assert relaxed.values["margin"] < 0.9
-    assert relaxed.factor == pytest.approx(0.9 / relaxed.values["margin"])
+    (relaxed,) = relaxations([RemedyOutcome(search.remedy, None, None, None, (), (), search.points)], goal, machines)
+    (margin,) = relaxed.relaxations
+    assert (margin.key, margin.value) == ("margin", 0.9)
+    assert margin.needed < 0.9
+    assert relaxed.factor == pytest.approx(0.9 / margin.needed)
 
 
 def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -> None:
@@ -361,8 +362,8 @@ def test_costs_order_settings() -> None:
     """What breaks a constraint costs more than what does not, and the more the further it does."""
     columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf], "looser": [1.0] * 4, "slower": [1.0] * 4}
     columns |= {"force": [1.0] * 4, "margin": [0.6, 0.6, 0.4, 0.6]}
-    settings = SettingsTried(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
-    assert settings.cost(Goal()).argsort().tolist() == [0, 1, 2, 3]
+    points = TriedPoints(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
+    assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("motion", ["hold", "ramp"])

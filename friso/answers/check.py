@@ -18,7 +18,7 @@ from friso.stage.correlations import draw
 from friso.studies.draws import MOST, Draws
 
 if TYPE_CHECKING:
-    from friso.cure.suggestion import Suggestion
+    from friso.remedies.suggestion import Suggestion
     from friso.studies.laws.verdicts import VerdictsByLaw
     from friso.views.drawing.figure import Figure
     from friso.views.files import Files
@@ -43,7 +43,7 @@ class CheckAnswer(Answer):
         case = self.result["given"]
         if case.stage.joint or case.verdict not in ("hunts", "bistable"):
             return None
-        from friso.cure.suggestion import suggestion
+        from friso.remedies.suggestion import suggestion
 
         return suggestion(case.stage)
 

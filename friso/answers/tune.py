@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, text_of, whole_number, wrong
-from friso.cure.goal import Goal
 from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
+from friso.remedies.goal import Goal
 from friso.stage import Stage
 
 if TYPE_CHECKING:
-    from friso.cure.method import Advice
+    from friso.remedies.method import Advice
     from friso.views.drawing.figure import Figure
     from friso.views.files import Files
 
@@ -25,7 +25,7 @@ Part = Literal["controller", "joint"]
 
 
 class TuneAnswer(Answer):
-    """The ways that stop the hunting, the least change first: `result` is the `Advice`."""
+    """The remedies, the least change first: `result` is the `Advice`."""
 
     command, status = "tune", 2
 
@@ -38,13 +38,13 @@ class TuneAnswer(Answer):
         return "no change that was tried works" if self.result.needed and not self.result.working else ""
 
     def sentences(self) -> Sequence[str]:
-        """What to change, what it brings and costs, and why other ways do not work."""
+        """What to change, what it brings and costs, and why the other remedies do not work."""
         from friso.views.tune.words import answer, failing
 
         return [*answer(self.result), *failing(self.result)]
 
     def tables(self) -> Sequence[AnswerTable]:
-        """The ways beside each other."""
+        """The remedies beside each other."""
         from friso.views.tune.words import COLUMNS, rows
 
         return [AnswerTable(self.result.stage.name, COLUMNS, rows(self.result))]
@@ -55,8 +55,8 @@ class TuneAnswer(Answer):
         from friso.views.tune.sensitivity_words import sensitivity_sentences
         from friso.views.tune.words import assumptions, window_lines
 
-        cure = self.result
-        return [*gain_lines(cure), *window_lines(cure), *sensitivity_sentences(cure), *assumptions(cure)]
+        advice = self.result
+        return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """The design of leaf springs for an isolator."""
@@ -70,13 +70,13 @@ class TuneAnswer(Answer):
         return figures(self.result)
 
     def document(self) -> dict[str, Any]:
-        """The ways with their numbers."""
+        """The remedies with their numbers."""
         from friso.views.tune.document import tune_document
 
         return tune_document(self.result)
 
     def files(self) -> Files:
-        """A stage file for every way, the page, the figures."""
+        """A stage file for every remedy, the page, the figures."""
         from friso.views.tune.page import tune_files
 
         return tune_files(self.result)
@@ -117,12 +117,12 @@ def tune(
     set : dict, optional
         Keys to override.
     progress : Progress
-        Called as ways are tried.
+        Called as remedies are tried.
 
     Returns
     -------
     TuneAnswer
-        The ways, ``answer.working``, each with its `stage`.
+        The remedies, ``answer.result.working``, each with its `stage`.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def tune(
     goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, only, keep)
     whole_number(seed, "seed", 0, MOST_SEED, "1")
     correlations = correlations_of(stage, chosen)
-    from friso.cure.method import tune as tuned
+    from friso.remedies.method import tune as tuned
 
     return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress))
 

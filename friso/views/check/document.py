@@ -11,10 +11,10 @@ from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
-    from friso.cure.suggestion import Suggestion
     from friso.hunting import Case, Cycle, Judgement, Margin, Swing
     from friso.hunting.feeding import Feeding
     from friso.hunting.outward import AttractionEnd
+    from friso.remedies.suggestion import Suggestion
     from friso.studies.draws import Draws
     from friso.studies.laws.verdicts import VerdictsByLaw
     from friso.studies.shares import Share

@@ -8,7 +8,7 @@ from friso.hunting.margin import DISTANCE
 from friso.views.drawing.prefixes import with_unit
 
 if TYPE_CHECKING:
-    from friso.cure.suggestion import Suggestion
+    from friso.remedies.suggestion import Suggestion
 
 LITTLE = 0.5
 """Modulus margin below which the controller has to be tuned as well."""

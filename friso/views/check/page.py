@@ -17,8 +17,8 @@ from friso.views.files import Content
 from friso.views.pages import Report
 
 if TYPE_CHECKING:
-    from friso.cure.suggestion import Suggestion
     from friso.hunting import Case
+    from friso.remedies.suggestion import Suggestion
     from friso.studies.laws.verdicts import VerdictsByLaw
 
 

@@ -1,1 +1,1 @@
-"""The cure of a stage, in words, tables and figures."""
+"""Remedies for a stage that hunts, in words, tables and figures."""

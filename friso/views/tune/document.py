@@ -1,12 +1,12 @@
-"""The cure as a JSON document."""
+"""Remedies as a JSON document."""
 
 from __future__ import annotations
 
 from dataclasses import asdict
 from typing import Any
 
-from friso.cure.answers import Cure, Performance
-from friso.cure.method import Advice
+from friso.remedies.method import Advice
+from friso.remedies.verified import Performance, RemedyOutcome
 from friso.views.documents import plain_json
 from friso.views.tune.words import answer, changes, failing, reason, unsure_why
 
@@ -34,30 +34,34 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
                 "share": goal.share,
             },
             "as_is": _measured(tuning.present, tuning) | {"verdict": tuning.case.verdict},
-            "ways": {cure.way.name: _way(cure, tuning) for cure in tuning.answers},
+            "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
             "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
             "relaxed": [
-                {"way": relaxed.way.name, "values": dict(relaxed.values), "factor": relaxed.factor}
+                {
+                    "way": relaxed.remedy.name,
+                    "values": {relaxation.key: relaxation.needed for relaxation in relaxed.relaxations},
+                    "factor": relaxed.factor,
+                }
                 for relaxed in tuning.relaxed
             ],
         }
     )
 
 
-def _way(cure: Cure, tuning: Advice) -> dict[str, Any]:
-    if cure.stage is None or cure.measured is None or cure.case is None:
-        why = unsure_why(cure) if cure.interrupted else reason(cure, tuning)
-        return {"works": cure.sure, "why": why}
-    edge = cure.case.judgement.margin
+def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
+    if outcome.stage is None or outcome.measured is None or outcome.case is None:
+        why = unsure_why(outcome) if outcome.interrupted else reason(outcome, tuning)
+        return {"works": outcome.certainty, "why": why}
+    edge = outcome.case.judgement.margin
     return {
-        "works": cure.sure,
-        "doubts": [*cure.doubts],
-        "changes": changes(tuning.stage, cure.stage),
-        "verdict": cure.case.verdict,
-        "certain": cure.case.judgement.hunting.certain,
+        "works": outcome.certainty,
+        "doubts": [*outcome.doubts],
+        "changes": changes(tuning.stage, outcome.stage),
+        "verdict": outcome.case.verdict,
+        "certain": outcome.case.judgement.hunting.certain,
         "edge_factor": None if edge is None else edge.factor,
-        "windows": [asdict(window) for window in cure.windows],
-        **_measured(cure.measured, tuning),
+        "windows": [asdict(window) for window in outcome.windows],
+        **_measured(outcome.measured, tuning),
     }
 
 

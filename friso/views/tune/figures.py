@@ -1,16 +1,16 @@
-"""The cure, drawn: the same move before and after, settling times of the machines, and loops."""
+"""Remedies, drawn: the same move before and after, settling times of the machines, and loops."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from friso.cure.answers import Cure
-from friso.cure.method import Advice
 from friso.engine.simulate import simulate
 from friso.equations.motion import last_corner
 from friso.frequency.drive import DriveTiming
 from friso.frequency.loops import response
 from friso.frequency.members import limit_cases
+from friso.remedies.method import Advice
+from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
 from friso.views.drawing.figure import (
     BLUE,
@@ -29,7 +29,7 @@ from friso.views.drawing.figure import (
 from friso.views.drawing.prefixes import with_unit
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
-"""Of the ways, in their order; more than these begin again."""
+"""Of the remedies, in their order; more than these begin again."""
 
 SAMPLES = 4000
 """Samples of a time response."""
@@ -51,21 +51,21 @@ def figures(tuning: Advice) -> list[Figure]:
 
 
 def shown(tuning: Advice) -> list[tuple[str, Stage, str]]:
-    """The stages that are drawn, with names and colours: as it is, and with each way for which there are settings."""
-    ways = [cure for cure in tuning.answers if cure.stage is not None]
+    """The stages that are drawn, with names and colours: as it is, and with each remedy that has a stage."""
+    remedies = [outcome for outcome in tuning.outcomes if outcome.stage is not None]
     return [
         ("as it is", tuning.stage, INK),
-        *((_name(cure), cure.stage, colour(tuning, cure)) for cure in ways if cure.stage),
+        *((_name(outcome), outcome.stage, colour(tuning, outcome)) for outcome in remedies if outcome.stage),
     ]
 
 
-def colour(tuning: Advice, cure: Cure) -> str:
-    """The colour of a way."""
-    return COLOURS[tuning.answers.index(cure) % len(COLOURS)]
+def colour(tuning: Advice, outcome: RemedyOutcome) -> str:
+    """The colour of a remedy."""
+    return COLOURS[tuning.outcomes.index(outcome) % len(COLOURS)]
 
 
-def _name(cure: Cure) -> str:
-    return cure.way.name if cure.sure == "works" else f"{cure.way.name} (not sure)"
+def _name(outcome: RemedyOutcome) -> str:
+    return outcome.remedy.name if outcome.certainty == "works" else f"{outcome.remedy.name} (not sure)"
 
 
 def _response(tuning: Advice, stages: list[tuple[str, Stage, str]]) -> Panel:
@@ -85,9 +85,9 @@ def _settling(tuning: Advice) -> Panel:
     end = flat["motion.duration"] - float(last_corner(flat))
     rows = [("as it is", tuning.present.moves.settling[0], INK)]
     rows += [
-        (_name(cure), cure.measured.moves.settling[0], colour(tuning, cure))
-        for cure in tuning.answers
-        if cure.measured is not None
+        (_name(outcome), outcome.measured.moves.settling[0], colour(tuning, outcome))
+        for outcome in tuning.outcomes
+        if outcome.measured is not None
     ]
     start = 1e-3 * end
     series = []

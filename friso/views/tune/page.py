@@ -1,10 +1,10 @@
-"""The page of `friso tune`, its figures, and a stage file for every way."""
+"""The page of `friso tune`, its figures, and a stage file for every remedy."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friso.cure.method import Advice
+from friso.remedies.method import Advice
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
@@ -21,14 +21,14 @@ def tune_files(tuning: Advice) -> dict[str, Content]:
 
 
 def stage_files(tuning: Advice) -> dict[str, Content]:
-    """A stage file for every way for which there are settings; one that is not sure to work is named so."""
+    """A stage file for every remedy for which there are settings; one that is not sure to work is named so."""
     files: dict[str, Content] = {}
-    for cure in tuning.answers:
-        if cure.stage is None:
+    for outcome in tuning.outcomes:
+        if outcome.stage is None:
             continue
-        slug = cure.way.name.replace(",", "").replace(" ", "-")
-        unsure = "" if cure.sure == "works" else "-not-sure"
-        files[f"tuned-{slug}{unsure}.toml"] = cure.stage.to_toml()
+        slug = outcome.remedy.name.replace(",", "").replace(" ", "-")
+        unsure = "" if outcome.certainty == "works" else "-not-sure"
+        files[f"tuned-{slug}{unsure}.toml"] = outcome.stage.to_toml()
     least = tuning.working[:1]
     return {"tuned.toml": least[0].stage.to_toml() if least and least[0].stage else None, **files}
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from friso.cure.method import Advice
-from friso.cure.sensitivities import Sensitivities
+from friso.remedies.method import Advice
+from friso.remedies.sensitivities import Sensitivities
 from friso.views.drawing.prefixes import with_unit
 
 MOST, LEAST = 4, 0.02

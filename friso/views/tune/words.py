@@ -1,4 +1,4 @@
-"""The cure in words: what to change, what it brings and costs, what else would do, and what cannot work and why."""
+"""The remedies in words: what to change, what it brings and costs, what else would do, and what cannot work and why."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from friso.cure.answers import Cure, Performance
-from friso.cure.goal import Goal
-from friso.cure.method import Advice
-from friso.cure.relax import Relaxed
-from friso.cure.search import SettingsTried
-from friso.cure.variables import BANDWIDTH, crossover
-from friso.cure.window import SettingWindow
 from friso.equations.breakaway import breakaway, least_breakaway
+from friso.remedies.goal import Goal
+from friso.remedies.method import Advice
+from friso.remedies.relax import RelaxedGoal
+from friso.remedies.search import TriedPoints
+from friso.remedies.variables import BANDWIDTH, crossover
+from friso.remedies.verified import Performance, RemedyOutcome
+from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
 from friso.stage.transmission import leading_friction
 from friso.views.drawing.prefixes import NOTHING, listed, percent, share_with_interval, with_unit
@@ -33,7 +33,7 @@ DOUBTS = {
     "force": "too many of the machines take more force than there is",
     "together": "too many of the machines miss one part of the goal or another",
 }
-"""Why a way is not sure to work."""
+"""Why a remedy is not sure to work."""
 
 COLUMNS = (
     "Works",
@@ -45,8 +45,8 @@ COLUMNS = (
     "Stiffness under load",
 )
 
-RELAXED = {"within": "--within", "settle": "--settle", "force_limit": "--force-limit", "margin": "modulus margin"}
-UNITS = {"within": "m", "settle": "s", "force_limit": "N", "margin": ""}
+OPTIONS = {"within": "--within", "settle": "--settle", "force_limit": "--force-limit"}
+"""Options that state the parts of a goal."""
 
 ABSENT = "never"
 
@@ -112,15 +112,17 @@ def goal_words(goal: Goal) -> str:
 def _interrupted(tuning: Advice) -> list[str]:
     if not tuning.interrupted:
         return []
-    return ["Interrupted: this is the best so far. Ways that are not named were not tried, and one may be unfinished."]
+    return [
+        "Interrupted: this is the best so far. Options that are not named were not tried, and one may be unfinished."
+    ]
 
 
-def _works(cure: Cure, tuning: Advice, what: str) -> str:
-    assert cure.stage is not None
-    assert cure.measured is not None
+def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> str:
+    assert outcome.stage is not None
+    assert outcome.measured is not None
     return (
-        f"{what}: {cure.way.name}. Set {listed(changes(tuning.stage, cure.stage), 'and')}. "
-        f"{_brings(cure.measured, tuning)}. {price(cure.measured, tuning, cure.way.buys_joint)}"
+        f"{what}: {outcome.remedy.name}. Set {listed(changes(tuning.stage, outcome.stage), 'and')}. "
+        f"{_brings(outcome.measured, tuning)}. {price(outcome.measured, tuning, outcome.remedy.buys_joint)}"
     )
 
 
@@ -135,7 +137,7 @@ def _brings(measured: Performance, tuning: Advice) -> str:
 
 
 def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
-    """What a way costs against the stage as it is."""
+    """What a remedy costs against the stage as it is."""
     goal, before = tuning.goal, tuning.present
     force = _ratio(measured.force(goal), before.force(goal))
     stiffness = _ratio(measured.stiffness, before.stiffness)
@@ -157,76 +159,78 @@ def _ratio(now: float, before: float) -> str:
 
 def _nothing(tuning: Advice) -> list[str]:
     """That nothing is sure to work, what is not sure to, and what to relax."""
-    unsure = [cure for cure in tuning.answers if cure.sure == "unsure"]
-    lines = [f"No way was found that surely meets the goal: {goal_words(tuning.goal)}."]
+    unsure = [outcome for outcome in tuning.outcomes if outcome.certainty == "unsure"]
+    lines = [f"No option was found that certainly meets the goal: {goal_words(tuning.goal)}."]
     lines += [
-        f"{cure.way.name} may do ({listed(changes(tuning.stage, cure.stage), 'and')}), but {unsure_why(cure)}."
-        for cure in unsure
-        if cure.stage is not None
+        f"{outcome.remedy.name} might work ({listed(changes(tuning.stage, outcome.stage), 'and')}), but "
+        f"{unsure_why(outcome)}."
+        for outcome in unsure
+        if outcome.stage is not None
     ]
-    lines += [_relax(relaxed, tuning.goal) for relaxed in tuning.relaxed]
+    lines += [_relax(relaxed) for relaxed in tuning.relaxed]
     if not tuning.relaxed and not tuning.interrupted:
-        lines.append("No relaxation of one part of the goal, or of two, was found with which a way meets it.")
+        lines.append("No relaxation of one part of the goal, or of two, was found with which an option meets it.")
     return lines
 
 
-def _relax(relaxed: Relaxed, goal: Goal) -> str:
+def _relax(relaxed: RelaxedGoal) -> str:
     parts = [
-        f"{RELAXED[name]} of {number(value, UNITS[name])} instead of {number(getattr(goal, name), UNITS[name])}"
-        for name, value in relaxed.values.items()
+        f"{OPTIONS.get(part.key, part.requirement)} of {number(part.needed, part.unit)} instead of "
+        f"{number(part.value, part.unit)}"
+        for part in relaxed.relaxations
     ]
     return (
-        f"With a {listed(parts, 'and')}, {relaxed.way.name} would do on the machines that were tried (this was not "
-        "verified by cycles: run friso tune again with it)."
+        f"With a {listed(parts, 'and')}, {relaxed.remedy.name} would work on the machines tried (this was not verified "
+        "by cycles: run friso tune again with it)."
     )
 
 
-def unsure_why(cure: Cure) -> str:
-    """Why a way is not sure to work."""
-    if cure.interrupted and not cure.doubts:
+def unsure_why(outcome: RemedyOutcome) -> str:
+    """Why a remedy is not sure to work."""
+    if outcome.interrupted and not outcome.doubts:
         return "it was not verified: the search was interrupted"
-    return listed([DOUBTS[doubt] for doubt in cure.doubts], "and")
+    return listed([DOUBTS[doubt] for doubt in outcome.doubts], "and")
 
 
 def failing(tuning: Advice) -> list[str]:
     """What cannot work, and why; and what is not sure to."""
     lines = []
-    for cure in tuning.answers:
-        if cure.sure == "does not work":
-            lines.append(f"{cure.way.name}: does not work. {reason(cure, tuning)}")
-        elif cure.sure == "unsure" and tuning.working:
-            lines.append(f"{cure.way.name}: not sure to work: {unsure_why(cure)}.")
+    for outcome in tuning.outcomes:
+        if outcome.certainty == "does not work":
+            lines.append(f"{outcome.remedy.name}: does not work. {reason(outcome, tuning)}")
+        elif outcome.certainty == "unsure" and tuning.working:
+            lines.append(f"{outcome.remedy.name}: not sure to work: {unsure_why(outcome)}.")
     return lines
 
 
-def reason(cure: Cure, tuning: Advice) -> str:
-    """Why no setting of a way meets the goal."""
-    if cure.settings is None:
+def reason(outcome: RemedyOutcome, tuning: Advice) -> str:
+    """Why no setting of a remedy meets the goal."""
+    if outcome.points is None:
         return "It was not tried."
-    settings, goal = cure.settings, tuning.goal
-    sentence = next(_reasons(settings, cure, goal))
-    return f"{sentence}{_edges(tuning) if [v.name for v in cure.way.variables] == [BANDWIDTH] else ''}"
+    points, goal = outcome.points, tuning.goal
+    sentence = next(_reasons(points, outcome, goal))
+    return f"{sentence}{_edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ''}"
 
 
-def _reasons(settings: SettingsTried, cure: Cure, goal: Goal) -> Iterator[str]:
+def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
     """The first constraint that leaves nothing of the settings that meet those before."""
-    broken, left = settings.broken(goal), np.ones(len(settings.margin), bool)
+    broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     tried = f"of {len(left)} settings tried"
-    said = {
+    sentences = {
         "margin": f"No setting keeps a modulus margin of {goal.margin:g} on {percent(goal.share)} of the machines: the "
-        f"best has {settings.margin.max(initial=0.0):.2f}.",
+        f"best has {points.margin.max(initial=0.0):.2f}.",
         "settling": f"No setting ({tried}) brings {percent(goal.share)} of the machines to rest in position by the "
         "end of the run.",
-        "distance": f"No setting ({tried}) does so at {1 / goal.distance:.2f} of its bandwidth as well: hunting is "
-        "nearer.",
+        "distance": f"No setting ({tried}) still does so at {1 / goal.distance:.2f} of its bandwidth: the edge of "
+        "hunting is too close.",
         "force": "All settings that settle take more force than there is.",
         "settle": "All settings that settle do so too late.",
     }
-    for name, sentence in said.items():
+    for name, sentence in sentences.items():
         left = left & ~broken[name]
         if not left.any():
             yield sentence
-    yield f"Something attracts machines, or may, with all of the {cure.attracted} best settings that were surveyed."
+    yield f"Something attracts machines, or may, with all of the {outcome.attracted} best settings that were surveyed."
 
 
 def _edges(tuning: Advice) -> str:
@@ -246,15 +250,15 @@ def _edges(tuning: Advice) -> str:
 
 
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
-    """The ways side by side, the stage as it is first."""
+    """The remedies side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
     words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
-    for cure in tuning.answers:
-        cells = [words[cure.sure], *[NOTHING] * (len(COLUMNS) - 1)]
-        if cure.measured is not None:
-            cells = _row(cure.measured, tuning, words[cure.sure])
-        table.append((cure.way.name, cells))
+    for outcome in tuning.outcomes:
+        cells = [words[outcome.certainty], *[NOTHING] * (len(COLUMNS) - 1)]
+        if outcome.measured is not None:
+            cells = _row(outcome.measured, tuning, words[outcome.certainty])
+        table.append((outcome.remedy.name, cells))
     return table
 
 
@@ -271,15 +275,15 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     ]
 
 
-def window_words(window: SettingWindow, cure: Cure) -> str:
+def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
     """Where a number may lie, all else being as tuned."""
     name, low, high = window.name, window.low, window.high
     unit = ""
     if window.name == BANDWIDTH:
-        present = crossover(cure.way.stage)
+        present = crossover(outcome.remedy.stage)
         low, high, unit = low * present, high * present, "Hz"
     else:
-        keys = numeric_keys(cure.way.stage.flat())
+        keys = numeric_keys(outcome.remedy.stage.flat())
         unit = keys[name].unit if name in keys else ""
     first, last = (number(value, unit) for value in (low, high))
     first = f"{first} (the least tried)" if window.open_below else first
@@ -288,16 +292,16 @@ def window_words(window: SettingWindow, cure: Cure) -> str:
 
 
 def window_lines(tuning: Advice) -> list[str]:
-    """The windows of the ways that work."""
+    """The windows of the remedies that work."""
     return [
-        f"{cure.way.name} meets the goal, each number by itself, for {'; '.join(_windows(cure))}."
-        for cure in tuning.working
-        if cure.windows
+        f"{outcome.remedy.name} meets the goal, each number by itself, for {'; '.join(_windows(outcome))}."
+        for outcome in tuning.working
+        if outcome.windows
     ]
 
 
-def _windows(cure: Cure) -> list[str]:
-    return [window_words(window, cure) for window in cure.windows]
+def _windows(outcome: RemedyOutcome) -> list[str]:
+    return [window_words(window, outcome) for window in outcome.windows]
 
 
 def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:

@@ -1,4 +1,4 @@
-"""What became of a way: its stage, verified by cycles and on machines that the optimiser did not see."""
+"""What became of a remedy: its stage, verified by cycles and on machines that the optimiser did not see."""
 
 from __future__ import annotations
 
@@ -8,24 +8,24 @@ from typing import Literal
 
 import numpy as np
 
-from friso.cure.goal import Goal
-from friso.cure.machines import Fleet
-from friso.cure.search import SettingsTried
-from friso.cure.trials import Attraction, Moves, attraction, margins, moved, quantile
-from friso.cure.ways import WayOut
-from friso.cure.window import SettingWindow
 from friso.equations.bandwidth import proportional_stiffness
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
 from friso.hunting.check import Case, check_given
 from friso.hunting.verdict import BANDWIDTHS
+from friso.remedies.catalogue import Remedy
+from friso.remedies.goal import Goal
+from friso.remedies.machines import Fleet
+from friso.remedies.search import TriedPoints
+from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile
+from friso.remedies.window import VariableWindow
 from friso.stage import Stage
 from friso.studies.shares import Share, share
 
 ONE = np.zeros((1, 0))
-"""The shares of the one setting of a way without variables."""
+"""The shares of the one point of a remedy without variables."""
 
-Sure = Literal["works", "unsure", "does not work"]
+Certainty = Literal["works", "unsure", "does not work"]
 
 
 @dataclass(frozen=True)
@@ -78,25 +78,25 @@ class Performance:
 
 
 @dataclass(frozen=True)
-class Cure:
-    """A way's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work, or
-    does not (empty: it works); the `windows` of its numbers; and all settings that were tried, of which `attracted`
-    were given up because something attracted machines with them. `shares` are where in the ranges of the way it lies.
+class RemedyOutcome:
+    """A remedy's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work,
+    or does not (empty: it works); the `windows` of its numbers; and all points that were tried, of which `attracted`
+    were given up because something attracted machines with them. `shares` are where in the remedy's ranges it lies.
     """
 
-    way: WayOut
+    remedy: Remedy
     stage: Stage | None
     measured: Performance | None
     case: Case | None
     doubts: tuple[str, ...]
-    windows: tuple[SettingWindow, ...] = ()
-    settings: SettingsTried | None = None
+    windows: tuple[VariableWindow, ...] = ()
+    points: TriedPoints | None = None
     attracted: int = 0
     interrupted: bool = False
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
-    def sure(self) -> Sure:
+    def certainty(self) -> Certainty:
         """Whether it works: all was verified, or not."""
         if self.interrupted:
             return "unsure"
@@ -108,16 +108,16 @@ class Cure:
 @np.errstate(all="ignore")
 def measure(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
     """A stage on machines, with the sampling and delay of the stage `drive` for its margins."""
-    way = WayOut.settled_on("", stage)
+    remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
     timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
     stiffness = proportional_stiffness(flat)
     if flat.get("joint.locked") is False:
         stiffness = in_series(stiffness, flat["joint.stiffness"])
     return Performance(
-        moved(way, ONE, machines, goal),
-        margins(way, ONE, machines, drive),
-        attraction(way, ONE, machines, goal),
+        moved(remedy, ONE, machines, goal),
+        margins(remedy, ONE, machines, drive),
+        attraction(remedy, ONE, machines, goal),
         settled_margin({**flat, **timing}),
         float(stiffness),
     )

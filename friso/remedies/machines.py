@@ -55,19 +55,19 @@ class Fleet:
         )
         return replace(self, ratios=ratios, shifts=shifts, travel=self.travel[numbers])
 
-    def laid_over(self, stage: Stage, changes: Mapping[str, Any], settings: int) -> dict[str, Any]:
-        """Flat keys of all machines with all `settings`, which are arrays of shape (settings,): those of the first on
+    def laid_over(self, stage: Stage, changes: Mapping[str, Any], points: int) -> dict[str, Any]:
+        """Flat keys of all machines with all `points`, which are arrays of shape (points,): those of the first on
         all machines come first. The controller is tuned for the stage and does not know what was drawn."""
         flat = stage.flat()
         tuned = as_tuned(flat)
         for key, value in {**tuned, **changes}.items():
-            flat[key] = np.repeat(np.broadcast_to(value, (settings,)), self.count)
+            flat[key] = np.repeat(np.broadcast_to(value, (points,)), self.count)
         for key, ratio in self._of(flat).items():
-            flat[key] = flat[key] * np.tile(ratio, settings)
+            flat[key] = flat[key] * np.tile(ratio, points)
         for key, shift in self.shifts.items():
-            flat[key] = flat.get(key, 0.0) + np.tile(shift, settings)
+            flat[key] = flat.get(key, 0.0) + np.tile(shift, points)
         key, power = TRAVEL[flat["motion.kind"]]
-        flat[key] = flat[key] * np.tile(self.travel, settings) ** power
+        flat[key] = flat[key] * np.tile(self.travel, points) ** power
         return flat
 
     def _of(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:

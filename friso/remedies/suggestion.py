@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.cure.goal import Goal
-from friso.cure.variables import DAMPING_RATIOS, joint
-from friso.cure.ways import WayOut
 from friso.design_method.isolator import isolated
 from friso.equations.bandwidth import faster
 from friso.equations.breakaway import least_breakaway
@@ -17,6 +14,9 @@ from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.remedies.catalogue import Remedy
+from friso.remedies.goal import Goal
+from friso.remedies.variables import DAMPING_RATIOS, joint
 from friso.stage import Stage
 
 STROKES = (1e-4, 3e-4, 1e-3, 3e-3)
@@ -50,9 +50,9 @@ def suggestion(stage: Stage) -> Suggestion | None:
         free = isolated(stage)
     except InputError:
         return None
-    way, tried = WayOut("", free, joint(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
-    shares = np.array([_shares(way, stroke, damping) for stroke, damping in tried])
-    numbers = way.changes(shares)
+    remedy, tried = Remedy("", free, joint(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
+    shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
+    numbers = remedy.changes(shares)
     flat = {**free.flat(), **numbers}
     attracts = np.zeros(len(tried), bool)
     for factor in (1.0, 1 / Goal.distance):
@@ -60,17 +60,17 @@ def suggestion(stage: Stage) -> Suggestion | None:
         survey = attractors(Ensemble.held(slower, len(tried), form=shared_structure(slower)), cycles=False)
         attracts |= survey.attracts | ~survey.decided
     for number in np.flatnonzero(~attracts):
-        settled = way.tuned(shares[number])
+        settled = remedy.tuned(shares[number])
         margin = settled_margin(settled.flat())
         if margin > 0:
             return Suggestion(settled, True, margin)
-    return Suggestion(way.tuned(shares[-1]), False, 0.0)
+    return Suggestion(remedy.tuned(shares[-1]), False, 0.0)
 
 
-def _shares(way: WayOut, stroke: float, damping: float) -> list[float]:
+def _shares(remedy: Remedy, stroke: float, damping: float) -> list[float]:
     """The shares of the ranges of a joint at which it has a stroke [m] and a damping ratio."""
     wanted = (stroke, FORCE, damping)
     return [
         float(np.log(value / variable.low) / np.log(variable.high / variable.low))
-        for value, variable in zip(wanted, way.variables, strict=True)
+        for value, variable in zip(wanted, remedy.variables, strict=True)
     ]

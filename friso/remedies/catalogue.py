@@ -1,4 +1,4 @@
-"""The ways to cure a stage: what each changes, from the least change to the greatest."""
+"""The remedies that there are: what each changes, from the least change to the greatest."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from friso.cure import variables
-from friso.cure.goal import Goal
-from friso.cure.variables import Variable, bandwidth_factor, of_key
 from friso.design_method.isolator import isolated
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.errors import InputError
+from friso.remedies import variables
+from friso.remedies.goal import Goal
+from friso.remedies.variables import Variable, bandwidth_factor, of_key
 from friso.stage import Stage
 from friso.stage.controllers import FILTERS_KEY, controller_of
 
@@ -32,8 +32,8 @@ WIDTHS, DEPTH = (0.1, 1.5), 0.9
 
 
 @dataclass(frozen=True)
-class WayOut:
-    """A way by its `name`, the stage it begins with, and its variables, which are applied in this order; whether it
+class Remedy:
+    """A remedy by its `name`, the stage it begins with, and its variables, which are applied in this order; whether it
     changes the controller alone, or a joint is needed (`buys_joint`)."""
 
     name: str
@@ -42,7 +42,7 @@ class WayOut:
     buys_joint: bool = False
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
-        """The keys that change at shares of the ranges, (settings, variables), to arrays of shape (settings,)."""
+        """The keys that change at shares of the ranges, (points, variables), to arrays of shape (points,)."""
         flat, changed = self.stage.flat(), dict[str, Any]()
         for variable, share in zip(self.variables, shares.T, strict=True):
             change = variable.change({**flat, **changed}, variable.at(share))
@@ -50,7 +50,7 @@ class WayOut:
         return changed
 
     @classmethod
-    def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> WayOut:
+    def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:
         """A stage as it is, with nothing to vary."""
         return cls(name, stage, (), buys_joint)
 
@@ -59,12 +59,12 @@ class WayOut:
         return self.stage.with_numbers({k: float(f"{v[0]:.4g}") for k, v in self.changes(shares[None]).items()})
 
 
-def ways(stage: Stage, goal: Goal) -> list[WayOut]:
-    """The ways that a goal allows, those that change least first."""
-    listed: list[WayOut] = []
+def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
+    """The remedies that a goal allows, those that change least first."""
+    listed: list[Remedy] = []
     speed = bandwidth_factor(stage, goal.bandwidth_limit)
     if goal.controller:
-        listed += [WayOut("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
+        listed += [Remedy("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
         listed += [*_notch(stage, speed), *_against_friction(stage, goal)]
     if goal.joint and least_breakaway(stage.flat()) > 0:
         listed += _isolators(stage, goal, speed)
@@ -73,13 +73,13 @@ def ways(stage: Stage, goal: Goal) -> list[WayOut]:
 
 def _gains(
     name: str, stage: Stage, speed: Variable, first: tuple[Variable, ...] = (), buys_joint: bool = False
-) -> list[WayOut]:
+) -> list[Remedy]:
     """All gains, where there are more than the bandwidth tells."""
     several = (*first, *variables.gains(stage, speed))
-    return [WayOut(name, stage, several, buys_joint)] if len(several) > 1 else []
+    return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
-def _notch(stage: Stage, speed: Variable) -> Iterator[WayOut]:
+def _notch(stage: Stage, speed: Variable) -> Iterator[Remedy]:
     """A notch at the parasitic mode, with which the bandwidth can be higher."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat:
@@ -93,10 +93,10 @@ def _notch(stage: Stage, speed: Variable) -> Iterator[WayOut]:
         return
     key = f"{FILTERS_KEY}.{len(filters) + 1}.width"
     width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
-    yield WayOut("notch at the parasitic mode, and bandwidth", with_notch, (width, speed))
+    yield Remedy("notch at the parasitic mode, and bandwidth", with_notch, (width, speed))
 
 
-def _against_friction(stage: Stage, goal: Goal) -> Iterator[WayOut]:
+def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
     """Each setting against friction that the stage has not got, by itself."""
     flat = stage.flat()
     law = controller_of(flat)
@@ -117,10 +117,10 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[WayOut]:
         ranges = {f"controller.{key}": (scale * low, scale * high) for key, (scale, (low, high)) in keys.items()}
         if not any(key in flat for key in ranges):
             numbers = {key: float(np.sqrt(low * high)) for key, (low, high) in ranges.items()}
-            yield WayOut(name, stage.with_numbers(numbers), tuple(of_key(key, *ends) for key, ends in ranges.items()))
+            yield Remedy(name, stage.with_numbers(numbers), tuple(of_key(key, *ends) for key, ends in ranges.items()))
 
 
-def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[WayOut]:
+def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Remedy]:
     """An isolator, alone and with the gains; leaf springs of the file give way to a joint stated by its numbers."""
     try:
         free = isolated(stage)
@@ -131,6 +131,6 @@ def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[WayOut]:
         kept = {key: flat[key] for key in flat if key.startswith(("joint.stiffness", "parasitic."))}
         free = free.with_numbers(kept, without=("flexure",))
     joint = variables.joint(float(least_breakaway(flat)))
-    yield WayOut("isolator", free, joint, True)
+    yield Remedy("isolator", free, joint, True)
     if goal.controller:
         yield from _gains("isolator and gains", free, speed, joint, True)

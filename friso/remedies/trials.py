@@ -1,4 +1,4 @@
-"""Settings tried on machines: all of them at once in the engine's lanes."""
+"""Points tried on machines: all of them at once in the engine's lanes."""
 
 from __future__ import annotations
 
@@ -6,9 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.cure.goal import Goal
-from friso.cure.machines import Fleet
-from friso.cure.ways import WayOut
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -18,6 +15,9 @@ from friso.equations.structure import shared_structure
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.verdict import can_hunt
+from friso.remedies.catalogue import Remedy
+from friso.remedies.goal import Goal
+from friso.remedies.machines import Fleet
 from friso.stage import Stage
 from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
@@ -31,7 +31,7 @@ LOOSER = 10.0
 
 @dataclass(frozen=True)
 class Moves:
-    """Moves of settings on machines, all of shape (settings, machines): the time of `settling` [s] within the tolerance
+    """Moves of points on machines, all of shape (points, machines): the time of `settling` [s] within the tolerance
     from the last corner of the reference on, and within the looser one, infinite where the stage is not in position at
     the end; and the largest `force` [N]."""
 
@@ -40,7 +40,7 @@ class Moves:
     force: np.ndarray
 
     def slowest(self, share: float) -> np.ndarray:
-        """The settling time [s] of all but the slowest machines of each setting, shape (settings,)."""
+        """The settling time [s] of all but the slowest machines of each point, shape (points,)."""
         return quantile(self.settling, share)
 
 
@@ -51,11 +51,11 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
-def moved(way: WayOut, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0) -> Moves:
-    """The moves of settings, as shares of the ranges of a way (settings, variables), with a bandwidth lower by a factor
+def moved(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0) -> Moves:
+    """The moves of points, as shares of the ranges of a remedy (points, variables), with a bandwidth lower by a factor
     `slower`."""
     count = len(shares) * machines.count
-    flat = faster(machines.laid_over(way.stage, way.changes(shares), len(shares)), 1 / slower)
+    flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))
     options = RunOptions(rtol=RTOL, bands=(goal.within, LOOSER * goal.within), record_from=np.inf)
     corner = np.broadcast_to(last_corner(flat), (count,))
@@ -72,19 +72,19 @@ def moved(way: WayOut, shares: np.ndarray, machines: Fleet, goal: Goal, slower: 
 
 
 @np.errstate(all="ignore")
-def margins(way: WayOut, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
-    """The least modulus margin of the limit cases (0: not stable), shape (settings, machines), with the sampling and
+def margins(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
+    """The least modulus margin of the limit cases (0: not stable), shape (points, machines), with the sampling and
     delay of the stage `drive`."""
     timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
-    flat = {**machines.laid_over(way.stage, way.changes(shares), len(shares)), **timing}
+    flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing}
     count = len(shares) * machines.count
-    return linear_loops(way.stage, linear_flat(drive, flat), count).margin.reshape(len(shares), machines.count)
+    return linear_loops(remedy.stage, linear_flat(drive, flat), count).margin.reshape(len(shares), machines.count)
 
 
 @dataclass(frozen=True)
 class Attraction:
     """Whether anything hunting attracts machines at their bandwidth or down to the distance below it (`attracts`), and
-    whether simulations decided that, both of shape (settings, machines)."""
+    whether simulations decided that, both of shape (points, machines)."""
 
     attracts: np.ndarray
     decided: np.ndarray
@@ -96,10 +96,10 @@ class Attraction:
 
 
 @np.errstate(all="ignore")
-def attraction(way: WayOut, shares: np.ndarray, machines: Fleet, goal: Goal) -> Attraction:
-    """What attracts the machines with settings, at the bandwidth and below it by the distance of the goal, by
+def attraction(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal) -> Attraction:
+    """What attracts the machines with points, at the bandwidth and below it by the distance of the goal, by
     simulations from many starts; closed orbits have to confirm it for the answer."""
-    flat = machines.laid_over(way.stage, way.changes(shares), len(shares))
+    flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count
     if not can_hunt(flat):
         return Attraction(np.zeros(shape, bool), np.ones(shape, bool))
