@@ -20,7 +20,7 @@ from scipy.stats import qmc
 from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
 from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet, drawn
+from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import tune
 from friso.remedies.search import Budget, Search
 from friso.remedies.verified import RemedyOutcome, measure
@@ -147,8 +147,8 @@ def main() -> None:
         begun = perf_counter()
         advice = tune(stage, goal, chosen=options.ways)
         seconds = perf_counter() - begun
-        machines = drawn(stage, Correlations(), Budget().machines, advice.seed)
-        fresh = drawn(stage, Correlations(), options.fresh, 77)
+        machines = draw_fleet(stage, Correlations(), Budget().machines, advice.seed)
+        fresh = draw_fleet(stage, Correlations(), options.fresh, 77)
         for outcome in advice.outcomes:
             if outcome.certainty != "works" or outcome.stage is None:
                 rows.append((name, outcome.remedy.name, outcome.certainty, *[""] * 4, f"{seconds:.0f} s"))

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from friso.engine import simd_math
 from friso.engine.arrays import Results, Status, Tables
-from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
+from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, KernelRequest, empty_results, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
@@ -74,7 +74,7 @@ def run(
     batch = prepare(shape, flat, runs, chosen)._replace(tables=tables)
     assert chosen.interval is not None
     results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, len(shape.full_state))
-    run_batch(shape, batch, settings_of(chosen), results, threads)
+    run_batch(shape, batch, options_of(chosen), results, threads)
     return shape, results
 
 

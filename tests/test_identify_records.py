@@ -20,9 +20,9 @@ from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Identification, identify
 from friso.identification.moves import IdentifiedMoves
-from friso.identification.output_error.answers import estimates_of
 from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.identifiable import Identified
+from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import LINEARITY, record
 from friso.identification.sources import named, read_all
 from friso.views.identify.document import identify_document

@@ -23,7 +23,7 @@ from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
 from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.goal import Goal
-from friso.remedies.machines import Fleet, drawn
+from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import Advice, tune
 from friso.remedies.relax import relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
@@ -70,7 +70,7 @@ def tuning(rigid: Stage, goal: Goal) -> Advice:
 
 @pytest.fixture(scope="module")
 def machines(rigid: Stage) -> Fleet:
-    return drawn(rigid, Correlations(), 5, 1)
+    return draw_fleet(rigid, Correlations(), 5, 1)
 
 
 def test_the_first_machine_is_that_of_the_file(rigid: Stage, machines: Fleet) -> None:
@@ -89,7 +89,7 @@ def test_settings_are_laid_over_machines_one_after_the_other(rigid: Stage, machi
 def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> None:
     gone = dict.fromkeys(("masses.cart", "controller.tuned_mass"))
     whole = rigid.replace({**gone, "masses.stage": "2 kg"})
-    machines, free = drawn(whole, Correlations(), 4, 1), isolated(whole)
+    machines, free = draw_fleet(whole, Correlations(), 4, 1), isolated(whole)
     flat = machines.laid_over(free, {}, 1)
     np.testing.assert_allclose(
         flat["masses.cart"] + flat["masses.stage"], machines.laid_over(whole, {}, 1)["masses.stage"]

@@ -33,7 +33,7 @@ class ExportAnswer(Answer):
 
     def blocks(self) -> Sequence[str]:
         """The loop drawn, and the parameters of a drive."""
-        return [text for text in (self.result.drawing, self.result.text) if text]
+        return [text for text in (self.result.diagram, self.result.text) if text]
 
     def tables(self) -> Sequence[AnswerTable]:
         """Each gain with its symbol and its values."""

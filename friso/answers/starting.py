@@ -143,10 +143,10 @@ def _start(
         return files("friso").joinpath("templates/stage.toml").read_text(encoding="utf-8")
     from friso.drives.read import stage_from
 
-    drawn = stage_from(Path(source), axis, values)
-    for sentence in drawn.left_out:
+    stage_of_axis = stage_from(Path(source), axis, values)
+    for sentence in stage_of_axis.left_out:
         LOGGER.warning(f"left out: {sentence}")
-    return drawn.text()
+    return stage_of_axis.text()
 
 
 def schema(of: str = "stage") -> dict[str, Any]:

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, text_of, whole_number, wrong
 from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
+from friso.remedies import Changeable
 from friso.remedies.goal import Goal
 from friso.stage import Stage
 
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
     from friso.views.files import Files
 
 MOST_SEED = 2**31 - 1
-
-Part = Literal["controller", "joint"]
 
 
 class TuneAnswer(Answer):
@@ -90,8 +89,8 @@ def tune(
     settle: float | str | None = None,
     force_limit: float | str | None = None,
     bandwidth_limit: float | str | None = None,
-    only: Part | None = None,
-    keep: Part | None = None,
+    only: Changeable | None = None,
+    keep: Changeable | None = None,
     seed: int = 1,
     set: Changes = None,
     progress: Progress = silent,
@@ -149,8 +148,8 @@ def _goal(
     settle: float | str | None,
     force_limit: float | str | None,
     bandwidth_limit: float | str | None,
-    only: Part | None,
-    keep: Part | None,
+    only: Changeable | None,
+    keep: Changeable | None,
 ) -> Goal:
     """The goal of the options. Raises InputError."""
     if only is not None and only == keep:

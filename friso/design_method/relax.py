@@ -109,7 +109,7 @@ class _Trials:
 
 def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
-    of_sheets = np.array([requirement.ways[0].key == "leaves.thickness" for requirement in needs])
+    of_sheets = np.array([requirement.keys[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))
     spare = np.where(of_sheets, 0.0, SPARE)  # what may be bought is met exactly
 
@@ -125,7 +125,9 @@ def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxat
     if minimum.fun >= UNMET:
         return
     (sizes,), (sheet,) = trials.built(minimum.x[:, None])
-    for remedy in needs[k].ways:
-        needed = remedy.needed(MORE * float(np.exp(max(minimum.fun, 0.0))))
-        if needed is not None and not np.isclose(needed, remedy.value, rtol=1e-6):
-            yield Relaxation(needs[k].name, remedy.key, remedy.value, needed, remedy.unit, Geometry.of(sizes, sheet))
+    for relaxable in needs[k].keys:
+        needed = relaxable.needed(MORE * float(np.exp(max(minimum.fun, 0.0))))
+        if needed is not None and not np.isclose(needed, relaxable.value, rtol=1e-6):
+            yield Relaxation(
+                needs[k].name, relaxable.key, relaxable.value, needed, relaxable.unit, Geometry.of(sizes, sheet)
+            )

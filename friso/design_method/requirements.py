@@ -39,8 +39,8 @@ class LeafTask:
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way to relax a requirement: the `key` of the specification, its `value` there and `unit`, and to what it has to
+class RelaxableKey:
+    """What relaxes a requirement: the `key` of the specification, its `value` there and `unit`, and to what it has to
     be changed for a geometry that breaks the requirement by a factor (None: no change of it is enough)."""
 
     key: str
@@ -51,26 +51,26 @@ class Way:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A requirement in words, the ways to relax it, and by what factor geometries break it: 1 where they just do."""
+    """A requirement in words, the keys that relax it, and by what factor geometries break it: 1 where they just do."""
 
     name: str
-    ways: tuple[Way, ...]
+    keys: tuple[RelaxableKey, ...]
     excess: Callable[[Mechanism], Any]
 
 
-def more(key: str, value: float, unit: str) -> Way:
+def more(key: str, value: float, unit: str) -> RelaxableKey:
     """To be relaxed by making it larger."""
-    return Way(key, value, unit, lambda excess: value * excess)
+    return RelaxableKey(key, value, unit, lambda excess: value * excess)
 
 
-def less(key: str, value: float, unit: str) -> Way:
+def less(key: str, value: float, unit: str) -> RelaxableKey:
     """To be relaxed by making it smaller."""
-    return Way(key, value, unit, lambda excess: value / excess)
+    return RelaxableKey(key, value, unit, lambda excess: value / excess)
 
 
-def factor(key: str, value: float) -> Way:
+def factor(key: str, value: float) -> RelaxableKey:
     """A factor of safety, which cannot be smaller than 1."""
-    return Way(key, value, "", lambda excess: value / excess if value >= excess else None)
+    return RelaxableKey(key, value, "", lambda excess: value / excess if value >= excess else None)
 
 
 BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first interfering frequency"
@@ -117,7 +117,7 @@ def requirements(task: LeafTask) -> list[Requirement]:
     ]
 
 
-def _lighter(task: LeafTask) -> tuple[Way, ...]:
+def _lighter(task: LeafTask) -> tuple[RelaxableKey, ...]:
     """A smaller load along the leaves, if that is all there is; the weight of the stage stays."""
     load = task.spec.load
     force = float(load.force_x)
@@ -128,7 +128,7 @@ def _lighter(task: LeafTask) -> tuple[Way, ...]:
         left = task.load / excess - (task.load - force)
         return left if left >= 0 else None
 
-    return (Way("load.force_x", force, "N", needed),)
+    return (RelaxableKey("load.force_x", force, "N", needed),)
 
 
 def _support(spec: Spec, stroke: float) -> list[Requirement]:

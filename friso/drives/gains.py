@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from friso.drives.conversions import MOTOR_CONSTANT, TRAVEL, Conversion, conversions
-from friso.drives.drawing import drawing
+from friso.drives.diagram import loop_diagram
 from friso.drives.format import FORMATS, ParameterFormat
 from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError
@@ -22,11 +22,11 @@ class Gains:
     none), its parameters by name, and the keys of the stage that these have no place for."""
 
     stage: Stage
-    drawing: str
+    diagram: str
     conversions: tuple[Conversion, ...]
     kind: ParameterFormat | None = None
     parameters: Mapping[str, float] | None = None
-    lost: tuple[str, ...] = ()
+    not_held: tuple[str, ...] = ()
 
     @property
     def text(self) -> str:
@@ -47,13 +47,13 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
         if key not in askable:
             raise InputError("--set", quoted(key), f"a key of the stage, or one of {', '.join(sorted(askable))}")
     if kind is None:
-        return Gains(stage, drawing(flat), conversions(flat, answers))
+        return Gains(stage, loop_diagram(flat), conversions(flat, answers))
     refuse_open(kind.questions_back(flat, answers), f"--to {to}")
     back = kind.parameters(flat, answers)
-    return Gains(stage, drawing(flat), conversions(flat, answers), kind, back.values, _lost(flat, back.held))
+    return Gains(stage, loop_diagram(flat), conversions(flat, answers), kind, back.values, _not_held(flat, back.held))
 
 
-def _lost(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
+def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
     """Keys of [controller] that parameters have no place for: a filter once, and nothing that is 0 or a mere choice."""
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]

@@ -18,7 +18,7 @@ class OpenQuestion:
     """What is asked for: its key, what it is, and an example of an answer as --set takes it."""
 
     key: str
-    what: str
+    meaning: str
     example: str
 
     @property
@@ -43,10 +43,10 @@ class UserAnswers:
         except InputError as error:
             raise error.under(key) from None
 
-    def choice(self, key: str, of: tuple[str, ...]) -> str:
+    def choice(self, key: str, choices: tuple[str, ...]) -> str:
         """One of some texts. Raises InputError for another answer."""
-        if (text := str(self.texts[key])) not in of:
-            raise InputError(key, quoted(text), f"one of {', '.join(of)}", f"--set {key}={of[0]}")
+        if (text := str(self.texts[key])) not in choices:
+            raise InputError(key, quoted(text), f"one of {', '.join(choices)}", f"--set {key}={choices[0]}")
         return text
 
     def kind_of(self, key: str, fields: Mapping[AxisKind, Quantity]) -> tuple[AxisKind, float]:
@@ -72,10 +72,10 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
         raise InputError("friction.model", quoted(model), f"one of {', '.join(sorted(FRICTION.classes))}")
     law: type[Section] = friction_law(model)
     names = [name for name in numeric_fields(law) if law.model_fields[name].is_required()]
-    what = dict.fromkeys(
+    meaning = dict.fromkeys(
         names, "friction of the guide" + ("; or --set friction.model=none" if model == "lugre" else "")
     )
-    asked += _of_table("friction", law, names, what, kind)
+    asked += _of_table("friction", law, names, meaning, kind)
     if not moved and "motion.kind" not in answers:
         names = ["acceleration", "acceleration_time"]
         asked += _of_table("motion", ThereAndBack, names, dict.fromkeys(names, "of the move to try"), kind)
@@ -83,17 +83,22 @@ def of_the_machine(answers: UserAnswers, kind: AxisKind = LINEAR, moved: bool = 
 
 
 def _of_table(
-    table: str, section: type[Section], names: Iterable[str], what: Mapping[str, str], kind: AxisKind
+    table: str, section: type[Section], names: Iterable[str], meaning: Mapping[str, str], kind: AxisKind
 ) -> list[OpenQuestion]:
     fields = {name: field.on(kind) for name, field in numeric_fields(section).items()}
-    return [OpenQuestion(f"{table}.{name}", what[name], fields[name].written_example) for name in names]
+    return [OpenQuestion(f"{table}.{name}", meaning[name], fields[name].written_example) for name in names]
 
 
 def refuse_open(questions: Iterable[OpenQuestion], origin: str) -> None:
     """Raises InputError with all that is open, in one list."""
     asked = list(questions)
     if asked:
-        things = f"{len(asked)} things are" if len(asked) > 1 else "one thing is"
+        values = f"{len(asked)} values are" if len(asked) > 1 else "one value is"
         width = max(len(question.option) for question in asked)
-        lines = [f"{question.option:<{width}}  {question.what}" for question in asked]
-        raise InputError("", f"{things} not known", "\n            ".join(["each of them:", *lines]), origin=origin)
+        lines = [f"{question.option:<{width}}  {question.meaning}" for question in asked]
+        raise InputError(
+            "",
+            f"{values} missing",
+            "\n            ".join(["set all of these:" if len(asked) > 1 else "set:", *lines]),
+            origin=origin,
+        )

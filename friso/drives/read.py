@@ -17,7 +17,7 @@ from friso.stage.files import text_of
 
 
 @dataclass(frozen=True)
-class Drawn:
+class StageOfAxis:
     """A stage from a parameter file: the file, its kind, the name of the axis in it, and what the stage leaves out."""
 
     stage: Stage
@@ -33,7 +33,7 @@ class Drawn:
         return "\n".join([*(f"# {one_line(sentence)}" for sentence in sentences), self.stage.to_toml()])
 
 
-def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) -> Drawn:
+def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) -> StageOfAxis:
     """The stage of an axis in a parameter file, with what the user says of all that is not in it. Raises InputError for
     what cannot be read, and for all that is still open together."""
     kind, axes = read(path)
@@ -42,11 +42,11 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
         answers = UserAnswers(user_answers)
         asked = kind.questions(chosen, answers)
         refuse_open(asked, f"{path}, {chosen.name}")
-        drawn = kind.stage(chosen, answers)
-        stage = _with_answers(drawn, kind, chosen, path, user_answers)
+        of_axis = kind.stage(chosen, answers)
+        stage = _with_answers(of_axis, kind, chosen, path, user_answers)
     except InputError as error:
         raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None
-    return Drawn(stage, path, kind, chosen.name, drawn.left_out)
+    return StageOfAxis(stage, path, kind, chosen.name, of_axis.left_out)
 
 
 def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
@@ -77,15 +77,15 @@ def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> A
 
 
 def _with_answers(
-    drawn: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
+    of_axis: AsStage, kind: ParameterFormat, axis: AxisParameters, path: Path, user_answers: Mapping[str, Any]
 ) -> Stage:
     """The stage of the tables with the answers laid over them: those with a dot are keys of the stage."""
     source = (
         f"Controller: {path.name}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "
-        "machine: as told to friso init"
+        "machine: as given to friso init"
     )
     tables: dict[str, Any] = {"name": f"{path.stem}, {axis.name}", "source": source}
-    tables |= {name: dict(table) for name, table in drawn.tables.items()}
+    tables |= {name: dict(table) for name, table in of_axis.tables.items()}
     for key, value in user_answers.items():
         table, dot, name = key.partition(".")
         if dot:

@@ -181,16 +181,16 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
     """Run a batch; where there is an allowance, in no more steps than it has left for each run."""
     allowance, states = current_allowance(), len(kernel.full_state)
     if allowance is None:
-        run_batch(kernel, batch, settings_of(options), results, options.threads)
+        run_batch(kernel, batch, options_of(options), results, options.threads)
         return
     budget = int(min(options.budget, allowance.most_steps(len(batch.starts), states)))
-    run_batch(kernel, batch, settings_of(replace(options, budget=budget)), results, options.threads)
+    run_batch(kernel, batch, options_of(replace(options, budget=budget)), results, options.threads)
     allowance.charge(results.statistics[:, STATISTICS.index("attempted")], states)
     if budget < options.budget and np.any(results.statuses == Status.BUDGET):
         allowance.exhaust()
 
 
-def settings_of(options: RunOptions) -> Settings:
+def options_of(options: RunOptions) -> Settings:
     """The options as the kernel takes them."""
     return Settings(
         rtol=float(options.rtol),

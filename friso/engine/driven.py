@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
+from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results
 
 BUDGET = 200
@@ -64,7 +64,7 @@ def follow(
         rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count
     )
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
-    settings = settings_of(replace(options, interval=inputs.sample_time))
+    settings = options_of(replace(options, interval=inputs.sample_time))
     for first in range(0, runs, CHUNK):
         numbers = np.arange(first, min(first + CHUNK, runs))
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])

@@ -181,7 +181,7 @@ class KernelRequest:
         """The classes of the stage file's sections that declare equations of their own."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
         controller = form.controller if isinstance(form, Structure) else None
-        return (friction_law(form.friction), *((controller.law,) if controller else ()))
+        return (friction_law(form.friction), *((controller.section,) if controller else ()))
 
     @property
     def title(self) -> str:

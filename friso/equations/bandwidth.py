@@ -30,8 +30,8 @@ def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
 
 def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
     """The keys that change in a controller that is faster by a factor, to their new values."""
-    law = controller_of(flat)
-    powers = {law.key(name): power for name, power in law.speeds_up.items()}
+    controller = controller_of(flat)
+    powers = {controller.key(name): power for name, power in controller.speeds_up.items()}
     return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
 
 
@@ -47,5 +47,5 @@ class _Numbers:
 
 def proportional_stiffness(flat: Mapping[str, Any]) -> float:
     """The proportional stiffness of the loop of a stage given as flat keys [N/m]."""
-    law = controller_of(flat)
-    return float(law.stiffness(_Numbers(flat), law.variant(flat)))
+    controller = controller_of(flat)
+    return float(controller.stiffness(_Numbers(flat), controller.variant(flat)))

@@ -213,7 +213,7 @@ class Blocks(ABC):
         for number, part in enumerate(self.form.filters if self.form else (), start=1):
             if part.path == path:
                 row = _Row(f"{FILTERS_KEY}.{number}")
-                upper, lower = part.law.transfer(row, part.variant)
+                upper, lower = part.section.transfer(row, part.variant)
                 signal = self.transfer(signal, upper, lower, f"filter_{number}")
         return signal
 
@@ -254,13 +254,13 @@ class Demand:
 def demanded(form: ControllerForm, seen: Measured, blocks: Blocks) -> Demand:
     """What a controller demands for what it measures."""
     error, settings = seen.error, form.settings
-    if form.law.feeds_back == "position":
+    if form.section.feeds_back == "position":
         position = blocks.fed_back(seen.position)
         rated = position if seen.rated is seen.position else seen.rated
         seen = replace(seen, position=position, rated=rated, error=seen.error + seen.position - position)
     if settings.dead_zone:
         seen = replace(seen, error=blocks.dead_zone(seen.error))
-    shares = form.law.declare(seen, blocks, form.variant)
+    shares = form.section.declare(seen, blocks, form.variant)
     total = sum(shares.values(), start=Blocks.nothing)
     added = total
     if settings.gains:

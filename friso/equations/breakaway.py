@@ -64,7 +64,7 @@ def _slow(flat: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     force = _steady_of(flat["friction.model"], _variant(flat))
     if force is None:
         return np.zeros(()), np.zeros(())
-    forward, back = (np.abs(force({**flat, "velocity": way * SLOW})) for way in (1.0, -1.0))
+    forward, back = (np.abs(force({**flat, "velocity": sign * SLOW})) for sign in (1.0, -1.0))
     return forward, back
 
 

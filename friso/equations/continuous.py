@@ -41,7 +41,7 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
     outputs = {"force": Output(force, "N", "actuator force")}
     outputs |= {
         f"force_{term}": Output(demand.shares[term].value, "N", f"{name} share")
-        for term, name in form.law.shares.items()
+        for term, name in form.section.shares.items()
         if term in demand.shares
     }
     states, resting = blocks.finished(demand, bound)

@@ -174,7 +174,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
 
 def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
     """Proportional stiffness of the loop [N/m]; 0 without a controller."""
-    return form.law.stiffness(Continuous(sp.S.One), form.variant) if form else sp.S.Zero
+    return form.section.stiffness(Continuous(sp.S.One), form.variant) if form else sp.S.Zero
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,7 @@ class ControllerForm:
     loops: tuple[str, ...] = ()
 
     @property
-    def law(self) -> type[ControllerSection]:
+    def section(self) -> type[ControllerSection]:
         """The class that declares its blocks."""
         return CONTROLLERS.form(self.kind, self.form)
 
@@ -136,12 +136,12 @@ def _transmission_form(flat: Mapping[str, Any]) -> TransmissionForm:
 
 def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
     """The form of the controller of a stage given as flat mapping."""
-    law = controller_of(flat)
+    controller = controller_of(flat)
     return ControllerForm(
         kind=flat[KIND],
-        form=law.__name__,
-        variant=law.variant(flat),
-        integral=law.integrates(flat),
+        form=controller.__name__,
+        variant=controller.variant(flat),
+        integral=controller.integrates(flat),
         anti_windup=flat.get(ANTI_WINDUP, DEFAULT_ANTI_WINDUP) if FORCE_LIMIT in flat else None,
         filters=filter_forms(flat, FILTERS_KEY),
         settings=settings_of(flat),

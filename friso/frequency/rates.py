@@ -58,9 +58,9 @@ class Lifted:
     def locus(self, turn: np.ndarray) -> Complex:
         """The characteristic locus that is the loop at that frequency, shape (members, k): the eigenvalue that is
         closest to the fundamental."""
-        every = np.linalg.eigvals(self.at(np.exp(1j * turn * self.d.shape[-1])))
-        near = np.abs(every - self.fundamental(turn)[..., None]).argmin(axis=-1)
-        return np.take_along_axis(every, near[..., None], axis=-1)[..., 0].astype(complex)
+        eigenvalues = np.linalg.eigvals(self.at(np.exp(1j * turn * self.d.shape[-1])))
+        near = np.abs(eigenvalues - self.fundamental(turn)[..., None]).argmin(axis=-1)
+        return np.take_along_axis(eigenvalues, near[..., None], axis=-1)[..., 0].astype(complex)
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:

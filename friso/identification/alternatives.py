@@ -45,9 +45,9 @@ class Alternative:
 def alternatives(log: Log, inverse: InverseModel, cart_share: float) -> list[Alternative]:
     """Those that fit much better than the inverse model, the best first; none that leaves half as much again."""
     candidates = [*_timing(log, inverse, cart_share), *_with_columns(log, inverse, cart_share)]
-    candidates = [one for one in candidates if one.model.error < BETTER * inverse.error]
-    candidates.sort(key=lambda one: one.model.error)
-    return [one for one in candidates if one.model.error <= RIVAL * candidates[0].model.error]
+    candidates = [candidate for candidate in candidates if candidate.model.error < BETTER * inverse.error]
+    candidates.sort(key=lambda candidate: candidate.model.error)
+    return [candidate for candidate in candidates if candidate.model.error <= RIVAL * candidates[0].model.error]
 
 
 def _timing(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alternative]:
@@ -61,11 +61,11 @@ def _timing(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alte
         return min(fits, key=lambda choice: fits[choice].error)
 
     period = 1 / (inverse.bandwidth * log.sample_time)
-    lag, _ = best((way * lag, 1) for lag in _doubling(LATEST * period) for way in (1, -1))
+    lag, _ = best((sign * lag, 1) for lag in _doubling(LATEST * period) for sign in (1, -1))
     lag, _ = plain = best((lag + more, 1) for more in (-abs(lag) // 4, abs(lag) // 4) if more)
-    _, width = best((lag, way * (2 * half + 1)) for half in _doubling(LONGEST * period / 2) for way in (1, -1))
+    _, width = best((lag, sign * (2 * half + 1)) for half in _doubling(LONGEST * period / 2) for sign in (1, -1))
     wider = abs(width) // 2 | 1
-    lag, width = best((lag, (1 if width > 0 else -1) * (abs(width) + way * (wider - 1))) for way in (-1, 1))
+    lag, width = best((lag, (1 if width > 0 else -1) * (abs(width) + sign * (wider - 1))) for sign in (-1, 1))
     lag, width = filtered = best((lag + more, width) for more in (-max(abs(lag) // 4, 1), max(abs(lag) // 4, 1)))
     believed = fits[filtered].error < BETTER * min(fits[plain].error, _alike(log, inverse, cart_share, *filtered))
     choice = filtered if believed else plain

@@ -127,8 +127,8 @@ def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
 def directions(position: np.ndarray) -> tuple[bool, bool]:
     """Whether a motion, shape (n,) [m], goes forward, and whether it goes back."""
     steps = np.diff(position)
-    ways = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
-    forward, back = ways > ONE_WAY * ways.sum()
+    travelled = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
+    forward, back = travelled > ONE_WAY * travelled.sum()
     return bool(forward), bool(back)
 
 

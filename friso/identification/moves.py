@@ -16,13 +16,13 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.model_error import all_with_model_error, not_described, of_inverse_model, with_causes
-from friso.identification.output_error.answers import estimates_of
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
 from friso.identification.output_error.parameters import MASS, is_free, keys_of, parameters_of
 from friso.identification.output_error.problem import Problem, Simulated, closed_loop, tracking
 from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, noise_of
 from friso.progress import Progress, silent
 from friso.stage.controllers import CONTROLLER

@@ -80,7 +80,7 @@ def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) 
     force; each of shape (n,)."""
     from friso.frequency.friction import steady_force  # brings SymPy along
 
-    forward, backward = (steady_force(flat, speed, way) for way in (True, False))
+    forward, backward = (steady_force(flat, speed, forwards) for forwards in (True, False))
     constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
     return forward * (1 + sign) / 2 - backward * (1 - sign) / 2 - constant
 

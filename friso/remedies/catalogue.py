@@ -99,11 +99,11 @@ def _notch(stage: Stage, speed: Variable) -> Iterator[Remedy]:
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
     """Each setting against friction that the stage has not got, by itself."""
     flat = stage.flat()
-    law = controller_of(flat)
+    controller = controller_of(flat)
     friction, within = float(breakaway(flat)), goal.within
-    if not law.integrates(flat) or friction <= 0:
+    if not controller.integrates(flat) or friction <= 0:
         return
-    hertz = flat[law.bandwidth_key] if law.bandwidth_key else 1.0
+    hertz = flat[controller.bandwidth_key] if controller.bandwidth_key else 1.0
     scales = {
         "integral limit": {"integral_limit": (friction, LIMITS)},
         "leak of the integral": {"integral_leak": (hertz, LEAKS)},

@@ -80,7 +80,7 @@ class Fleet:
         return ratios
 
 
-def drawn(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
+def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
     """Machines drawn as `friso compare` draws them; the first is that of the stage file, with its own move. Joints that
     the file does not have vary by the default spreads. Raises InputError."""
     sample, flat = draw_machines(stage, correlations, max(count, LEAST), seed), stage.flat()

@@ -16,7 +16,7 @@ from friso.hunting.check import Case
 from friso.progress import Progress, silent
 from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.goal import Goal
-from friso.remedies.machines import TRAVEL, Fleet, drawn
+from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
@@ -89,8 +89,8 @@ def tune(
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + 2)
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
-    fresh = drawn(ideal, correlations, budget.fresh, seed + FRESH)
-    machines = drawn(ideal, correlations, budget.machines, seed)
+    fresh = draw_fleet(ideal, correlations, budget.fresh, seed + FRESH)
+    machines = draw_fleet(ideal, correlations, budget.machines, seed)
     report("the stage as it is")
     case, present = verified(ideal), measure(ideal, fresh, goal, stage)
     outcomes: list[RemedyOutcome] = []

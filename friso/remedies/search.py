@@ -135,14 +135,14 @@ class Search:
         goal, count = self.goal, len(shares)
         few = self.machines.take(np.arange(min(6, self.machines.count)))
         margin = quantile(-margins(self.remedy, shares, few, self.drive), goal.share) * -1
-        on = np.flatnonzero(margin > goal.margin / 2)
+        stable = np.flatnonzero(margin > goal.margin / 2)
         columns = [np.full(count, np.inf) for _ in range(4)]
-        if on.size:
-            here: Moves = moved(self.remedy, shares[on], self.machines, goal)
-            below: Moves = moved(self.remedy, shares[on], self.machines, goal, slower=goal.distance)
-            values = (here.settling, here.looser, below.looser, here.force)
+        if stable.size:
+            moves: Moves = moved(self.remedy, shares[stable], self.machines, goal)
+            slower_moves: Moves = moved(self.remedy, shares[stable], self.machines, goal, slower=goal.distance)
+            values = (moves.settling, moves.looser, slower_moves.looser, moves.force)
             for column, value in zip(columns, values, strict=True):
-                column[on] = quantile(value, goal.share)
+                column[stable] = quantile(value, goal.share)
         settling, looser, slower, force = columns
         return TriedPoints(shares, settling, looser, slower, force, margin)
 

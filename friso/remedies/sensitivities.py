@@ -273,8 +273,8 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
     if not loops.stable.all():
         return None
     worst: Members = members[loops.worst()]
-    here = margins(flat, worst)
-    omega = np.array([2 * np.pi * here.closest])
+    closest = margins(flat, worst)
+    omega = np.array([2 * np.pi * closest.closest])
 
     def distance(changes: Mapping[str, float]) -> float:
         nearby = {**flat, **changes}
@@ -285,4 +285,4 @@ def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivati
         / (2 * SMALL * flat[name])
         for name in keys
     ]
-    return MarginDerivatives(here.modulus_margin, np.array(by))
+    return MarginDerivatives(closest.modulus_margin, np.array(by))

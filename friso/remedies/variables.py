@@ -76,9 +76,9 @@ def crossover(stage: Stage) -> float:
 
 def gains(stage: Stage, bandwidth: Variable) -> tuple[Variable, ...]:
     """The gains of a controller against each other, then its bandwidth."""
-    flat, law = stage.flat(), controller_of(stage.flat())
-    shape = [of_key(law.key(name), low, high) for name, (low, high) in law.shaped_by.items()]
-    keys = [law.key(name) for name in law.speeds_up if flat.get(law.key(name))]
+    flat, controller = stage.flat(), controller_of(stage.flat())
+    shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
+    keys = [controller.key(name) for name in controller.speeds_up if flat.get(controller.key(name))]
     against = [of_key(key, flat[key] / WIDE, flat[key] * WIDE) for key in keys[1:]]
     return (*shape, *against, bandwidth)
 

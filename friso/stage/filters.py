@@ -192,7 +192,7 @@ class FilterForm(NamedTuple):
     variant: Hashable
 
     @property
-    def law(self) -> type[FilterSection]:
+    def section(self) -> type[FilterSection]:
         """The class that declares its transfer function."""
         return FILTERS.classes[self.kind]  # type: ignore[return-value]
 

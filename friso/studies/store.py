@@ -20,8 +20,8 @@ import numpy as np
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
-from friso.studies.answers import Answers
 from friso.studies.cells import UNITS, WORDS, attributes_of
+from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.store_folder import exchange, locked, make, remove_leftovers, remove_partial_files
@@ -156,9 +156,9 @@ class Store:
         self.ledger.enter(self._number(block))
 
     @property
-    def answers(self) -> Answers:
+    def answers(self) -> KeptCells:
         """What a refined study keeps until it is done."""
-        return Answers(self.path / ".answers")
+        return KeptCells(self.path / ".answers")
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
         """Add attributes to the study."""

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
+from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import COMMANDED, LEVELS, NEUTRAL, READING, AsBuilt, whole_samples
 from friso.equations.roles import Role, Steady
@@ -143,7 +143,7 @@ def _recorded(
         tables=tables(flat, stage.floor, task, [int(seed) for seed in seeds]),
     )
     results = empty_results(len(seeds), 1, count, len(shape.full_state))
-    run_batch(shape, batch, settings_of(options), results, threads)
+    run_batch(shape, batch, options_of(options), results, threads)
     return Recorded(numbers, interval, *_signals(shape, results.samples, flat, task, seeds, interval), results.statuses)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -10,6 +10,7 @@ from friso.cli.asking import Details, ask
 from friso.cli.command import STOPS, Command
 from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
+from friso.remedies import Changeable
 
 Within = Annotated[
     str | None,
@@ -28,9 +29,8 @@ BandwidthLimit = Annotated[
         "--bandwidth-limit", metavar="FREQUENCY", help="Bandwidth that modes not in the stage file allow at most."
     ),
 ]
-Part = Literal["controller", "joint"]
-Only = Annotated[Part | None, typer.Option("--only", help="What alone may be changed.")]
-Keep = Annotated[Part | None, typer.Option("--keep", help="What may not be changed.")]
+Only = Annotated[Changeable | None, typer.Option("--only", help="What alone may be changed.")]
+Keep = Annotated[Changeable | None, typer.Option("--keep", help="What may not be changed.")]
 Seed = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
 ]

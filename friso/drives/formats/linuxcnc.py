@@ -38,7 +38,7 @@ ROTARY = KINDS["rotary"]
 NOT_CARRIED = {
     "FF0": "FF0 = {:g}, a force in proportion to the commanded position",
     "FF3": "FF3 = {:g}, of the commanded jerk",
-    "BIAS": "BIAS = {:g}, a constant output: friso takes what it balances as balanced",
+    "BIAS": "BIAS = {:g}, a constant output: friso assumes that it balances a constant load",
     "MAX_ERROR": "MAX_ERROR = {:g}, beyond which the error counts no further",
     "MAX_ERROR_D": "MAX_ERROR_D = {:g}, the limit of the error's derivative",
 }
@@ -87,7 +87,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
 def _sections(text: str) -> dict[str, dict[str, str]]:
     """Variables by section, the first of a name, as LinuxCNC takes them. Raises InputError."""
     sections: dict[str, dict[str, str]] = {}
-    here: dict[str, str] = {}
+    section: dict[str, str] = {}
     lines = text.splitlines()
     if len(lines) > MOST_LINES:
         raise InputError("", f"{len(lines)} lines", f"at most {MOST_LINES}")
@@ -95,11 +95,11 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
         if not line or line[0] in "#;":
             continue
         if line.startswith("["):
-            here = sections.setdefault(line.strip("[]").strip(), {})
+            section = sections.setdefault(line.strip("[]").strip(), {})
             continue
         key, equals, value = line.partition("=")
         if equals:
-            here.setdefault(key.strip(), value.strip())
+            section.setdefault(key.strip(), value.strip())
     return sections
 
 
@@ -115,13 +115,13 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
     if "SERVO_PERIOD" not in axis.machine and "drive.sample_time" not in answers:
         asked.append(OpenQuestion("drive.sample_time", "period of the servo thread", '"1 ms"'))
     if "controller.kp" in answers and FORCE not in answers and VELOCITY not in answers and not _unity(axis):
-        what = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
-        asked.append(OpenQuestion(VELOCITY, what, VELOCITY_FIELD.on(kind).written_example))
+        meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
+        asked.append(OpenQuestion(VELOCITY, meaning, VELOCITY_FIELD.on(kind).written_example))
     if FORCE not in answers and "controller.kp" not in answers:
-        what = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
+        meaning = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
         gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
-        what += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
-        asked.append(OpenQuestion(FORCE, what, FORCE_FIELD.on(kind).written_example))
+        meaning += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
+        asked.append(OpenQuestion(FORCE, meaning, FORCE_FIELD.on(kind).written_example))
     moved = "MAX_ACCELERATION" in axis.values and "MAX_VELOCITY" in axis.values
     return (*asked, *of_the_machine(answers, kind, moved))
 
@@ -265,7 +265,7 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     if flat["controller.kind"] == "cascade":
         return _of_cascade(flat, unit, answers.value(VELOCITY, VELOCITY_FIELD.on(kind)) / unit)
     if "controller.crossover" in flat:
-        expected = "gains: its low-pass comes first, which this component has not"
+        expected = "gains: this component has no low-pass before its terms"
         raise lacks("van Dijk's rules", expected, 'kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"')
     if get("tau") > 0:
         raise lacks("a filter of the derivative", "no filter (tau = 0), which this component has not")

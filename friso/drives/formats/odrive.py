@@ -213,7 +213,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     if axis.values.get(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
-        left.append("input_vel and input_torque of whoever commands the positions: taken as 0")
+        left.append("input_vel and input_torque of the position source: taken as 0")
     if mode == AHEAD[0]:
         left.append("the filter of the commanded position (input_filter_bandwidth)")
     if limited:

@@ -65,8 +65,8 @@ class Friction:
             slid: dict[Any, Any] = {**self.slid()}
         except ValueError:
             return None
-        ways: dict[Any, Any] = {direction(velocity).beyond: Piecewise((1, velocity > 0), (0, True))}
-        return self.force.subs(slid).subs(ways)
+        side: dict[Any, Any] = {direction(velocity).beyond: Piecewise((1, velocity > 0), (0, True))}
+        return self.force.subs(slid).subs(side)
 
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
         """On which side of its kinks the law is in `states`: conditions, by the kinks' symbols; without the direction

@@ -45,8 +45,10 @@ class Dahl(FrictionSection):
         viscous."""
         coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
         levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])
-        way = displacements(coulomb, stiffness)
-        return MeasuredFriction(levels, stiffness, 0.0, way, -coulomb * np.expm1(-way * stiffness / coulomb))
+        displacement = displacements(coulomb, stiffness)
+        return MeasuredFriction(
+            levels, stiffness, 0.0, displacement, -coulomb * np.expm1(-displacement * stiffness / coulomb)
+        )
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:

@@ -85,8 +85,8 @@ class ElastoPlastic(StribeckSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """Purely elastic up to the break-away deflection."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        way = displacements(static, stiffness)
-        return on_bristles(flat, virgin(static, stiffness, flat["friction.breakaway_deflection"], way))
+        displacement = displacements(static, stiffness)
+        return on_bristles(flat, virgin(static, stiffness, flat["friction.breakaway_deflection"], displacement))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:

@@ -142,10 +142,10 @@ class GeneralisedMaxwellSlip(StribeckSection):
         """From rest each element is drawn along until it bears its share of static friction."""
         levels, stiffness, strength = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         strength = strength * levels.static
-        way = displacements(levels.static, float(stiffness.sum()))
-        force = np.minimum(stiffness * way[:, None], strength).sum(axis=1)
+        displacement = displacements(levels.static, float(stiffness.sum()))
+        force = np.minimum(stiffness * displacement[:, None], strength).sum(axis=1)
         damping = sum(flat[name] for name in element_keys(flat, DAMPING))
-        return MeasuredFriction(levels, float(stiffness.sum()), float(damping), way, force)
+        return MeasuredFriction(levels, float(stiffness.sum()), float(damping), displacement, force)
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:

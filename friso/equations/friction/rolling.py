@@ -63,8 +63,8 @@ class Rolling(StribeckSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """From rest as Dahl's exponent has it."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        way = displacements(static, stiffness)
-        return on_bristles(flat, virgin(static, stiffness, flat["friction.rolling_exponent"], way))
+        displacement = displacements(static, stiffness)
+        return on_bristles(flat, virgin(static, stiffness, flat["friction.rolling_exponent"], displacement))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
@@ -106,6 +106,6 @@ def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
 
 def virgin(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
     """Force [N] over displacement [m] from rest, both of shape (n,)."""
-    way, more = stiffness * displacement / static, exponent - 1
-    lacking = np.exp(-way) if more == 0 else (1 + more * way) ** (-1 / more)
+    deflection, more = stiffness * displacement / static, exponent - 1
+    lacking = np.exp(-deflection) if more == 0 else (1 + more * deflection) ** (-1 / more)
     return static * (1 - lacking)

@@ -13,7 +13,7 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import channel, low_pass, on_bearing, ways
+from friso.identification.readings.common import by_direction, channel, low_pass, on_bearing
 from friso.identification.readings.peaks import peak, smoothed
 from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
 from friso.identification.readings.slips import slips
@@ -132,7 +132,7 @@ def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: lis
             else replace(estimate, reason=" ".join([f"{estimate.reason}.", *notes]).rstrip("."))
         )
 
-    forward, backward = (static(mask) for _, mask in ways(directions))
+    forward, backward = (static(mask) for _, mask in by_direction(directions))
     together = static(np.ones(len(forces), dtype=bool))
     if forward.determined and backward.determined and (forward.low > backward.high or backward.low > forward.high):
         notes.append(f"The directions differ: {forward.value:.3g} N forward, {backward.value:.3g} N backward.")

@@ -17,6 +17,7 @@ from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, S
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import (
     Mean,
+    by_direction,
     by_t,
     channel,
     correlated_mean,
@@ -24,7 +25,6 @@ from friso.identification.readings.common import (
     low_pass,
     on_bearing,
     rate,
-    ways,
 )
 from friso.identification.readings.loading import METHOD as LOADED
 from friso.identification.readings.loading import stiffness_of_loading
@@ -229,7 +229,7 @@ def _answer(
         used = chosen & (rates > 0)  # held ones may have none
         return static_friction(KEY, forces[used], rates[used], bristle_rate, relative_error, late[used].mean())
 
-    masks = dict(ways(directions))
+    masks = dict(by_direction(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
     forward, backward = (static(mask, f" {words}") for words, mask in masks.items())
     every = (

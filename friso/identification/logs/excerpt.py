@@ -15,8 +15,8 @@ def excerpt(log: Log, count: int) -> Log:
     part = log.longest
     if part.stop - part.start <= count:
         return log
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(log["position"][part])))])
-    first = part.start + int(np.argmax(way[count - 1 :] - way[: len(way) - count + 1]))
+    travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(log["position"][part])))])
+    first = part.start + int(np.argmax(travel[count - 1 :] - travel[: len(travel) - count + 1]))
     chosen = slice(first, first + count)
     signals = {role: values[chosen] for role, values in log.signals.items()}
     return replace(log, time=log.time[chosen], signals=signals, segments=(slice(0, count),))

@@ -258,10 +258,10 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
     that distance instead of a force: rests do not count, nor does the time `settling` [s] after each of them and after
     the beginning."""
     window = max(3, round(REST / sample_time))
-    way = maximum_filter1d(position, window) - minimum_filter1d(position, window)
+    span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
     steps = np.abs(np.diff(position))
     digit = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
-    resting = way <= STILL * max(robust(position - smooth), digit / np.sqrt(12))
+    resting = span <= STILL * max(robust(position - smooth), digit / np.sqrt(12))
     resting[0] = True
     late = round(settling / sample_time)
     recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)

@@ -205,7 +205,7 @@ def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.n
     return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=start)])
 
 
-def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
+def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """Either direction by name, with the mask of what belongs to it."""
     yield "forward", directions > 0
     yield "backward", directions < 0

@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, by_t, stribeck_curve, t_value, ways
+from friso.identification.readings.common import Mean, by_direction, by_t, stribeck_curve, t_value
 from friso.identification.readings.passes import CUTOFF, Pass, on_common_places, passes, places_of
 from friso.intervals import COVERAGE
 
@@ -73,7 +73,7 @@ def friction_velocity(log: Log, mass: float = 0.0) -> FrictionVelocity:
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
     sides = {
         words: _direction(np.abs(velocities[m]), np.sign(velocities[m]) * forces[m], errors[m], words)
-        for words, m in ways(velocities)
+        for words, m in by_direction(velocities)
     }
     bias, both = _together(velocities, forces, errors)
     places = places_of(log, used)

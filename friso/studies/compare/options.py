@@ -76,8 +76,12 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     late = machine.get("drive.delay", 0.0)
     if "drive.current_bandwidth" in machine:
         late += 1 / (2 * np.pi * machine["drive.current_bandwidth"])
-    ratio, law = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
-    return {**flat, **{key: ratio * flat[key] for key in map(law.key, law.loop_gain)}, "drive.delay": late}
+    ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
+    return {
+        **flat,
+        **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)},
+        "drive.delay": late,
+    }
 
 
 def options(machines: Machines, within: float, also: tuple[Setting, ...] = ()) -> CompareOptions:

@@ -135,7 +135,7 @@ class Errors:
         )
 
 
-def in_series(power: float, rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def rates_in_series(power: float, rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Slownesses add: edge^-power is the sum of rate^-power."""
     total = np.logaddexp.reduce(-power * rates, axis=0)
     return -total / power, np.exp(-power * rates - total)
@@ -144,7 +144,7 @@ def in_series(power: float, rates: np.ndarray, locked: np.ndarray) -> tuple[np.n
 def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """edge^-2 is that of the locked edge plus that of the largest rate."""
     largest = rates.argmax(axis=0)
-    log, weights = in_series(2.0, np.stack([rates.max(axis=0), locked]), locked)
+    log, weights = rates_in_series(2.0, np.stack([rates.max(axis=0), locked]), locked)
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
 
 
@@ -244,5 +244,5 @@ JOINT = Rate("joint", {"joint": 0.5}, (*_TUNING, *_FRICTION, *_JOINT))
 STROKE = Rate("stroke", {"joint": 0.5, "stroke": -0.5}, (*_TUNING, *_FRICTION, *_JOINT))
 """sqrt(F_s/(m S_j))"""
 
-LOCKED_LAW = EdgeLaw((SLIP, DROP), partial(in_series, 1.0))
+LOCKED_LAW = EdgeLaw((SLIP, DROP), partial(rates_in_series, 1.0))
 FREE_LAW = EdgeLaw((JOINT, STROKE), beside_locked)

@@ -46,7 +46,7 @@ def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
     return modes
 
 
-def settled_margin(stage: Stage, changes: Mapping[str, Any]) -> float:
+def margin_with(stage: Stage, changes: Mapping[str, Any]) -> float:
     """The least modulus margin of the settled states of a stage with these changes (flat keys to SI numbers), sampled
     as the thesis's drive; 0 if one of them is not stable."""
     return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))

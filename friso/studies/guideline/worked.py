@@ -11,7 +11,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
-from friso.studies.guideline.parasitic import settled_margin
+from friso.studies.guideline.parasitic import margin_with
 from friso.studies.guideline.sweeps import LOCKED_BOX
 from friso.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCase, cases, direct, plain
 from friso.studies.thesis.studies import thesis_rig
@@ -195,7 +195,7 @@ def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
     stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
     changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
     joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
-    margin = settled_margin(thesis_rig(), joint | {CROSSOVER: limit})
+    margin = margin_with(thesis_rig(), joint | {CROSSOVER: limit})
     return WorkedDesign(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
 
 

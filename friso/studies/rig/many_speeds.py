@@ -18,8 +18,9 @@ from friso.frequency.friction import steady_force
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identification.readings.passes import passes
 from friso.stage import Stage
+from friso.stage.transmission import moving_mass
 from friso.studies.rig.outcome import RigLog, rig_log
-from friso.studies.rig.sizes import interval, longest_travel, moving_mass, pace, quicker, travel
+from friso.studies.rig.sizes import interval, longest_travel, pace, quicker, travel
 from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
@@ -78,7 +79,7 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     """The passes of a stage whose joint is locked, or which has none."""
     logs, places = many_speeds_logs(stage, seed), []
     for log, begin in zip(logs, _begins(stage), strict=True):
-        velocity = friction_velocity(log.log, moving_mass(stage))
+        velocity = friction_velocity(log.log, moving_mass(stage.flat()))
         low, *_, high = speeds_of(log.stage)
         speeds = np.geomspace(low, high, CURVE)
         ends = velocity.places if len(velocity.velocities) else (begin, begin + SHARED * longest_travel(stage))

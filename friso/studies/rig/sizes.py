@@ -14,7 +14,7 @@ from friso.equations.bandwidth import bandwidth, proportional_stiffness, sped_up
 from friso.equations.breakaway import breakaway
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.stage.transmission import moving_mass as mass_moved
+from friso.stage.transmission import moving_mass
 from friso.virtual_rig.run import as_built_keys
 from friso.virtual_rig.task import own_motion
 
@@ -57,17 +57,12 @@ def pace(stage: Stage) -> float:
     named = bandwidth(flat)
     if named is not None:
         return float(named)
-    return float(np.sqrt(proportional_stiffness(flat) / (moving_mass(stage) * np.sqrt(ALPHA)))) / (2 * np.pi)
-
-
-def moving_mass(stage: Stage) -> float:
-    """All that the controller moves [kg]."""
-    return float(mass_moved(stage.flat()))
+    return float(np.sqrt(proportional_stiffness(flat) / (moving_mass(flat) * np.sqrt(ALPHA)))) / (2 * np.pi)
 
 
 def friction(stage: Stage) -> float:
     """The break-away friction [N]; without any, what moves the mass at 1 m/s^2, our choice."""
-    return float(breakaway(stage.flat())) or moving_mass(stage)
+    return float(breakaway(stage.flat())) or float(moving_mass(stage.flat()))
 
 
 def travel(stage: Stage) -> tuple[float, float]:

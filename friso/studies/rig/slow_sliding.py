@@ -15,9 +15,10 @@ from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSl
 from friso.identification.readings.at_bearing import between
 from friso.identification.readings.passes import passes
 from friso.stage import Stage
+from friso.stage.transmission import moving_mass
 from friso.studies.rig.many_speeds import speeds_of
 from friso.studies.rig.outcome import RigLog, rig_log
-from friso.studies.rig.sizes import interval, moving_mass, pace, travel
+from friso.studies.rig.sizes import interval, pace, travel
 from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
@@ -90,7 +91,7 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
 def _analysed(log: RigLog) -> SlowSliding:
     flat = as_built_keys(log.stage)
     stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
-    mass, exponent = moving_mass(log.stage), flat["friction.stribeck_exponent"]
+    mass, exponent = moving_mass(log.stage.flat()), flat["friction.stribeck_exponent"]
     bristles = MassOnBristles((mass, 0.0), (stiffness, 0.0), (damping, 0.0), exponent)
     return stribeck_from_slow_sliding(log.log, between(flat), bristles)
 

@@ -89,7 +89,7 @@ def _joint(design: Design) -> dict[str, Any]:
 
 def _leaves(design: Design) -> dict[str, Any]:
     choice, beams = design.fitted.choice, design.fitted.choice.beams
-    requirements = [{"name": requirement.name, "key": requirement.ways[0].key} for requirement in choice.requirements]
+    requirements = [{"name": requirement.name, "key": requirement.keys[0].key} for requirement in choice.requirements]
     return {
         **_sizes(choice.geometry),
         "drive_stiffness_n_per_m": beams.drive[0],

@@ -31,8 +31,8 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
     return [
         (
             requirement.name,
-            _keys(requirement, lambda remedy: remedy.key),
-            _keys(requirement, lambda remedy: plain(remedy.value, remedy.unit)),
+            _keys(requirement, lambda relaxable: relaxable.key),
+            _keys(requirement, lambda relaxable: plain(relaxable.value, relaxable.unit)),
             f"{100 * share:.1f} %{', binds' if share > BINDS else ''}",
         )
         for requirement, share in zip(choice.requirements, choice.excess, strict=True)
@@ -40,7 +40,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
 
 
 def _keys(requirement: Requirement, text: Callable[[Way], str]) -> str:
-    return ", ".join(map(text, requirement.ways))
+    return ", ".join(map(text, requirement.keys))
 
 
 def _sizes(design: Design) -> tuple[tuple[str, str], ...]:

@@ -14,7 +14,7 @@ def export_document(gains: Gains) -> dict[str, Any]:
     return plain_json(
         {
             "stage": gains.stage.name,
-            "structure": gains.drawing.splitlines(),
+            "structure": gains.diagram.splitlines(),
             "gains": [
                 {
                     "name": row.name,

@@ -22,7 +22,7 @@ def export_html(gains: Gains) -> str:
         "notes": notes(gains),
         "columns": COLUMNS,
         "rows": rows(gains),
-        "drawing_of_loop": gains.drawing,
+        "drawing_of_loop": gains.diagram,
         "parameters": gains.text,
     }
     return Report.of_stage("export", gains.stage, (), title(gains), **values).html()

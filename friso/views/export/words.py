@@ -31,8 +31,8 @@ def notes(gains: Gains) -> list[str]:
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
     if gains.kind is not None:
         texts.append(f"Parameters by the formulas of {gains.kind.firmware} ({gains.kind.source})")
-        if gains.lost:
-            texts.append(f"Not among them: {', '.join(gains.lost)}")
+        if gains.not_held:
+            texts.append(f"Not among them: {', '.join(gains.not_held)}")
     return texts
 
 

@@ -13,9 +13,10 @@ from friso.identification.readings.friction_position import FrictionPosition, fr
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.progress import Progress
 from friso.stage import Stage
+from friso.stage.transmission import moving_mass
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log, stopped
-from friso.studies.rig.sizes import freed, interval, locked, longest_travel, moving_mass, pace, travel
+from friso.studies.rig.sizes import freed, interval, locked, longest_travel, pace, travel
 from friso.studies.rig.slow_sliding import Slow, slow_sliding
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
@@ -69,7 +70,7 @@ def speeds(stage: Stage) -> tuple[float, ...]:
 
 
 def _passes(name: str, stage: Stage, seed: int) -> Passes:
-    log, mass = _passes_log(name, stage, seed), moving_mass(stage)
+    log, mass = _passes_log(name, stage, seed), moving_mass(stage.flat())
     cart = log.true["cart_position"]
     if not len(cart):
         raise stopped(log)

@@ -44,7 +44,7 @@ class Canvas:
         return "\n".join(line.rstrip() for line in self.lines if line.strip())
 
 
-def drawing(flat: Mapping[str, Any]) -> str:
+def loop_diagram(flat: Mapping[str, Any]) -> str:
     """The loop of a stage given as flat keys, with the terms that it has; empty for a controller from elsewhere."""
     key = {name.removeprefix("controller."): v for name, v in flat.items() if name.startswith("controller.")}
     if key["kind"] == "cascade":

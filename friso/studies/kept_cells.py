@@ -16,7 +16,7 @@ from friso.studies.refine import Ask
 from friso.whole_file import whole_file
 
 
-class Answers:
+class KeptCells:
     """Answers kept in a folder; what is damaged there is asked for again: the files are archives with checksums."""
 
     def __init__(self, folder: Path) -> None:
@@ -27,9 +27,9 @@ class Answers:
         self.folder.mkdir(exist_ok=True)
         number = count()
 
-        def answer(cells: np.ndarray) -> Columns:
+        def kept_or_asked(cells: np.ndarray) -> Columns:
             file = self.folder / f"{next(number)}.npz"
-            if (stored := _answer(file, cells)) is not None:
+            if (stored := _kept(file, cells)) is not None:
                 return stored
             columns = ask(cells)
             with whole_file(file) as stream:
@@ -37,18 +37,18 @@ class Answers:
                 np.savez_compressed(stream, cells=cells, **arrays)
             return columns
 
-        return answer
+        return kept_or_asked
 
     def forget(self) -> None:
         """Remove what was kept: the blocks of the study hold it by now."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-def _answer(file: Path, cells: np.ndarray) -> Columns | None:
+def _kept(file: Path, cells: np.ndarray) -> Columns | None:
     """What was kept about just these cells, None if nothing."""
     try:
         with np.load(file) as stored:
-            answer = dict(stored)
+            columns = dict(stored)
     except (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error):
         return None
-    return answer if np.array_equal(answer.pop("cells", None), cells) else None
+    return columns if np.array_equal(columns.pop("cells", None), cells) else None
