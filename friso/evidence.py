@@ -22,7 +22,7 @@ class Entry:
 
     `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with, and
     `code` the digest (`benchmarks.code`) of the modules that it `rests_on` besides: criteria, methods and experiments,
-    as folders and files of the package (empty: it was computed before there were digests). `stated` holds,
+    as folders and files of the package (an empty `code`: it was computed before there were digests). `stated` holds,
     per document of the repository, the phrases that state the finding there. `note` says where the values come from
     when the command did not write them itself.
     """
@@ -37,6 +37,11 @@ class Entry:
     code: str = ""
     stated: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     note: str = ""
+
+    @property
+    def day(self) -> str:
+        """The day it was computed, as documents write it."""
+        return f"{self.computed.day} {self.computed:%B %Y}"
 
 
 @dataclass(frozen=True)

@@ -31,7 +31,7 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
 
 
 @pytest.mark.parametrize(
-    ("value", "given"),
+    ("value", "shown"),
     [
         ("2400", "2400 (a bare number without a unit)"),
         ("2.4e3", "2400.0 (a bare number without a unit)"),

@@ -461,7 +461,7 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "given", "expected"),
+    ("text", "shown", "expected"),
     [
         ("1 kHz..0.1 Hz", r'"1 kHz..0.1 Hz" \(reversed range\)', "an increasing range"),
         ("1 Hz..1 Hz", r'"1 Hz..1 Hz" \(empty range\)', "an increasing range"),

@@ -430,7 +430,7 @@ def test_a_stage_without_leaves_is_shown_a_table_that_works(refused: Refused) ->
 
 
 @pytest.mark.parametrize(
-    ("stroke", "given", "expected"),
+    ("stroke", "shown", "expected"),
     [
         ("1", r'"1" \(its unit is missing\)', "convertible to m, greater than 0"),
         ("0 mm", '"0 mm"', "greater than 0"),

@@ -120,7 +120,7 @@ def test_what_ends_in_the_hunting_that_was_found_hunts_whatever_else_there_is() 
 
 
 @pytest.mark.parametrize(
-    ("starts", "known"),
+    ("starts", "certain"),
     [
         ((NONE, NONE, None), True),
         ((HUNTING, replace(NONE, unknown=2), None), False),

@@ -263,7 +263,7 @@ def figures(case: tuple[Identification, list[LogFile], list[Prediction]]) -> lis
 
 
 @pytest.mark.parametrize(
-    ("found", "said"),
+    ("estimate", "said"),
     [
         (Estimate("masses.cart", "kg", 95.281, 94.84, 95.722, ""), "95.28 kg (94.84 to 95.72)"),
         (Estimate("joint.stiffness", "N/m", 2400.4, 2386.0, 2414.8, ""), "2400 N/m (2386 to 2415)"),
@@ -298,7 +298,7 @@ def test_what_is_left_possible(low: float, high: float, unit: str, said: str) ->
 
 
 @pytest.mark.parametrize(
-    ("unit", "known"),
+    ("unit", "prefixed"),
     [
         ("N s/m", "N*s/m"),
         ("1", ""),

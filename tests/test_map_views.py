@@ -586,7 +586,7 @@ def swinging(where: np.ndarray) -> xr.Dataset:
 
 
 @pytest.mark.parametrize(
-    ("name", "rows", "columns", "told"),
+    ("name", "rows", "columns", "expected"),
     [
         ("low", slice(0, 2), slice(None), [50, 6]),
         ("high", slice(2, 4), slice(None), [50, 11]),

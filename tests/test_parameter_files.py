@@ -109,7 +109,7 @@ def test_all_that_is_not_in_the_file_is_asked_for_at_once(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("unit", "joint", "force", "told"),
+    ("unit", "joint", "force", "answers"),
     [
         ("mm", "TYPE = LINEAR", "20 N", MACHINE),
         ("inch", "TYPE = LINEAR", "20 N", MACHINE),
@@ -258,7 +258,7 @@ def test_export_writes_page_and_parameters(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "to", "part"),
+    ("answers", "to", "part"),
     [
         ({}, "odrive", "travel_per_turn"),
         ({"travel_per_turn": "3 N"}, None, "travel_per_turn"),

@@ -165,7 +165,7 @@ def message(stage: Stage, changes: dict[str, object]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "given", "expected"),
+    ("key", "value", "shown", "expected"),
     [
         ("drive.encoder_resolution", "0 nm", '"0 nm"', "convertible to m, greater than 0"),
         ("drive.encoder_resolution", "-1 nm", '"-1 nm"', "convertible to m, greater than 0"),

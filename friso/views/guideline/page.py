@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.evidence import value
+from friso.evidence import entries, value
 from friso.frequency.crossover import WANTED
 from friso.hunting.edges import KINDS, ROUNDS, STEP
 from friso.hunting.persistence import DISTANCES
@@ -82,6 +82,7 @@ def guideline_page(guideline: Guideline) -> str:
         parasitic_words=parasitic_sentences(guideline.parasitic),
         parasitic_edges=parasitic_edges(guideline.worked.studies["parasitic"]),
         rough_minutes=value("guideline.minutes", "rough"),
+        rough_day=entries()["guideline.minutes"].day,
         drive=DRIVE,
         kinds=KINDS,
         errors_of=_errors(guideline),
