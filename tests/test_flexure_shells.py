@@ -156,8 +156,8 @@ def test_published_leaf() -> None:
 if __name__ == "__main__":
     for title, model in MODELS.items():
         table: dict[str, list[float]] = {}
-        for each in MECHANISMS:
-            for key, error in errors(each, model, mesh=(48, 24)).items():
+        for mechanism in MECHANISMS:
+            for key, error in errors(mechanism, model, mesh=(48, 24)).items():
                 table.setdefault(key, []).append(100 * error)
         for key, column in sorted(table.items()):
             worst = max(column, key=abs)

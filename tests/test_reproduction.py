@@ -82,7 +82,7 @@ BUILT = {"F24", "F25", "F26", "F27", "F28"}
 """Claims on the rig as built: tried in test_rig_hunting.py."""
 
 
-FEW = tuple({each.parameter: each for each in OPEN}.values())
+FEW = tuple({case.parameter: case for case in OPEN}.values())
 """Of every open parameter one value, the last."""
 
 

@@ -110,8 +110,8 @@ NEEDS = {"F24": MOVES, "F25": MOVES, "F26": GRID, "F27": ON_RAILS, "F28": STANDS
 ADDED = {
     "locked": measured_locked,
     "free": measured_free,
-    "motor, locked": lambda found: weaker_motor(found, 0, MEASURED[0], WEIGHED[0]),
-    "motor, free": lambda found: weaker_motor(found, 1, MEASURED[1], WEIGHED[1]),
+    "motor, locked": lambda results: weaker_motor(results, 0, MEASURED[0], WEIGHED[0]),
+    "motor, free": lambda results: weaker_motor(results, 1, MEASURED[1], WEIGHED[1]),
 }
 """Parts that the loops of the rig as built add to F17, F18, F22 and F23."""
 
