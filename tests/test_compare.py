@@ -16,6 +16,7 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 from friso.answers.output_folder import MARKER
+from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency import crossover
@@ -29,7 +30,6 @@ from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
-from friso.studies.compare.settings import SETTINGS, settings_named
 from friso.studies.compare.statistics import difference, median
 from friso.studies.compare.study import Comparison, Result, compare
 from friso.studies.shares import share
@@ -531,7 +531,7 @@ def test_a_setting_against_friction_is_one_that_the_stage_can_have(name: str) ->
     chosen = stage.with_numbers(numbers)
     assert {key: chosen.flat()[key] for key in numbers} == pytest.approx(numbers)
     assert structure(chosen.flat()) != structure(stage.flat())
-    assert _setting(Option(setting.letter, chosen))
+    assert _setting(setting, chosen.flat())
 
 
 def test_settings_that_are_asked_for_are_tried() -> None:

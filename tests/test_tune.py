@@ -13,6 +13,7 @@ from variants import stage as variant
 from friso import Stage, load
 from friso.design_method.isolator import isolated
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
+from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check_given
@@ -34,7 +35,6 @@ from friso.remedies.variables import BANDWIDTH, crossover
 from friso.remedies.verified import Performance, RemedyOutcome, doubts, measure
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
-from friso.studies.compare.settings import settings_named
 from friso.views.check.isolator_words import isolator_sentence
 from friso.views.tune.document import tune_document
 from friso.views.tune.gain_words import gain_lines

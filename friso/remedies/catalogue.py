@@ -10,22 +10,13 @@ import numpy as np
 
 from friso.design_method.isolator import isolated
 from friso.equations.breakaway import breakaway, least_breakaway
+from friso.equations.settings import SETTINGS
 from friso.errors import InputError
 from friso.remedies import variables
 from friso.remedies.goal import Goal
 from friso.remedies.variables import Variable, bandwidth_factor, of_key
 from friso.stage import Stage
 from friso.stage.controllers import FILTERS_KEY, controller_of
-
-LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
-"""Ranges of the integral limit, in units of the break-away friction, and of the leak, in units of the bandwidth or,
-where no key states one, of 1 Hz."""
-
-DEADBANDS, EXITS = (0.1, 0.9), (1.0, 10.0)
-"""Ranges of the deadband, in tolerances, and of the error that ends it, in deadbands."""
-
-WINDOWS, FACTORS = (0.5, 100.0), (0.05, 4.0)
-"""Ranges of the standstill window, in tolerances, and of the gains in it."""
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch, as a share of its frequency, and its depth."""
@@ -97,27 +88,17 @@ def _notch(stage: Stage, speed: Variable) -> Iterator[Remedy]:
 
 
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
-    """Each setting against friction that the stage has not got, by itself."""
+    """Each setting against friction that is tuned and that the stage has not got, by itself."""
     flat = stage.flat()
-    controller = controller_of(flat)
-    friction, within = float(breakaway(flat)), goal.within
-    if not controller.integrates(flat) or friction <= 0:
+    if breakaway(flat) <= 0:
         return
-    hertz = flat[controller.bandwidth_key] if controller.bandwidth_key else 1.0
-    scales = {
-        "integral limit": {"integral_limit": (friction, LIMITS)},
-        "leak of the integral": {"integral_leak": (hertz, LEAKS)},
-        "deadband of the integral": {
-            "integral_deadband": (within, DEADBANDS),
-            "integral_deadband_exit": (within, EXITS),
-        },
-        "gains at standstill": {"standstill_window": (within, WINDOWS), "standstill_factor": (1.0, FACTORS)},
-    }
-    for name, keys in scales.items():
-        ranges = {f"controller.{key}": (scale * low, scale * high) for key, (scale, (low, high)) in keys.items()}
-        if not any(key in flat for key in ranges):
+    integrates = controller_of(flat).integrates(flat)
+    for setting in SETTINGS.values():
+        ranges = setting.ranges(flat, goal.within) if integrates or not setting.integral else {}
+        if ranges and not any(key in flat for key in ranges):
             numbers = {key: float(np.sqrt(low * high)) for key, (low, high) in ranges.items()}
-            yield Remedy(name, stage.with_numbers(numbers), tuple(of_key(key, *ends) for key, ends in ranges.items()))
+            keys = tuple(of_key(key, *ends) for key, ends in ranges.items())
+            yield Remedy(setting.name, stage.with_numbers(numbers), keys)
 
 
 def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Remedy]:

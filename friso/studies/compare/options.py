@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, sped_up
+from friso.equations.settings import SETTINGS, Setting
 from friso.frequency.crossover import WANTED, limits
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 from friso.studies.compare.machines import Machines
-from friso.studies.compare.settings import SETTINGS, Setting
 
 DEADBAND = 0.5
 """Deadband of the integrator, in tolerances for being in position: our choice. It rests while the stage is in position,
@@ -43,12 +43,13 @@ JOINT: tuple[str, ...] = ("c", "g")
 @dataclass(frozen=True)
 class Option:
     """One way: its `letter`, the stage that has it, what it changes of the keys (numbers, or arrays of one for each
-    machine), and by which `factor` its controller is faster."""
+    machine), by which `factor` its controller is faster, and which `setting` against friction it is, if any."""
 
     letter: str
     stage: Stage
     changes: Mapping[str, Any] = field(default_factory=dict)
     factor: float = 1.0
+    setting: Setting | None = None
 
     @property
     def name(self) -> str:
@@ -111,7 +112,7 @@ def options(machines: Machines, within: float, also: tuple[Setting, ...] = ()) -
             left_out[setting.letter] = "the controller does not integrate"
         else:
             numbers = setting.numbers(locked.flat(), within)
-            listed.append(Option(setting.letter, locked.with_numbers(numbers)))
+            listed.append(Option(setting.letter, locked.with_numbers(numbers), setting=setting))
     return CompareOptions(tuple(listed), dict(sorted(left_out.items())), deadband)
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.equations.motion import last_corner
+from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.stage import Stage
@@ -23,7 +24,6 @@ from friso.studies.compare.measures import (
     measured,
 )
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
-from friso.studies.compare.settings import settings_named
 from friso.studies.compare.statistics import EstimatedValue, difference, median
 from friso.studies.shares import Share, share
 from friso.virtual_rig.run import Recorded, run
@@ -176,7 +176,7 @@ def compare(
     also: tuple[str, ...] = (),
 ) -> Comparison:
     """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
-    named `also` of the settings against friction (`friso.studies.compare.settings`).
+    named `also` of the settings against friction (`friso.equations.settings`).
 
     Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
     """

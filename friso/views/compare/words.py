@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth
+from friso.equations.settings import SETTINGS, Setting
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
+from friso.stage import ControllerSection
+from friso.stage.section import numeric_fields
+from friso.stage.standstill import AgainstFriction
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Result
@@ -48,12 +53,7 @@ PROSE = {
     "e": "the reset",
     "f": "feedforward",
     "g": "isolator and faster controller",
-    "h": "the limit of the integral",
-    "i": "the leak",
-    "j": "the deadband with hysteresis",
-    "k": "the lower gain at standstill",
-    "l": "the push",
-    "m": "the dither",
+    **{setting.letter: f"the {setting.name}" for setting in SETTINGS.values()},
 }
 
 
@@ -84,30 +84,15 @@ def _about(option: Option, comparison: Comparison) -> str:
         "drawn for each machine",
         "g": _bandwidth(option, comparison),
     }
-    return f"{joint}; {meanings.get(option.letter) or _setting(option)}"
+    setting = option.setting
+    return f"{joint}; {_setting(setting, option.stage.flat()) if setting else meanings[option.letter]}"
 
 
-def _setting(option: Option) -> str:
+def _setting(setting: Setting, flat: Mapping[str, Any]) -> str:
     """A setting against friction, with its numbers."""
-    flat = option.stage.flat()
-
-    def shown(name: str, unit: str) -> str:
-        return with_unit(flat[f"controller.{name}"], unit)
-
-    if option.letter == "h":
-        return f"the force that an integral holds stays below {shown('integral_limit', 'N')}"
-    if option.letter == "i":
-        return f"the integral leaks below {shown('integral_leak', 'Hz')}"
-    if option.letter == "j":
-        enter, leave = shown("integral_deadband", "m"), shown("integral_deadband_exit", "m")
-        return f"the integrator pauses from an error of {enter} on, until it is {leave}"
-    if option.letter == "k":
-        factor, window = shown("standstill_factor", ""), shown("standstill_window", "m")
-        return f"all gains times {factor} while the error is below {window}"
-    if option.letter == "l":
-        push, window = shown("stiction_push", "N"), shown("stiction_push_window", "m")
-        return f"a force of {push} towards the reference while that rests and the error is above {window}"
-    return f"a sinusoidal force of {shown('dither_amplitude', 'N')} at {shown('dither_frequency', 'Hz')}"
+    keys = {name: (ControllerSection.key(name), field.unit) for name, field in numeric_fields(AgainstFriction).items()}
+    texts = {name: with_unit(flat[key], unit).strip() for name, (key, unit) in keys.items() if key in flat}
+    return setting.says.format_map(texts)
 
 
 def _bandwidth(option: Option, comparison: Comparison) -> str:

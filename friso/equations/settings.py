@@ -1,0 +1,144 @@
+"""The settings of drives against friction, one catalogue: what each does, its sizes for a machine, and its ranges.
+
+Their keys are declared in `friso.stage.standstill`, their equations in `continuous` and `sampled`. `friso compare
+--also` tries one size of each, `friso tune` their ranges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import pi, sqrt
+from typing import Any
+
+from friso.equations.breakaway import breakaway, sliding
+from friso.equations.continuous import slow_gains
+from friso.errors import InputError
+from friso.quantities import quoted
+from friso.stage.controllers import ControllerSection, controller_of
+from friso.stage.transmission import moving_mass
+
+Machine = Mapping[str, Any]
+Sizes = Callable[[Machine, float], dict[str, float]]
+Ranges = Callable[[Machine, float], dict[str, tuple[float, float]]]
+"""From the flat keys of a stage and the tolerance for being in position [m] to values [SI] of names in [controller], or
+to their ends."""
+
+LIMITS, LEAKS = (0.05, 2.0), (1e-3, 0.3)
+"""Ranges of the integral limit, in units of the break-away friction, and of the leak, in units of the bandwidth or,
+where no key states one, of 1 Hz."""
+
+DEADBANDS, EXITS = (0.1, 0.9), (1.0, 10.0)
+"""Ranges of the deadband, and of the error that ends it, in tolerances."""
+
+WINDOWS, FACTORS = (0.5, 100.0), (0.05, 4.0)
+"""Ranges of the standstill window, in tolerances, and of the gains in it."""
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A setting: the `letter` and `name` of its option, what it does (`says`, names of its keys in braces standing for
+    their values), whether it needs an integral, its `sizes`, and the ranges in which it is tuned (None: it is not)."""
+
+    letter: str
+    name: str
+    says: str
+    integral: bool
+    sizes: Sizes
+    tuned_in: Ranges | None = None
+
+    def numbers(self, flat: Machine, within: float) -> dict[str, float]:
+        """Its keys in a stage file, and their values [SI]."""
+        return {ControllerSection.key(name): value for name, value in self.sizes(flat, within).items()}
+
+    def ranges(self, flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+        """Its keys in a stage file, and the ends [SI] between which they are tuned; none where it is not."""
+        if self.tuned_in is None:
+            return {}
+        return {ControllerSection.key(name): ends for name, ends in self.tuned_in(flat, within).items()}
+
+
+def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:
+    low, high = ends
+    return scale * low, scale * high
+
+
+def _limits(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+    return {"integral_limit": _scaled(float(breakaway(flat)), LIMITS)}
+
+
+def _leak(flat: Machine, within: float) -> dict[str, float]:
+    proportional, integral = slow_gains(flat)
+    return {"integral_leak": integral / proportional / (2 * pi) / 10}
+
+
+def _leaks(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+    stated = controller_of(flat).bandwidth_key
+    return {"integral_leak": _scaled(flat[stated] if stated else 1.0, LEAKS)}
+
+
+def _deadbands(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+    return {"integral_deadband": _scaled(within, DEADBANDS), "integral_deadband_exit": _scaled(within, EXITS)}
+
+
+def _standstill(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+    return {"standstill_window": _scaled(within, WINDOWS), "standstill_factor": FACTORS}
+
+
+def _dither(flat: Machine, within: float) -> dict[str, float]:
+    proportional, _ = slow_gains(flat)
+    fast = 10 * sqrt(proportional / moving_mass(flat)) / (2 * pi)
+    return {
+        "dither_amplitude": 0.5 * float(sliding(flat)),
+        "dither_frequency": min(fast, 1 / (20 * flat["drive.sample_time"])),
+    }
+
+
+SETTINGS: Mapping[str, Setting] = {
+    "limit": Setting(
+        "h",
+        "integral limit",
+        "the force that an integral holds stays below {integral_limit}",
+        True,
+        lambda flat, _: {"integral_limit": 1.2 * float(breakaway(flat))},
+        _limits,
+    ),
+    "leak": Setting("i", "leak of the integral", "the integral leaks below {integral_leak}", True, _leak, _leaks),
+    "hysteresis": Setting(
+        "j",
+        "deadband with hysteresis",
+        "the integrator pauses from an error of {integral_deadband} on, until it is {integral_deadband_exit}",
+        True,
+        lambda _, within: {"integral_deadband": 0.5 * within, "integral_deadband_exit": 2 * within},
+        _deadbands,
+    ),
+    "standstill": Setting(
+        "k",
+        "gains at standstill",
+        "all gains times {standstill_factor} while the error is below {standstill_window}",
+        False,
+        lambda _, within: {"standstill_window": 5 * within, "standstill_factor": 0.5},
+        _standstill,
+    ),
+    "push": Setting(
+        "l",
+        "push",
+        "a force of {stiction_push} towards the reference while that rests and the error is above "
+        "{stiction_push_window}",
+        False,
+        lambda flat, within: {"stiction_push": 0.8 * float(sliding(flat)), "stiction_push_window": within},
+    ),
+    "dither": Setting("m", "dither", "a sinusoidal force of {dither_amplitude} at {dither_frequency}", False, _dither),
+}
+"""Sizes are our choice: an integral that can just break the machine loose; a leak at a tenth of the integral's corner;
+integrals that pause within half the tolerance until twice the tolerance is exceeded; half the gains within five
+tolerances; a push of four fifths of Coulomb friction outside the tolerance; a dither of half of it at ten times the
+bandwidth, or with twenty samples a period."""
+
+
+def settings_named(names: tuple[str, ...]) -> tuple[Setting, ...]:
+    """Settings by their names, "all" for all of them. Raises InputError for an unknown one."""
+    for name in names:
+        if name != "all" and name not in SETTINGS:
+            raise InputError("--also", quoted(name), f"one of {', '.join(SETTINGS)}, or all", "--also leak")
+    return tuple(setting for name, setting in SETTINGS.items() if name in names or "all" in names)
