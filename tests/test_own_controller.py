@@ -145,6 +145,25 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
         assert options["b"]["crossover_hz"] == pytest.approx(6.0 * options["b"]["bandwidth_factor"])
 
 
+def test_tune(locked: Stage, tmp_path: Path) -> None:
+    """Its bandwidth is among what is tuned, and the answer has its numbers."""
+    tiny = Budget(points=3, generations=2, machines=4, surveyed=2, fresh=6)
+    with patched({method: {"Budget": lambda: tiny, "ways": None}}):
+        document = answer(tmp_path, locked, "tune", "--only", "controller", "--bandwidth-limit", "16 Hz")
+    assert document["ways"]["bandwidth"]["works"] == "works"
+
+
+def test_export(locked: Stage, tmp_path: Path) -> None:
+    """Its keys by their units, its loop as a box, and the limit that every controller may have."""
+    document = answer(tmp_path, locked, "export", "gains")
+    gains = {row["symbol"]: row["values"] for row in document["gains"]}
+    assert gains["bandwidth"][0] == {"value": 6.0, "unit": "Hz"}
+    assert gains["bandwidth"][1] == {"value": pytest.approx(12 * np.pi), "unit": "rad/s"}
+    assert gains["mass"][0] == {"value": 1.7, "unit": "kg"}
+    assert gains["Fmax"][0] == {"value": 200.0, "unit": "N"}
+    assert "[ pi-d ]--[ limit ]" in document["structure"][0]
+
+
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})

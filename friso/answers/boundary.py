@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
 from friso.answers.inputs import Changes, StageLike, axes_of, pairs_of, read_stage, stem_of, tolerance_of, wrong
+from friso.equations.bandwidth import range_example
 from friso.hunting.boundary import Diagram, KeyRange, Plane
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, any_sign
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     from friso.views.boundary.words import ShownKey
     from friso.views.drawing.figure import Figure
     from friso.views.files import Files
-
-EXAMPLE = 'controller.crossover="1 Hz..40 Hz"'
 
 
 class BoundaryAnswer(Answer):
@@ -118,9 +117,10 @@ def boundary(
     >>> friso.boundary(friso.example("thesis_rig"), x="controller.crossover=1 Hz..40 Hz")  # doctest: +SKIP
     """
     chosen, tolerance = read_stage(stage, set), tolerance_of(rtol)
-    ranges = axes_of(axes or {}, {"x": x, "y": y}, EXAMPLE)
+    example = range_example(chosen.flat())
+    ranges = axes_of(axes or {}, {"x": x, "y": y}, example)
     if not ranges:
-        raise wrong("x", "no key", "one key or two with their ranges", EXAMPLE)
+        raise wrong("x", "no key", "one key or two with their ranges", example)
     links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')
     progress(0, 0, f"following cycles over {' and '.join(ranges)}")
     from friso.studies.boundary import boundary as traced_boundary

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
     from friso.views.files import Content
 
-AXIS_EXAMPLE = 'controller.crossover="1 Hz..40 Hz:41"'
+AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
 
 BYTES = 8
 """Bytes of a number in a store, before they are compressed."""

@@ -6,20 +6,25 @@ velocity v is v/L turns per second, and a torque is a current times the motor's 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite, pi, sqrt
+from math import isfinite, pi
 from typing import Any
 
-from friso.axis import LINEAR, axis_of
+from friso.axis import LINEAR, AxisKind, axis_of
 from friso.drives.questions import UserAnswers
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
+from friso.stage.controllers import controller_of
 
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
 """What the user may say: what a turn moves, and the torque of an ampere [N m/A], or the force [N/A] without a turn."""
 
 TORQUE_PER_AMPERE, FORCE_PER_AMPERE = Quantity("N*m/A", positive, "0.5 N*m/A"), Quantity("N/A", positive, "30 N/A")
+
+
+Other = tuple[float, str]
+"""A value in another unit."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +65,10 @@ class Turn:
         return cls(travel, per_ampere)
 
 
+Convert = Callable[[float, Turn, AxisKind], list[Other]]
+"""From a value in SI to what it is in other units."""
+
+
 def conversions(flat: Mapping[str, Any], answers: UserAnswers) -> tuple[Conversion, ...]:
     """The gains of a stage given as flat keys, by what is known of motor and screw. Raises InputError."""
     turn = Turn.of(flat, answers)
@@ -70,136 +79,72 @@ def conversions(flat: Mapping[str, Any], answers: UserAnswers) -> tuple[Conversi
         raise InputError("controller", actual, "numbers that a drive could take", 'kp = "500 N*s/m"') from None
 
 
-def _rows(flat: Mapping[str, Any], turn: Turn) -> tuple[Conversion, ...]:
-    """The gains of each kind of controller."""
-    key = {name.removeprefix("controller."): v for name, v in flat.items() if name.startswith("controller.")}
-    if key["kind"] == "cascade":
-        return _of_cascade(key, turn, flat)
-    if key["kind"] == "pid" and "crossover" not in key:
-        return _of_pid(key, turn, flat)
-    if key["kind"] == "pid":
-        return _of_van_dijk(flat, turn)
-    return ()
-
-
-def _of_cascade(key: Mapping[str, Any], turn: Turn, flat: Mapping[str, Any]) -> tuple[Conversion, ...]:
-    rows = [_kv("gain of the position loop", "kv", key["kv"])]
-    if "position_integral_time" in key:
-        rows.append(_time("integral time of the position loop", "Tp", key["position_integral_time"]))
-    rows.append(_damping("gain of the velocity loop", "kp", key["kp"], turn, flat))
-    if time := key.get("velocity_integral_time"):
-        rows.append(_time("integral time of the velocity loop", "Tn", time))
-        rows.append(_stiffness("the same as a gain, kp/Tn", "ki", key["kp"] / time, turn, flat))
-    if key["velocity_filter"]:
-        rows.append(_time("filter of the measured velocity", "Tf", key["velocity_filter"]))
-    rows.append(Conversion("share of the reference's velocity", "f", ((key["velocity_feedforward"], ""),)))
-    return (*rows, *_ahead(key, turn, flat), *_limits(key, turn, flat))
-
-
-def _of_pid(key: Mapping[str, Any], turn: Turn, flat: Mapping[str, Any]) -> tuple[Conversion, ...]:
-    kp, ki, kd = key["kp"], key["ki"], key["kd"]
-    rows = [
-        _stiffness("proportional gain", "kp", kp, turn, flat),
-        _integral("integral gain", "ki", ki, turn, flat),
-        _damping("derivative gain", "kd", kd, turn, flat),
-    ]
-    if key["tau"]:
-        rows.append(_time("filter of the derivative", "tau", key["tau"]))
-    if ki and kp:
-        rows.append(_time("integral time kp/ki", "Ti", kp / ki))
-    if kp and kd:
-        rows.append(_time("derivative time kd/kp", "Td", kd / kp))
-    if ki and kd and not key["tau"] and key["derivative_on"] == "measurement" and kp**2 >= 4 * ki * kd:
-        half, root = kp / (2 * kd), sqrt((kp / (2 * kd)) ** 2 - ki / kd)
-        rows.append(_kv("as P over PI with kp = kd: kv (or 1/Tn)", "kv", half - root))
-        rows.append(_time("as P over PI with kp = kd: Tn (or 1/kv)", "Tn", 1 / (half + root)))
-    return (*rows, *_ahead(key, turn, flat), *_limits(key, turn, flat))
-
-
-def _of_van_dijk(flat: Mapping[str, Any], turn: Turn) -> tuple[Conversion, ...]:
-    from friso.equations.controllers.van_dijk import numbers
-
-    values = numbers(flat)
-    times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
-    return (
-        _stiffness("gain k_p of Eq. 8", "k_p", values["k_p"], turn, flat),
-        *(_time(f"time constant of the {what}", name, values[name]) for name, what in times.items()),
-        *_limits({name.removeprefix("controller."): v for name, v in flat.items()}, turn, flat),
-    )
-
-
-def _ahead(key: Mapping[str, Any], turn: Turn, flat: Mapping[str, Any]) -> list[Conversion]:
-    """The feedforwards that there are."""
-    rows = []
-    if mass := key.get("acceleration_feedforward"):
-        values = [(mass, axis_of(flat).unit("kg"))]
-        if turn.travel:
-            values.append((mass * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor"))
-        rows.append(Conversion("feedforward of acceleration", "m", tuple(values)))
-    if viscous := key.get("viscous_feedforward"):
-        rows.append(_damping("feedforward of viscous friction", "d", viscous, turn, flat))
-    if coulomb := key.get("coulomb_feedforward"):
-        rows.append(_force("feedforward of Coulomb friction", "Fc", coulomb, turn, flat))
-    return rows
-
-
-def _limits(key: Mapping[str, Any], turn: Turn, flat: Mapping[str, Any]) -> list[Conversion]:
-    names = {"force_limit": ("limit of the force", "Fmax"), "integral_limit": ("limit of the integrals", "Imax")}
-    return [_force(*words, key[name], turn, flat) for name, words in names.items() if key.get(name)]
-
-
-def _kv(name: str, symbol: str, kv: float) -> Conversion:
-    return Conversion(name, symbol, ((kv, "1/s"), (kv * 0.06, "(m/min)/mm")))
-
-
-def _time(name: str, symbol: str, time: float) -> Conversion:
-    return Conversion(name, symbol, ((time, "s"), (time * 1e3, "ms"), (1 / (2 * pi * time), "Hz (corner)")))
-
-
-def _force(name: str, symbol: str, force: float, turn: Turn, flat: Mapping[str, Any]) -> Conversion:
-    values = [(force, axis_of(flat).unit("N"))]
-    if turn.travel:
-        values.append((force * turn.travel / (2 * pi), "N*m at the motor"))
-    if turn.per_ampere:
-        values.append((force / turn.per_ampere, "A"))
-    return Conversion(name, symbol, tuple(values))
-
-
-def _damping(name: str, symbol: str, gain: float, turn: Turn, flat: Mapping[str, Any]) -> Conversion:
-    """A gain that is a force per velocity."""
-    return _per(name, symbol, gain, "N*s/m", ("/(rad/s)", "/(turn/s)", "/rpm"), (1.0, 2 * pi, 2 * pi / 60), turn, flat)
-
-
-def _stiffness(name: str, symbol: str, gain: float, turn: Turn, flat: Mapping[str, Any]) -> Conversion:
-    """A gain that is a force per displacement."""
-    return _per(name, symbol, gain, "N/m", ("/rad", "/turn"), (1.0, 2 * pi), turn, flat)
-
-
-def _integral(name: str, symbol: str, gain: float, turn: Turn, flat: Mapping[str, Any]) -> Conversion:
-    """A gain that is a force per displacement and time."""
-    return _per(name, symbol, gain, "N/(m*s)", ("/(rad*s)", "/(turn*s)"), (1.0, 2 * pi), turn, flat)
-
-
-def _per(
-    name: str,
-    symbol: str,
-    gain: float,
-    unit: str,
-    per: tuple[str, ...],
-    factors: tuple[float, ...],
-    turn: Turn,
-    flat: Mapping[str, Any],
-) -> Conversion:
-    """A gain, also per angle of the motor, as a torque and as a current."""
+def _rows(flat: Mapping[str, Any], turn: Turn) -> Iterator[Conversion]:
+    """The gains that a controller declares, each by its unit."""
     kind = axis_of(flat)
-    values = [(gain, kind.unit(unit))]
-    if turn.per_ampere:
-        shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)
-        values.append((gain / turn.per_ampere, shown))
-    if turn.travel:
-        at_motor = gain * (turn.travel / (2 * pi)) ** 2
-        values += [(at_motor * factor, f"N*m{text}") for text, factor in zip(per, factors, strict=True)]
+    for gain in controller_of(flat).gains(flat):
+        values = [(gain.value, kind.unit(gain.unit)), *BY_UNIT.get(gain.unit, _nothing)(gain.value, turn, kind)]
+        yield Conversion(gain.name, gain.symbol, tuple(values))
+
+
+def _nothing(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    return []
+
+
+def _rate(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    return [(value * 0.06, "(m/min)/mm")]
+
+
+def _time(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    return [(value * 1e3, "ms"), (1 / (2 * pi * value), "Hz (corner)")]
+
+
+def _frequency(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    return [(value * 2 * pi, "rad/s")]
+
+
+def _length(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    return [(value / turn.travel, "turn")] if turn.travel else []
+
+
+def _mass(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    return [(value * (turn.travel / (2 * pi)) ** 2, "kg*m^2 at the motor")] if turn.travel else []
+
+
+def _force(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+    at_motor = [(value * turn.travel / (2 * pi), "N*m at the motor")] if turn.travel else []
+    return [*at_motor, *([(value / turn.per_ampere, "A")] if turn.per_ampere else [])]
+
+
+def _per(unit: str, *per: tuple[str, float]) -> Convert:
+    """A force for a motion, also per angle of the motor, as a torque and as a current: with the angle as it is written
+    behind the force, and how many of the first there are in it."""
+
+    def others(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
+        values = []
         if turn.per_ampere:
-            ampere = turn.per_ampere * turn.travel / (2 * pi)  # torque of an ampere
-            values += [(at_motor * factor / ampere, f"A{text}") for text, factor in zip(per, factors, strict=True)]
-    return Conversion(name, symbol, tuple(values))
+            shown = kind.unit(unit).replace("N*m", "A", 1) if kind != LINEAR else unit.replace("N", "A", 1)
+            values.append((value / turn.per_ampere, shown))
+        if turn.travel:
+            at_motor = value * (turn.travel / (2 * pi)) ** 2
+            values += [(at_motor * factor, f"N*m{angle}") for angle, factor in per]
+            if turn.per_ampere:
+                ampere = turn.per_ampere * turn.travel / (2 * pi)  # torque of an ampere
+                values += [(at_motor * factor / ampere, f"A{angle}") for angle, factor in per]
+        return values
+
+    return others
+
+
+BY_UNIT: Mapping[str, Convert] = {
+    "N/m": _per("N/m", ("/rad", 1.0), ("/turn", 2 * pi)),
+    "N*s/m": _per("N*s/m", ("/(rad/s)", 1.0), ("/(turn/s)", 2 * pi), ("/rpm", 2 * pi / 60)),
+    "N/(m*s)": _per("N/(m*s)", ("/(rad*s)", 1.0), ("/(turn*s)", 2 * pi)),
+    "N": _force,
+    "kg": _mass,
+    "m": _length,
+    "s": _time,
+    "1/s": _rate,
+    "Hz": _frequency,
+}
+"""What values in SI are in other units, by their unit on a linear axis."""

@@ -5,109 +5,66 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from friso.stage.controllers import FILTERS_KEY, FORCE_LIMIT, controller_of
+from friso.stage.filters import FEEDBACK, FORWARD
+from friso.stage.lists import row_keys
+
 ABOVE, MAIN, BELOW, LAST, LOWEST = range(5)
 """Lines of a drawing."""
 
-AHEAD = {
-    "acceleration_feedforward": "m d²r/dt²",
-    "viscous_feedforward": "d dr/dt",
-    "coulomb_feedforward": "Fc sign(dr/dt)",
-}
+ASIDE = 6
+"""By how many characters what is added from below stands before its sum."""
 
 
 class Canvas:
-    """Lines of a drawing, each written from left to right."""
+    """A drawing from the error to the force, to which boxes and sums are added from left to right."""
 
-    def __init__(self) -> None:
+    def __init__(self, flat: Mapping[str, Any]) -> None:
+        self.paths = {flat[f"{place}.path"] for place in row_keys(flat, FILTERS_KEY)}
+        self.limited = FORCE_LIMIT in flat
         self.lines = [""] * 5
-        self.add("r --(+)-- e --")
-        self.put(BELOW, 5, "| -")
-        self.put(LAST, 5, "y")
+        self.lines[MAIN] = "r --(+)-- e --"
+        self._put(BELOW, 5, "| -")
+        self._put(LAST, 5, "y")
 
-    def add(self, text: str) -> None:
-        """Go on along the main line."""
-        self.lines[MAIN] += text
+    @property
+    def filtered(self) -> bool:
+        """Whether what is fed back is filtered."""
+        return FEEDBACK in self.paths
 
-    def junction(self) -> int:
-        """A sum on the main line; the place of its sign."""
-        self.add("--(+)")
-        return len(self.lines[MAIN]) - 2
+    def box(self, text: str) -> None:
+        """What the signal goes through next."""
+        line = self.lines[MAIN]
+        self.lines[MAIN] = f"{line}{'' if line.endswith('-') else '--'}[ {text} ]"
 
-    def put(self, line: int, place: int, text: str) -> None:
+    def sum(self, above: str = "", below: str = "", minus: bool = True, deep: bool = False) -> None:
+        """A sum with what comes from above, and what from below, subtracted or (`minus` False) added; `deep`, one line
+        further down."""
+        self.lines[MAIN] += "--(+)"
+        place = len(self.lines[MAIN]) - 2
+        if above:
+            self._put(ABOVE, place, f"v  {above}")
+        if below:
+            self._put(BELOW, place, "| -" if minus else "|")
+            if deep:
+                self._put(LAST, place, "|")
+            self._put(LOWEST if deep else LAST, place if minus else place - ASIDE, below)
+
+    def text(self) -> str:
+        """The drawing, the force behind filters and limit."""
+        boxes = [*(["filters"] if FORWARD in self.paths else []), *(["limit"] if self.limited else [])]
+        for name in boxes:
+            self.box(name)
+        self.lines[MAIN] += "--> F"
+        return "\n".join(line.rstrip() for line in self.lines if line.strip())
+
+    def _put(self, line: int, place: int, text: str) -> None:
         """Write at a place of a line, behind what stands there."""
         self.lines[line] = f"{self.lines[line]:<{place}}{text}"
 
-    def ended(self, key: Mapping[str, Any]) -> str:
-        """The drawing, the force behind filters and limit."""
-        boxes = [*(["filters"] if _filters(key, "forward") else []), *(["limit"] if "force_limit" in key else [])]
-        self.add("--" + "".join(f"[ {name} ]--" for name in boxes) + "> F")
-        return "\n".join(line.rstrip() for line in self.lines if line.strip())
-
 
 def loop_diagram(flat: Mapping[str, Any]) -> str:
-    """The loop of a stage given as flat keys, with the terms that it has; empty for a controller from elsewhere."""
-    key = {name.removeprefix("controller."): v for name, v in flat.items() if name.startswith("controller.")}
-    if key["kind"] == "cascade":
-        return _cascade(key)
-    if key["kind"] == "pid":
-        return _van_dijk(key) if "crossover" in key else _pid(key)
-    return ""
-
-
-def _cascade(key: Mapping[str, Any]) -> str:
-    canvas = Canvas()
-    canvas.add("[ kv (1 + 1/(Tp s)) ]" if "position_integral_time" in key else "[ kv ]")
-    if key["velocity_feedforward"]:
-        place = canvas.junction()
-        canvas.put(BELOW, place, "|")
-        canvas.put(LAST, place - 6, "f dr/dt")
-    place = canvas.junction()
-    how = ", filtered" if key["velocity_filter"] or _filters(key, "feedback") else ""
-    canvas.put(BELOW, place, "| -")
-    canvas.put(LAST, place, "|")
-    canvas.put(LOWEST, place, f"dy/dt{how}")
-    on_error, integral = key["proportional_on"] == "error", "velocity_integral_time" in key
-    velocity = "kp (1 + 1/(Tn s))" if integral and on_error else "kp/(Tn s)" if integral else "kp"
-    canvas.add(f"--[ {velocity} ]")
-    ahead = _ahead(key)
-    if ahead or not on_error:
-        place = canvas.junction()
-        if ahead:
-            canvas.put(ABOVE, place, f"v  {ahead}")
-        if not on_error:
-            canvas.put(BELOW, place, "| -")
-            canvas.put(LAST, place, f"kp dy/dt{how}")
-    return canvas.ended(key)
-
-
-def _pid(key: Mapping[str, Any]) -> str:
-    canvas = Canvas()
-    derivative = "kd s/(1 + tau s)" if key["tau"] else "kd s"
-    on_error = key["derivative_on"] == "error"
-    terms = ["kp", *(["ki/s"] if key["ki"] else []), *([derivative] if key["kd"] and on_error else [])]
-    canvas.add(f"[ {' + '.join(terms)} ]")
-    ahead, beside = _ahead(key), key["kd"] and not on_error
-    if ahead or beside:
-        place = canvas.junction()
-        if ahead:
-            canvas.put(ABOVE, place, f"v  {ahead}")
-        if beside:
-            canvas.put(BELOW, place, "| -")
-            canvas.put(LAST, place, f"[ {derivative} ]-- y")
-    return canvas.ended(key)
-
-
-def _van_dijk(key: Mapping[str, Any]) -> str:
-    canvas = Canvas()
-    canvas.add("[ 1/(1 + tau_p s) ]--[ k_p (1 + tau_z s)(1 + 1/(tau_i s)) ]")
-    return canvas.ended(key)
-
-
-def _ahead(key: Mapping[str, Any]) -> str:
-    """What is fed forward to the force."""
-    return " + ".join(term for name, term in AHEAD.items() if key.get(name))
-
-
-def _filters(key: Mapping[str, Any], path: str) -> bool:
-    """Whether there are filters in a path."""
-    return any(name.startswith("filters.") and name.endswith(".path") and key[name] == path for name in key)
+    """The loop of a stage given as flat keys, with the terms that it has, as its controller draws it."""
+    canvas = Canvas(flat)
+    controller_of(flat).draw(canvas, flat)
+    return canvas.text()

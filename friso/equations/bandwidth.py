@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from friso.stage import numeric_keys
 from friso.stage.controllers import KIND, controller_of
 
 
@@ -33,6 +34,16 @@ def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
     controller = controller_of(flat)
     powers = {controller.key(name): power for name, power in controller.speeds_up.items()}
     return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
+
+
+def range_example(flat: Mapping[str, Any]) -> str:
+    """A range of a key, as it stands in a message: of the one that says how fast the controller of a stage is, its
+    bandwidth or the first of its gains, or else of a mass."""
+    controller = controller_of(flat) if KIND in flat else None
+    gains = [controller.bandwidth_key, *map(controller.key, controller.speeds_up)] if controller else []
+    key = next(key for key in [*gains, "masses.stage", "masses.cart"] if key and flat.get(key))
+    low, high, unit = flat[key] / 8, flat[key] * 5, numeric_keys(flat)[key].unit
+    return f'{key}="{low:.3g} {unit}..{high:.3g} {unit}"'
 
 
 @dataclass(frozen=True)

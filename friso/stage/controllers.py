@@ -3,7 +3,7 @@
 from collections.abc import Hashable, Mapping, Sequence
 from inspect import get_annotations
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, Self, cast
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, cast
 
 from pydantic import model_validator
 
@@ -12,7 +12,7 @@ from friso.quantities import Quantity, Value, positive
 from friso.stage.filters import FILTER_ARRAY
 from friso.stage.lists import Rows
 from friso.stage.plug_ins import load_own
-from friso.stage.section import Section, SectionClass, Variants
+from friso.stage.section import Section, SectionClass, Variants, numeric_fields
 from friso.stage.standstill import AgainstFriction
 
 CONTROLLER = "controller"
@@ -29,6 +29,18 @@ DEFAULT_ANTI_WINDUP: AntiWindup = "clamp"
 """Where a stage file has a limit and does not tell."""
 
 BACK_CALCULATION: AntiWindup = "back_calculation"
+
+SYMBOLS = {"force_limit": ("limit of the force", "Fmax"), "integral_limit": ("limit of the integrals", "Imax")}
+"""What keys of every controller are called in a table of gains, and their symbols."""
+
+
+class Gain(NamedTuple):
+    """A number for a drive: what it is, its symbol, its value [SI] and its unit on a linear axis."""
+
+    name: str
+    symbol: str
+    value: float
+    unit: str
 
 
 class ControllerSection(AgainstFriction):
@@ -64,6 +76,9 @@ class ControllerSection(AgainstFriction):
     """The shares of the force and what they are called in plots."""
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
+    symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType({})
+    """Names of keys to what they are called in a table of gains, and their symbols, where the name itself will not
+    do."""
 
     @model_validator(mode="after")
     def _anti_windup_is_whole(self) -> Self:
@@ -109,6 +124,28 @@ class ControllerSection(AgainstFriction):
         """The shares of the force [N], each a signal made by the `blocks` (`friso.equations.blocks`) from what is
         `measured`."""
         raise NotImplementedError
+
+    @classmethod
+    def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
+        """The numbers for a drive: its keys that are not 0, then those that every controller has."""
+        fields = numeric_fields(cls)
+        names = sorted(fields, key=lambda name: name in ControllerSection.model_fields)
+        return tuple(
+            Gain(*cls._called(name), float(flat[cls.key(name)]), fields[name].unit)
+            for name in names
+            if flat.get(cls.key(name))
+        )
+
+    @classmethod
+    def _called(cls, name: str) -> tuple[str, str]:
+        """What a key is called in a table of gains, and its symbol."""
+        return {**SYMBOLS, **cls.symbols}.get(name, (name.replace("_", " "), name))
+
+    @classmethod
+    def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
+        """Draw the way from the error to the demanded force in characters (`friso.drives.diagram.Canvas`): a box, if a
+        controller does not say more."""
+        canvas.box(flat[KIND])
 
     @classmethod
     def key(cls, name: str) -> str:

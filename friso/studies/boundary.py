@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.tolerance import checked_rtol
+from friso.equations.bandwidth import range_example
 from friso.errors import InputError
 from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
@@ -20,8 +21,6 @@ LOOSEST = 1e-6
 
 TRIED = 9
 """Values of each range that are tried for a stage that may be."""
-
-EXAMPLE = 'controller.crossover="1 Hz..40 Hz"'
 
 
 def boundary(
@@ -40,40 +39,42 @@ def boundary(
     range, link or stage (one that cannot hunt), ValueError for an `rtol` that is not usable.
     """
     checked_rtol(rtol)
-    followers = dict(links or {})
+    followers, example = dict(links or {}), range_example(stage.flat())
     ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
     if len(ranges) not in (1, 2):
-        raise InputError("axes", f"{len(ranges)} keys", "one key or two", EXAMPLE)
+        raise InputError("axes", f"{len(ranges)} keys", "one key or two", example)
     check_links(stage, followers, frozenset(swept.key for swept in ranges))
     if reason := cannot_hunt(stage):
         if reason == DITHERS:
-            raise InputError("controller", reason, "a controller without dither", EXAMPLE)
-        raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
+            raise InputError("controller", reason, "a controller without dither", example)
+        raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", example)
     for swept in ranges:
         if swept.key.startswith("motion."):
             problem = "a key of the motion, which plays no part"
-            raise InputError(swept.key, problem, "a key of the stage or its controller", EXAMPLE)
+            raise InputError(swept.key, problem, "a key of the stage or its controller", example)
     if rtol > LOOSEST:
         raise InputError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))
-    _refuse_impossible(space)
+    _refuse_impossible(space, example)
     kernels([KernelRequest(space.form, variational) for variational in (False, True)])
     return diagram(space, rtol) if len(ranges) == 1 else plane(space, rtol)
 
 
-def _refuse_impossible(space: Space) -> None:
+def _refuse_impossible(space: Space, example: str) -> None:
     """Raises InputError if no stage may have the values of the ranges."""
     points = space.grid(TRIED)
     if not space.allowed(points).any():
         key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]
-        raise InputError(key, "ranges that no stage may have", why, EXAMPLE)
+        raise InputError(key, "ranges that no stage may have", why, example)
 
 
 def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> KeyRange:
-    read = read_axis(stage, name, text, name in free, log)
+    read, example = read_axis(stage, name, text, name in free, log), range_example(stage.flat())
     if isinstance(read, SweptAxis) or read.count is not None:
-        raise InputError(name, repr(text), "a range FIRST..LAST, without a number of points", EXAMPLE)
+        raise InputError(
+            name, repr(text), "a range FIRST..LAST, without a number of points", range_example(stage.flat())
+        )
     field = numeric_keys(stage.flat()).get(name)
     if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
-        raise InputError(name, repr(text), f"values {field.bound.text}", EXAMPLE)
+        raise InputError(name, repr(text), f"values {field.bound.text}", example)
     return KeyRange(name, read.first, read.last, read.scale == "log", read.unit)

@@ -13,17 +13,19 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
+from friso.equations.controllers.feedforward import SYMBOLS, fed_forward
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage import ControllerSection, Rule, register_controller
+from friso.stage.controllers import Gain
 
 if TYPE_CHECKING:
     import sympy as sp
 
     from friso.equations.blocks import Blocks, Measured, Signal
 
-POSITION_TIME, VELOCITY_TIME, PROPORTIONAL_ON, VELOCITY_FILTER = (
+KP, POSITION_TIME, VELOCITY_TIME, PROPORTIONAL_ON, VELOCITY_FILTER = (
     f"controller.{name}"
-    for name in ("position_integral_time", "velocity_integral_time", "proportional_on", "velocity_filter")
+    for name in ("kp", "position_integral_time", "velocity_integral_time", "proportional_on", "velocity_filter")
 )
 
 FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "coulomb_feedforward", "viscous_feedforward")
@@ -76,6 +78,17 @@ class Cascade(ControllerSection):
             "velocity_integral_time": "Integral time of velocity",
         }
     )
+    symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType(
+        {
+            "kv": ("gain of the position loop", "kv"),
+            "position_integral_time": ("integral time of the position loop", "Tp"),
+            "kp": ("gain of the velocity loop", "kp"),
+            "velocity_integral_time": ("integral time of the velocity loop", "Tn"),
+            "velocity_filter": ("filter of the measured velocity", "Tf"),
+            "velocity_feedforward": ("share of the reference's velocity", "f"),
+            **SYMBOLS,
+        }
+    )
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
@@ -96,6 +109,29 @@ class Cascade(ControllerSection):
             filtered=bool(flat[VELOCITY_FILTER] > 0),
             feedforward=tuple(name for name in FEEDFORWARD if flat[cls.key(name)] > 0),
         )
+
+    @classmethod
+    def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
+        """Its keys, and the integral of the velocity loop as a gain."""
+        listed = super().gains(flat)
+        if VELOCITY_TIME not in flat:
+            return listed
+        integral = flat[KP] / flat[VELOCITY_TIME]
+        return (*listed, Gain("integral of the velocity loop as a gain, kp/Tn", "ki", integral, "N/m"))
+
+    @classmethod
+    def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
+        """A sum for each loop."""
+        canvas.box("kv (1 + 1/(Tp s))" if POSITION_TIME in flat else "kv")
+        if flat[cls.key("velocity_feedforward")]:
+            canvas.sum(below="f dr/dt", minus=False)
+        velocity = f"dy/dt{', filtered' if flat[VELOCITY_FILTER] or canvas.filtered else ''}"
+        canvas.sum(below=velocity, deep=True)
+        on_error, integral = flat[PROPORTIONAL_ON] == "error", VELOCITY_TIME in flat
+        canvas.box("kp (1 + 1/(Tn s))" if integral and on_error else "kp/(Tn s)" if integral else "kp")
+        ahead = fed_forward(flat)
+        if ahead or not on_error:
+            canvas.sum(ahead, "" if on_error else f"kp {velocity}")
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:

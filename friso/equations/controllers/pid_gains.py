@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import sqrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
+from friso.equations.controllers.feedforward import SYMBOLS, fed_forward
 from friso.equations.controllers.pid import Pid
 from friso.quantities import Quantity, Value, any_sign, non_negative
 from friso.stage import Rule, register_controller
-from friso.stage.controllers import KIND
+from friso.stage.controllers import KIND, Gain
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -57,6 +59,15 @@ class PidGains(Pid):
     loop_gain = ("kp", "ki", "kd")
     decisive = ("ki", "kd", "tau")
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({**Pid.shares, "f": "feedforward"})
+    symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType(
+        {
+            "kp": ("proportional gain", "kp"),
+            "ki": ("integral gain", "ki"),
+            "kd": ("derivative gain", "kd"),
+            "tau": ("filter of the derivative", "tau"),
+            **SYMBOLS,
+        }
+    )
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
@@ -77,6 +88,32 @@ class PidGains(Pid):
             derivative_on=flat[DERIVATIVE_ON] if derived else "none",
             feedforward=tuple(name for name in FEEDFORWARD if cls.key(name) in flat),
         )
+
+    @classmethod
+    def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
+        """Its keys; its times; and, where it is one, the gains of a P over a PI controller."""
+        kp, ki, kd = flat[KP], flat[KI], flat[KD]
+        listed = [*super().gains(flat)]
+        if ki and kp:
+            listed.append(Gain("integral time kp/ki", "Ti", kp / ki, "s"))
+        if kp and kd:
+            listed.append(Gain("derivative time kd/kp", "Td", kd / kp, "s"))
+        if ki and kd and not flat[TAU] and flat[DERIVATIVE_ON] == "measurement" and kp**2 >= 4 * ki * kd:
+            half, root = kp / (2 * kd), sqrt((kp / (2 * kd)) ** 2 - ki / kd)
+            listed.append(Gain("as P over PI with kp = kd: kv (or 1/Tn)", "kv", half - root, "1/s"))
+            listed.append(Gain("as P over PI with kp = kd: Tn (or 1/kv)", "Tn", 1 / (half + root), "s"))
+        return tuple(listed)
+
+    @classmethod
+    def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
+        """A sum where something acts beside the error."""
+        derivative = "kd s/(1 + tau s)" if flat[TAU] else "kd s"
+        on_error = flat[DERIVATIVE_ON] == "error"
+        terms = ["kp", *(["ki/s"] if flat[KI] else []), *([derivative] if flat[KD] and on_error else [])]
+        canvas.box(" + ".join(terms))
+        ahead, beside = fed_forward(flat), flat[KD] and not on_error
+        if ahead or beside:
+            canvas.sum(ahead, f"[ {derivative} ]-- y" if beside else "")
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:

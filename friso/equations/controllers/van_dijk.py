@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from friso.equations.controllers.pid import Pid
 from friso.quantities import Number, Quantity, Value, at_least_1, inside_0_1, positive
 from friso.stage import Rule, register_controller
-from friso.stage.controllers import KIND
+from friso.stage.controllers import KIND, Gain
 from friso.stage.tables import ROUNDING
 from friso.stage.transmission import moving_mass
 
@@ -60,6 +60,23 @@ class VanDijk(Pid):
         return {TUNED_MASS: moving_mass(flat)}
 
     @classmethod
+    def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
+        """Those of Eq. 7 that follow from its keys, and the keys that every controller has."""
+        values = numbers(flat)
+        times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
+        return (
+            Gain("gain k_p of Eq. 8", "k_p", values["k_p"], "N/m"),
+            *(Gain(f"time constant of the {name}", symbol, values[symbol], "s") for symbol, name in times.items()),
+            *(gain for gain in super().gains(flat) if gain.symbol not in cls.needed),
+        )
+
+    @classmethod
+    def draw(cls, canvas: Any, flat: Mapping[str, Any]) -> None:
+        """The low-pass, then the three terms."""
+        canvas.box("1/(1 + tau_p s)")
+        canvas.box("k_p (1 + tau_z s)(1 + 1/(tau_i s))")
+
+    @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
         """Always."""
         return True
@@ -67,12 +84,12 @@ class VanDijk(Pid):
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
         """The gain k_p of Eq. 8 [N/m]."""
-        return gains(blocks)["k_p"]
+        return rules(blocks)["k_p"]
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
         """The three shares [N] of Eq. 7."""
-        k_p, tau_z, tau_i, tau_p = gains(blocks).values()
+        k_p, tau_z, tau_i, tau_p = rules(blocks).values()
         passed = blocks.low_pass(measured.error, tau_p, "error")
         return {
             "p": passed * (k_p * (1 + tau_z / tau_i)),
@@ -99,11 +116,11 @@ def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
 
     return {
         name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
-        for name, expression in gains(Continuous(S.One)).items()
+        for name, expression in rules(Continuous(S.One)).items()
     }
 
 
-def gains(blocks: Blocks) -> dict[str, sp.Expr]:
+def rules(blocks: Blocks) -> dict[str, sp.Expr]:
     """Eq. 8: gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s]."""
     from sympy import pi, sqrt
 

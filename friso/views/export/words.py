@@ -25,8 +25,6 @@ def rows(gains: Gains) -> list[tuple[str, list[str]]]:
 def notes(gains: Gains) -> list[str]:
     """What to know of the numbers."""
     texts = []
-    if not gains.conversions:
-        texts.append("This controller is not one of friso's own: its gains have no other units than those of its file")
     if not any("at the motor" in unit or "turn" in unit for row in gains.conversions for _, unit in row.values):
         texts.append('Units of a motor are added by --set travel_per_turn="10 mm" (or a [transmission])')
     if gains.kind is not None:

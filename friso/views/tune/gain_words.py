@@ -8,7 +8,7 @@ from friso.views.export.words import rows
 
 
 def gain_lines(tuning: Advice) -> list[str]:
-    """The gains to type in for every remedy that works, none of a controller of another package."""
+    """The gains to type in for every remedy that works."""
     lines = []
     for outcome in tuning.working:
         table = rows(gains_of(outcome.stage, {})) if outcome.stage else []

@@ -1,0 +1,28 @@
+"""What controllers feed forward to the force: in a table of gains, and in the drawing of a loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+from friso.stage import ControllerSection
+
+SYMBOLS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "acceleration_feedforward": ("feedforward of acceleration", "m"),
+        "viscous_feedforward": ("feedforward of viscous friction", "d"),
+        "coulomb_feedforward": ("feedforward of Coulomb friction", "Fc"),
+    }
+)
+
+TERMS = {
+    "acceleration_feedforward": "m d²r/dt²",
+    "viscous_feedforward": "d dr/dt",
+    "coulomb_feedforward": "Fc sign(dr/dt)",
+}
+
+
+def fed_forward(flat: Mapping[str, Any]) -> str:
+    """The terms that there are; empty without any."""
+    return " + ".join(term for name, term in TERMS.items() if flat.get(ControllerSection.key(name)))
