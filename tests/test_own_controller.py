@@ -20,6 +20,9 @@ from friso.equations.structure import structure
 from friso.frequency import crossover
 from friso.identification.output_error.problem import closed_loop
 from friso.identification.readings.common import record
+from friso.remedies import method
+from friso.remedies.catalogue import remedies
+from friso.remedies.search import Budget
 from friso.stage import Stage, save
 from friso.studies.compare import study
 from friso.studies.rig.experiments import hunting
@@ -148,14 +151,17 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
 def test_tune(locked: Stage, tmp_path: Path) -> None:
     """Its bandwidth is among what is tuned, and the answer has its numbers."""
     tiny = Budget(points=3, generations=2, machines=4, surveyed=2, fresh=6)
-    with patched({method: {"Budget": lambda: tiny, "ways": None}}):
-        document = answer(tmp_path, locked, "tune", "--only", "controller", "--bandwidth-limit", "16 Hz")
+    with patched({method: {"Budget": lambda: tiny, "remedies": lambda *goal: remedies(*goal)[:1]}}):
+        document = answer(tmp_path, locked, "tune", "--only", "controller", "--within", "5 um")
+    assert [*document["ways"]] == ["bandwidth"]
     assert document["ways"]["bandwidth"]["works"] == "works"
+    assert any(change.startswith(BANDWIDTH) for change in document["ways"]["bandwidth"]["changes"])
 
 
 def test_export(locked: Stage, tmp_path: Path) -> None:
     """Its keys by their units, its loop as a box, and the limit that every controller may have."""
-    document = answer(tmp_path, locked, "export", "gains")
+    save(locked, tmp_path / "stage.toml")
+    document = json.loads(friso_inside(tmp_path, "export", "gains", "stage.toml", "--json").stdout)
     gains = {row["symbol"]: row["values"] for row in document["gains"]}
     assert gains["bandwidth"][0] == {"value": 6.0, "unit": "Hz"}
     assert gains["bandwidth"][1] == {"value": pytest.approx(12 * np.pi), "unit": "rad/s"}
