@@ -47,11 +47,9 @@ def test_virgin_curves_against_scipy(friction: str) -> None:
 @pytest.mark.parametrize("law", ["gms", "elasto_plastic", "rolling"])
 def test_a_conversion_keeps_what_a_measurement_shows(law: str) -> None:
     conversion = convert(LUGRE, law, 6)
-    kept = {item.what for item in conversion.compared if item.kept}
-    assert kept >= {
-        "steady friction over speed", "break-away", "stiffness before sliding", "damping at rest", "viscous damping",
-    }  # fmt: skip
-    assert (law == "elasto_plastic") == ("virgin curve" not in kept)
+    kept = {item.kind for item in conversion.compared if item.kept}
+    assert kept >= {"curve", "static", "stiffness", "damping", "viscous"}
+    assert (law == "elasto_plastic") == ("virgin" not in kept)
     assert friso.loads(conversion.stage.to_toml()) == conversion.stage
     assert conversion.open
     assert conversion.active
@@ -69,11 +67,11 @@ def test_a_conversion_there_and_back() -> None:
 
 
 def test_what_a_law_cannot_keep_is_said() -> None:
-    lost = {law: [item.what for item in convert(LUGRE, law).lost] for law in ("dahl", "stribeck")}
-    assert {"break-away", "steady friction over speed", "virgin curve"} <= {*lost["dahl"]}
-    assert {"stiffness before sliding", "virgin curve"} <= {*lost["stribeck"]}
+    lost = {law: [item.kind for item in convert(LUGRE, law).lost] for law in ("dahl", "stribeck")}
+    assert {"static", "curve", "virgin"} <= {*lost["dahl"]}
+    assert {"stiffness", "virgin"} <= {*lost["stribeck"]}
     (fewer,) = convert(LUGRE, "gms", 2).lost
-    assert fewer.what == "virgin curve"
+    assert fewer.kind == "virgin"
 
 
 def test_passive_laws_are_not_warned_of() -> None:
@@ -118,4 +116,4 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_gms_keeps_its_own() -> None:
     conversion = convert(under(gms()), "gms", 3)
-    assert not [item for item in conversion.lost if item.what != "virgin curve"]
+    assert not [item for item in conversion.lost if item.kind != "virgin"]

@@ -45,6 +45,10 @@ class FrictionSection(UncertainSection):
     decided_by: ClassVar[Mapping[str, str]] = {}
     """The experiment that would tell the value of a key that other measurements leave open; under "", the one that
     tells the law from others."""
+    fitted: ClassVar[bool] = False
+    """Whether `friso identify` fits the law's parameters to logs of moves."""
+    words: ClassVar[Mapping[str, str]] = {}
+    """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:
@@ -85,6 +89,11 @@ register_friction = FRICTION.register
 def friction_law(name: str) -> type[FrictionSection]:
     """The class of the registered law called `name`."""
     return cast(type[FrictionSection], FRICTION.named(name))
+
+
+def friction_laws() -> dict[str, type[FrictionSection]]:
+    """The registered laws by name."""
+    return cast(dict[str, type[FrictionSection]], FRICTION.classes)
 
 
 class Joint(UncertainSection):

@@ -21,6 +21,10 @@ COULOMB_BELOW_STATIC = Rule(
 )
 
 
+LEVEL_WORDS = {"static": "Static friction", "coulomb": "Coulomb friction", "viscous": "Viscous friction"}
+"""What these keys are called on the axes of maps."""
+
+
 class Friction:
     """A declared friction law: force [N] that opposes the velocity, its component and its scales.
 
@@ -89,8 +93,8 @@ def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[
 
 
 def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
-    """The kink of every law that depends on the direction of the motion, beyond which the velocity [m/s] is positive:
-    others know it, and set it. About it friction may have a peak that is `narrow` [m/s]."""
+    """The kink of every law that depends on the direction of the motion, beyond which the velocity [m/s] is positive;
+    shared with modules that prescribe a direction. About it friction may have a peak that is `narrow` [m/s]."""
     from friso.equations.component import Kink
 
     return Kink(DIRECTION, velocity) if narrow is None else Kink(DIRECTION, velocity, narrow=narrow)
@@ -121,6 +125,7 @@ class StribeckSection(FrictionSection):
     asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     viscous_asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
+    words: ClassVar[Mapping[str, str]] = LEVEL_WORDS
     decisive: ClassVar[tuple[str, ...]] = (
         "friction.stribeck_exponent",
         "friction.asymmetry",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
-from friso.equations.friction.common import Friction, direction
+from friso.equations.friction.common import LEVEL_WORDS, Friction, direction
 from friso.equations.friction.measured import Levels, MeasuredFriction, displacements
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import FrictionSection, register_friction
@@ -21,6 +21,8 @@ class Dahl(FrictionSection):
     """A spring that slips: z' = v - sigma_0 abs(v)/F_c z, F = sigma_0 z + sigma_2 v."""
 
     model: Literal["dahl"]
+    fitted: ClassVar[bool] = True
+    words: ClassVar[Mapping[str, str]] = LEVEL_WORDS
     coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]

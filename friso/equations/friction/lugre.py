@@ -28,6 +28,7 @@ class LuGre(StribeckSection):
     """Bristles that deflect by z: z' = v - sigma_0 abs(v)/g(v) z, F = sigma_0 z + sigma_1 z' + sigma_2 v."""
 
     model: Literal["lugre"]
+    fitted: ClassVar[bool] = True
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
     decided_by: ClassVar[Mapping[str, str]] = {"": "the drift under a load that oscillates below break-away"}

@@ -38,6 +38,7 @@ class Rolling(StribeckSection):
     F = sigma_0 z + sigma_1 z' + sigma_2 v, the power rounded at r = 0 (`softening`)."""
 
     model: Literal["rolling"]
+    fitted: ClassVar[bool] = True
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
     rolling_exponent: Annotated[float, Number(from_1_to_4, "1.5")]

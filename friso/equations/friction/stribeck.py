@@ -4,7 +4,7 @@ doi:10.1016/0005-1098(94)90209-7."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Stribeck(StribeckSection):
     """A curve of force against velocity: F = g(v) tanh(v/v_r) + sigma_2 v; at rest it creeps instead of sticking."""
 
     model: Literal["stribeck"]
+    fitted: ClassVar[bool] = True
     regularisation_velocity: Annotated[Value, Quantity("m/s", positive, "10 um/s")]
 
     @staticmethod

@@ -10,15 +10,13 @@ import numpy as np
 
 from friso.axis import LINEAR, axis_of
 from friso.errors import InputError
+from friso.stage.tables import friction_law, friction_laws
 
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
 """The mass that moves; the cart's share of it, which a rigid stage has as given; static over Coulomb friction."""
 
 HIGHEST_RATIO = 4.0
 """Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
-
-FITTED = ("lugre", "dahl", "stribeck", "rolling")
-"""Friction laws whose parameters are fitted."""
 
 SHORTEST, LONGEST = 5e-8, 3e-4
 """Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
@@ -75,11 +73,12 @@ def parameters_of(
     left out. Raises InputError for a friction law that is not among those that can be fitted."""
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
-    if flat["friction.model"] in FITTED:
+    if friction_law(flat["friction.model"]).fitted:
         parameters += _friction(flat, levels, speed, travel, both_ways)
     elif flat["friction.model"] != "none":
         actual = f'"{flat["friction.model"]}", a law that friso cannot fit'
-        raise InputError("friction.model", actual, f"one of {', '.join(FITTED)}, or none", 'model = "lugre"')
+        fitted = ", ".join(name for name, law in friction_laws().items() if law.fitted)
+        raise InputError("friction.model", actual, f"one of {fitted}, or none", 'model = "lugre"')
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
     if both_ways:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,13 +25,18 @@ SPEEDS = np.geomspace(1e-2, 1e3, 201)
 """Speeds, in Stribeck velocities, at which steady friction is compared."""
 
 
+Shown = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous"]
+"""What measurements show: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping
+at rest, viscous damping."""
+
+
 @dataclass(frozen=True)
 class MeasuredChange:
     """One thing that a measurement shows, `before` and `after` the conversion [unit], and by how much it is off, as a
     share of static friction for curves and of the number itself for numbers; it is kept where that is below
     `allowed`."""
 
-    what: str
+    kind: Shown
     unit: str
     before: float
     after: float
@@ -111,11 +116,11 @@ def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConvers
     after, law = measured(flat), friction_law(flat["friction.model"])
     items = (
         _curve(source, made, before),
-        _number("break-away", "N", before.levels.static, after.levels.static),
-        _number("stiffness before sliding", "N/m", before.stiffness, after.stiffness),
+        _number("static", "N", before.levels.static, after.levels.static),
+        _number("stiffness", "N/m", before.stiffness, after.stiffness),
         _virgin(before, after),
-        _number("damping at rest", "N*s/m", before.damping, after.damping),
-        _number("viscous damping", "N*s/m", before.levels.viscous, after.levels.viscous),
+        _number("damping", "N*s/m", before.damping, after.damping),
+        _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
     return LawConversion(made, source, before, after, items, law.left_open(before), law.active(flat))
 
@@ -139,9 +144,9 @@ def _text(value: float, unit: str) -> Any:
     return f"{value!r} {unit}" if unit else value
 
 
-def _number(what: str, unit: str, before: float, after: float) -> MeasuredChange:
+def _number(kind: Shown, unit: str, before: float, after: float) -> MeasuredChange:
     size = max(abs(before), abs(after)) or 1.0
-    return MeasuredChange(what, unit, before, after, abs(after - before) / size)
+    return MeasuredChange(kind, unit, before, after, abs(after - before) / size)
 
 
 def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChange:
@@ -152,7 +157,7 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
     )
     at = np.unravel_index(int(np.argmax(np.abs(new - old))), old.shape)
     off = float(np.abs(new - old)[at] / before.levels.static)
-    return MeasuredChange("steady friction over speed", "N", float(old[at]), float(new[at]), off)
+    return MeasuredChange("curve", "N", float(old[at]), float(new[at]), off)
 
 
 WITHIN = 0.02
@@ -162,7 +167,7 @@ WITHIN = 0.02
 def _virgin(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
     """The virgin curve, where the two are farthest apart."""
     if not after.stiffness:
-        return MeasuredChange("virgin curve", "N", before.levels.static, 0.0, 1.0, WITHIN)
+        return MeasuredChange("virgin", "N", before.levels.static, 0.0, 1.0, WITHIN)
     force = np.interp(before.displacement, after.displacement, after.force)
     at = int(np.argmax(np.abs(force - before.force)))
-    return MeasuredChange("virgin curve", "N", float(before.force[at]), float(force[at]), before.misfit(force), WITHIN)
+    return MeasuredChange("virgin", "N", float(before.force[at]), float(force[at]), before.misfit(force), WITHIN)

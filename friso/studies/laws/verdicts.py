@@ -15,10 +15,10 @@ from friso.hunting.verdict import BANDWIDTHS
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import ELEMENTS, LawConversion, compared, convert, convertible, measured
+from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, convert, convertible, measured
 
-NEEDED = ("steady friction over speed", "break-away", "stiffness before sliding", "viscous damping")
-"""What a law has to keep to be asked."""
+NEEDED: frozenset[Shown] = frozenset(("curve", "static", "stiffness", "viscous"))
+"""What a law has to keep to be tried."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ class LawVerdict:
 
     def answers(self, case: str) -> set[bool]:
         """Whether the stage hunts under the law in a case, by the trials whose verdict is certain: both where that
-        hangs on what is open."""
+        depends on what is open."""
         return {trial.attracted(case) for trial in self.trials if trial.certain(case)}
 
     def certain(self, case: str) -> bool:
@@ -74,7 +74,7 @@ class LawVerdict:
         return all(trial.certain(case) for trial in self.trials)
 
     def hunts(self, case: str) -> bool | None:
-        """Whether the stage hunts under the law in a case; None where that is not certain, or hangs on what is open."""
+        """Whether the stage hunts under the law in a case; None if that is not certain, or depends on what is open."""
         answers = self.answers(case)
         return answers.pop() if len(answers) == 1 and self.certain(case) else None
 
@@ -103,11 +103,11 @@ class LawVerdict:
 
 @dataclass(frozen=True)
 class VerdictsByLaw:
-    """The verdicts law by law, the stage's own first, and the laws that were `left_out`: what they do not keep."""
+    """The verdicts law by law, the stage's own first, and the laws that were `left_out`: what they cannot keep."""
 
     stage: Stage
     verdicts: tuple[LawVerdict, ...]
-    left_out: Mapping[str, tuple[str, ...]]
+    left_out: Mapping[str, tuple[Shown, ...]]
 
     @property
     def in_hertz(self) -> bool:
@@ -115,7 +115,7 @@ class VerdictsByLaw:
         return bandwidth(self.stage.flat()) is not None
 
     def hunts(self, case: str) -> bool | None:
-        """Whether the stage hunts in a case, whatever the law; None where that hangs on the law or is not certain."""
+        """Whether the stage hunts in a case, whatever the law; None where that depends on the law or is not certain."""
         answers = {verdict.hunts(case) for verdict in self.verdicts}
         return answers.pop() if len(answers) == 1 else None
 
@@ -123,7 +123,7 @@ class VerdictsByLaw:
         """Whether the stage hunts in a case, by all verdicts that are certain."""
         return set().union(*(verdict.answers(case) for verdict in self.verdicts))
 
-    def hangs_on_the_law(self, case: str) -> bool:
+    def depends_on_law(self, case: str) -> bool:
         """Whether verdicts that are certain disagree in a case."""
         return len(self.answers(case)) > 1
 
@@ -132,9 +132,9 @@ class VerdictsByLaw:
         return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
-        """The experiments that would decide, where the verdict hangs on the law: those that tell what is open in a law
-        under which the verdict hangs on that, else those that tell the laws that disagree from the others."""
-        if not self.hangs_on_the_law(case):
+        """The experiments that would decide, where the verdict depends on the law: those that tell what is open in a
+        law under which the verdict depends on that, else those that tell the laws that disagree from the others."""
+        if not self.depends_on_law(case):
             return []
         open_ones = [verdict for verdict in self.verdicts if len(verdict.answers(case)) > 1]
         if open_ones:
@@ -168,15 +168,16 @@ def verdicts_by_law(
     return VerdictsByLaw(stage, tuple(verdicts), left_out)
 
 
-def _conversions(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[str, ...]]]:
+def _conversions(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[Shown, ...]]]:
     """The stage as it is, and under the other laws that keep what is measured of it; and what the others lose."""
     own = stage.flat()["friction.model"]
-    kept, left_out = [compared(stage, stage, measured(stage.flat()))], {}
+    kept = [compared(stage, stage, measured(stage.flat()))]
+    left_out: dict[str, tuple[Shown, ...]] = {}
     for law in convertible():
         if law == own:
             continue
         conversion = convert(stage, law, elements)
-        lost = tuple(item.what for item in conversion.lost if item.what in NEEDED)
+        lost = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
         if lost:
             left_out[law] = lost
         else:

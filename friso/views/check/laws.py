@@ -5,7 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from friso.axis import axis_shown
+from friso.hunting.margin import FARTHEST
 from friso.views.check.cases import case_labels
+from friso.views.convert.words import SHOWN
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
 
 if TYPE_CHECKING:
@@ -15,12 +17,12 @@ COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "se
 
 
 def laws_sentences(laws: VerdictsByLaw) -> list[str]:
-    """Case by case whether the verdict hangs on the law, and what would decide; then which laws were not asked."""
+    """Case by case whether the verdict depends on the law, and what would decide; then which laws were not tried."""
     labels = case_labels(laws.stage)
     says = [f"{labels[case]}: {_sentence(laws, case)}" for case in labels]
     if laws.left_out:
-        lost = [f"{law} ({listed(list(what), 'and')})" for law, what in laws.left_out.items()]
-        says.append(f"Not asked, since they do not keep what is measured: {'; '.join(lost)}.")
+        lost = [f"{law} ({listed([SHOWN[kind] for kind in kinds], 'and')})" for law, kinds in laws.left_out.items()]
+        says.append(f"Not tried, because they cannot reproduce the measurements: {'; '.join(lost)}.")
     return says
 
 
@@ -28,22 +30,22 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
     hunts, names = laws.hunts(case), [verdict.law for verdict in laws.verdicts]
     count, edges = COUNTS.get(len(names), str(len(names))), _edges(laws, case)
     if hunts is not None:
-        return f"under all {count} laws that keep what is measured the stage {_does(hunts)}{edges}."
+        return f"under all {count} laws that reproduce the measurements the stage {_does(hunts)}{edges}."
     silent = [verdict.law for verdict in laws.verdicts if not verdict.answers(case)]
     unsure = [f"under {listed(silent, 'and')} that is not certain"] if silent else []
     if not laws.answers(case):
-        return f"under none of the {count} laws that keep what is measured the verdict is certain."
+        return f"the verdict is certain under none of the {count} laws that reproduce the measurements."
     parts = [
         f"{_does(answer)} under {listed(under, 'and')}"
         for answer in (True, False)
         if (under := [verdict.law for verdict in laws.verdicts if verdict.hunts(case) is answer])
     ]
     parts += [text for verdict in laws.verdicts if (text := _open(verdict, case))]
-    if not laws.hangs_on_the_law(case):
+    if not laws.depends_on_law(case):
         return f"the stage {'; '.join([*parts, *unsure])}{edges}."
     measure = listed(laws.deciding(case), "and")
     decide = f" To decide, measure {measure}." if measure else ""
-    return f"the verdict hangs on the law: the stage {'; '.join([*parts, *unsure])}{edges}.{decide}"
+    return f"the verdict depends on the friction law: the stage {'; '.join([*parts, *unsure])}{edges}.{decide}"
 
 
 def _does(hunts: bool) -> str:
@@ -58,8 +60,10 @@ def _open(verdict: LawVerdict, case: str) -> str:
         return ""
     words = [_does(answer) for answer in (True, False) if answer in answers]
     if len(answers) > 1:
-        return f"under {verdict.law} {listed(words, 'or')}, by what is open in it"
-    return f"under {verdict.law} {words[0]} with some of what is open in it, else not certain"
+        return f"under {verdict.law} it {listed(words, 'or')}, depending on the parameters that are left open"
+    return (
+        f"under {verdict.law} it {words[0]} with some of the values that are left open, and is not certain with others"
+    )
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
@@ -67,7 +71,7 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
     unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
     missing = f"not determined under {listed(unsought, 'and')}" if unsought else ""
     if not edges:
-        none = "with no edge of hunting within a factor of ten of its bandwidth"
+        none = f"with no edge of hunting within a factor of {FARTHEST:g} of its bandwidth"
         return f", its edge of hunting {missing}" if missing else f", {none}"
     low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
     doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"
@@ -96,8 +100,8 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
             (f"{label}: amplitude", [_amplitude(verdict, case) for verdict in laws.verdicts]),
             (f"{label}: edge", [_edge(laws, verdict, case) for verdict in laws.verdicts]),
         ]
-    rows.append(("Drawn, since left open", [_drawn(verdict) for verdict in laws.verdicts]))
-    rows.append(("Not kept", [_lost(verdict) for verdict in laws.verdicts]))
+    rows.append(("Varied (left open)", [_drawn(verdict) for verdict in laws.verdicts]))
+    rows.append(("Not reproduced", [_lost(verdict) for verdict in laws.verdicts]))
     return [(axis_shown().text(name), texts) for name, texts in rows]
 
 
@@ -124,17 +128,17 @@ def _drawn(verdict: LawVerdict) -> str:
 
 
 def _lost(verdict: LawVerdict) -> str:
-    return ", ".join(item.what for item in verdict.conversion.lost) or NOTHING
+    return ", ".join(SHOWN[item.kind] for item in verdict.conversion.lost) or NOTHING
 
 
 def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
-    """Law by law and case by case, with every trial; whether the verdict hangs on the law or is not certain, and what
+    """Law by law and case by case, with every trial; whether the verdict depends on the law or is not certain, and what
     would decide."""
     cases = {}
     for case in case_labels(laws.stage):
         cases[case] = {
             "hunts": laws.hunts(case),
-            "hangs_on_the_law": laws.hangs_on_the_law(case),
+            "depends_on_law": laws.depends_on_law(case),
             "not_certain": laws.uncertain(case),
             "measure": laws.deciding(case),
             "laws": {verdict.law: _law(verdict, case) for verdict in laws.verdicts},
@@ -142,7 +146,7 @@ def laws_document(laws: VerdictsByLaw) -> dict[str, Any]:
     return {
         "conclusion": " ".join(laws_sentences(laws)),
         "cases": cases,
-        "left_out": {law: list(what) for law, what in laws.left_out.items()},
+        "left_out": {law: [SHOWN[kind] for kind in kinds] for law, kinds in laws.left_out.items()},
     }
 
 
@@ -150,7 +154,7 @@ def _law(verdict: LawVerdict, case: str) -> dict[str, Any]:
     return {
         "verdicts": list(verdict.verdicts(case)),
         "trials": [_trial(trial, case) for trial in verdict.trials],
-        "not_kept": [item.what for item in verdict.conversion.lost],
+        "not_kept": [SHOWN[item.kind] for item in verdict.conversion.lost],
         "passive_where": verdict.conversion.active or None,
     }
 

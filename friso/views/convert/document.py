@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from friso.views.convert.words import conversion_sentences
+from friso.views.convert.words import SHOWN, conversion_sentences
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ def convert_document(conversion: LawConversion) -> dict[str, Any]:
             "friction": {key.removeprefix("friction."): v for key, v in flat.items() if key.startswith("friction.")},
             "compared": [
                 {
-                    "what": item.what,
+                    "what": SHOWN[item.kind],
                     f"before_{SUFFIXES[item.unit]}": item.before,
                     f"after_{SUFFIXES[item.unit]}": item.after,
                     "off": item.off,

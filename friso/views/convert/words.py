@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from friso.stage.stage import declared_keys
 from friso.views.drawing.prefixes import listed, with_unit
 
 if TYPE_CHECKING:
-    from friso.studies.laws.conversion import LawConversion, MeasuredChange
+    from friso.studies.laws.conversion import LawConversion, MeasuredChange, Shown
+
+SHOWN: Mapping[Shown, str] = {
+    "curve": "steady friction over speed",
+    "static": "break-away",
+    "stiffness": "stiffness before sliding",
+    "virgin": "virgin curve",
+    "damping": "damping at rest",
+    "viscous": "viscous damping",
+}
+"""What measurements show."""
 
 COLUMNS = ("before", "after", "off by", "kept")
 """Of the table of what is compared."""
@@ -29,7 +40,8 @@ def conversion_sentences(conversion: LawConversion) -> list[str]:
 
 
 def _lost(item: MeasuredChange) -> str:
-    return f"{item.what} is not kept ({with_unit(item.before, item.unit)} becomes {with_unit(item.after, item.unit)})"
+    before, after = (with_unit(value, item.unit) for value in (item.before, item.after))
+    return f"{SHOWN[item.kind]} is not kept ({before} becomes {after})"
 
 
 def _open(key: str, ends: tuple[float, float], conversion: LawConversion) -> str:
@@ -43,7 +55,7 @@ def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
     """The rows of the table: before, after, by how much it is off, whether it is kept."""
     return [
         (
-            item.what,
+            SHOWN[item.kind],
             [
                 with_unit(item.before, item.unit),
                 with_unit(item.after, item.unit),

@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.axis import axis_shown
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
+from friso.stage.tables import friction_laws
 from friso.studies.cells import NOTHING, SWING, UNKNOWN
 from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
 
@@ -21,20 +22,11 @@ AT_ONCE = 1_000_000
 
 _QUANTITIES = {
     FORCE_LIMIT: "Force limit",
-    "friction.bristle_damping": "Bristle damping",
-    "friction.bristle_stiffness": "Bristle stiffness",
-    "friction.coulomb": "Coulomb friction",
-    "friction.static": "Static friction",
-    "friction.stribeck_exponent": "Stribeck exponent",
-    "friction.stribeck_velocity": "Stribeck velocity",
-    "friction.viscous": "Viscous friction",
     "joint.limiter_damping": "Limiter damping",
     "joint.limiter_stiffness": "Limiter stiffness",
     "joint.locked": "Joint",
     "masses.cart": "Cart mass",
     "masses.stage": "Stage mass",
-    "motion.acceleration": "Acceleration",
-    "motion.acceleration_time": "Acceleration time",
 }
 _VARIABLES = {
     "outcome": "What the run does at its end",
@@ -94,10 +86,13 @@ _OF_ATTRACTORS = {
 def quantity(key: Hashable) -> str:
     """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
     name = str(key)
-    quantities = _QUANTITIES | CONTROLLERS.words
+    of_laws = {f"friction.{key}": word for law in friction_laws().values() for key, word in law.words.items()}
+    quantities = _QUANTITIES | of_laws | CONTROLLERS.words
     if name in quantities:
         return quantities[name]
-    words = name.removeprefix(f"{CONTROLLER}.").removeprefix("motion.").replace("_", " ").replace(".", " ")
+    for table in (f"{CONTROLLER}.", "friction.", "motion."):
+        name = name.removeprefix(table)
+    words = name.replace("_", " ").replace(".", " ")
     return words[:1].upper() + words[1:]
 
 
