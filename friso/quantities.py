@@ -23,6 +23,18 @@ LARGEST_INTEGER = 10**60
 """Whole numbers from here on are kept and written as floats."""
 
 
+NOTHING = "–"
+"""Stands where there is nothing to say."""
+
+
+def percent(share: float, digits: int = 2, signed: bool = False) -> str:
+    """A share in percent, to so many significant digits; a dash where there is none."""
+    if not math.isfinite(share):
+        return NOTHING
+    number, plus = float(f"{100 * share:.{digits}g}"), "+" if signed else ""
+    return f"{number:{plus}.0f} %" if abs(number) >= 10**digits else f"{number:{plus}g} %"
+
+
 def as_toml(value: Any) -> str:
     """How a scalar is written in TOML; anything else is named, not written out."""
     if isinstance(value, bool):

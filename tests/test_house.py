@@ -109,6 +109,26 @@ def test_names_of_values_say_what_they_hold(folder: str) -> None:
     assert named == []
 
 
+def test_percentages_are_written_by_one_function() -> None:
+    """Neither by the format of an f-string nor by hand; `quantities.percent` and `prefixes.percentage` are it."""
+    by_hand = []
+    for name, source in sources().items():
+        for node in ast.walk(ast.parse(source)):
+            if isinstance(node, ast.JoinedStr) and any(map(is_percentage, node.values, [*node.values[1:], None])):
+                by_hand.append(name)
+    assert by_hand == []
+
+
+def is_percentage(value: ast.expr, behind: ast.expr | None) -> bool:
+    """Whether a part of an f-string, with the part behind it, is a share times 100, or formatted as such."""
+    if not isinstance(value, ast.FormattedValue):
+        return False
+    hundred = isinstance(value.value, ast.BinOp) and isinstance(value.value.op, ast.Mult)
+    hundred = hundred and "100" in ast.unparse(value.value).split()
+    sign = isinstance(behind, ast.Constant) and str(behind.value).startswith(" %")
+    return (hundred and sign) or (value.format_spec is not None and "%'" in ast.unparse(value.format_spec))
+
+
 def test_views_stand_in_the_folder_of_their_command() -> None:
     assert {path.name for path in (PACKAGE / "views").glob("*.py")} - SHARED_VIEWS == set()
 

@@ -25,6 +25,7 @@ from friso.answers.map_study import (
 from friso.axis import speak_of
 from friso.errors import InputError
 from friso.progress import Progress, silent
+from friso.quantities import percent
 from friso.stage import Stage
 from friso.studies.axes import Values
 from friso.studies.execute import Crew, local_crew
@@ -243,11 +244,15 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
     if entry != "auto":
         return tolerance_of(entry)
     rtol, shares, cells = loosest_rtol(study, crew)
-    surviving = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {rtol_:g}" for rtol_, share in shares.items())
+    surviving = f"of {cells} cells, " + ", ".join(
+        f"{percent(share, 3)} at {rtol_:g}" for rtol_, share in shares.items()
+    )
     if shares.get(rtol, 0.0) >= WANTED:
-        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the outcomes survive ({surviving})")
+        LOGGER.warning(f"rtol {rtol:g} is the loosest at which {percent(WANTED)} of the outcomes survive ({surviving})")
     else:
-        LOGGER.warning(f"at no tolerance do {WANTED:.0%} of the outcomes survive ({surviving}); rtol {rtol:g} is used")
+        LOGGER.warning(
+            f"at no tolerance do {percent(WANTED)} of the outcomes survive ({surviving}); rtol {rtol:g} is used"
+        )
     return rtol
 
 

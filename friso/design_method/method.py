@@ -24,6 +24,7 @@ from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import Limits, limits
 from friso.progress import Progress, silent
+from friso.quantities import percent
 from friso.stage import Stage
 
 STROKES = 4
@@ -98,7 +99,7 @@ class Design:
         limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(SLOW)
         if limit is None or settling <= limit or not np.isfinite(settling):
             return ()
-        name = f"{1 - SLOW:.0%} of the moves settle in time"
+        name = f"{percent(1 - SLOW)} of the moves settle in time"
         later = Relaxation(name, "position.settling_time", float(limit), settling, "s")
         return (self.damped, later) if self.damped else (later,)
 

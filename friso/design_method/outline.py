@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from friso.equations.bandwidth import bandwidth
 from friso.intervals import Interval
+from friso.quantities import percent
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 
@@ -76,7 +77,7 @@ def _line(stage: Stage, key: str, share: float) -> str:
     flat, own = stage.flat(), stage.uncertain().get(key)
     name, unit = key.split(".")[1], numeric_keys(flat)[key].unit
     low, high = _ends(own) if own else ((1 - share) * flat[key], (1 + share) * flat[key])
-    why = "as in the stage file" if own else f"assumed: {100 * share:g} % about the stage file's"
+    why = "as in the stage file" if own else f"assumed: {percent(share)} about the stage file's"
     return f'{name} = "{low:.4g} {unit} .. {high:.4g} {unit}"   # {why}'
 
 

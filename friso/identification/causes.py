@@ -11,6 +11,7 @@ from friso.identification.alternatives import alternatives
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.checks import CLIPPED, clipped_share
 from friso.identification.logs.log import Log
+from friso.quantities import percent
 
 PEAK = 0.5
 """Share of the power of what is left in one peak from which on that counts as an oscillation."""
@@ -42,7 +43,7 @@ def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
 
 def _clipped(log: Log) -> list[Cause]:
     share = clipped_share(log["force"])
-    sentence = f"{100 * share:.2g} % of the force is cut off at its extremes: more force than this channel shows?"
+    sentence = f"{percent(share)} of the force is cut off at its extremes: more force than this channel shows?"
     return [Cause(sentence, None, True)] if share > CLIPPED else []
 
 
@@ -61,4 +62,4 @@ def _oscillation(inverse: InverseModel) -> str:
     share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
     if share < PEAK or peak == 0:
         return ""
-    return f"{100 * share:.0f} % of what is left swings at {rates[peak]:.3g} Hz: a mode in the band?"
+    return f"{percent(share)} of what is left swings at {rates[peak]:.3g} Hz: a mode in the band?"

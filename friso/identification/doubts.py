@@ -12,6 +12,7 @@ from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import explains
 from friso.identification.quality import Quality, halves, whole_error
+from friso.quantities import percent
 
 NOISY = 10.0
 """A fit that leaves so many times the noise of the record lacks something, and says so."""
@@ -48,13 +49,13 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
     rejected = worse and plain.ratio > NOISY and not poor
     if rejected:
         doubts.append(
-            f"The whole model contradicts the record: on the moves it leaves {100 * plain.whole_error:.3g} % of the "
-            f"force, a plain mass with friction {100 * inverse.error:.3g} %. What follows is from the latter alone"
+            f"The whole model contradicts the record: on the moves it leaves {percent(plain.whole_error, 3)} of the "
+            f"force, a plain mass with friction {percent(inverse.error, 3)}. What follows is from the latter alone"
             f"{''.join(f'; {cause.sentence}' for cause in reasons)}"
         )
     if poor:
         why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN
-        doubts.append(f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained: {why}")
+        doubts.append(f"A mass with friction leaves {percent(inverse.error, 3)} of the force unexplained: {why}")
     elif not rejected and plain.ratio > NOISY:
         doubts.append(
             f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "

@@ -18,7 +18,7 @@ import numpy as np
 
 from friso.errors import InputError, StageError
 from friso.intervals import COVERAGE
-from friso.quantities import as_toml, quoted
+from friso.quantities import as_toml, percent, quoted
 from friso.stage.controllers import as_tuned
 from friso.stage.files import parsed, text_of
 from friso.stage.section import unknown_key
@@ -174,7 +174,7 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
             joined = {key: np.concatenate([part[key] for part in parts]) for key in intervals}
             return Sample(joined, count, beyond, broken)
     most = broken.most_common(1)
-    text = f"ranges of which {100 * accepted / (MOST * size):.2g} % are allowed"
+    text = f"ranges of which {percent(accepted / (MOST * size))} are allowed"
     raise StageError("", text, most[0][0] if most else "ranges within the bounds of their keys")
 
 

@@ -43,6 +43,7 @@ from friso.identification.readings.common import (
     solved,
 )
 from friso.identification.stage_keys import shared_masses
+from friso.quantities import percent
 from friso.stage import Stage
 
 CHECKED, MOTION = 0.7, 5.0
@@ -147,7 +148,7 @@ def _nothing(why: str) -> Presliding:
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
     """Why the fit is not one of bristles; empty where it is."""
     if fit.left > EXPLAINED:
-        return f"{fit.left:.0%} of the friction is not explained: {SLIDES}"
+        return f"{percent(fit.left)} of the friction is not explained: {SLIDES}"
     if fit.ends:
         return f"the bristles yield: {SLIDES}"
     if held and 0 < fit.values[KEYS.index(STIFFNESS)] < SPRING * between.joint:

@@ -43,6 +43,7 @@ from friso.identification.readings.common import (
     jackknife,
     stribeck_curve,
 )
+from friso.quantities import percent
 
 BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
 """Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
@@ -249,7 +250,7 @@ def _judged(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) 
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
     if left > EXPLAINED:
-        return _unknown(f"{left:.0%} of the friction is not explained by LuGre's bristles")
+        return _unknown(f"{percent(left)} of the friction is not explained by LuGre's bristles")
     if not coulomb.low > 0:
         return _unknown("the force shows no friction: does the bearing slide?")
     if fastest < FASTEST * stribeck.value:

@@ -18,7 +18,7 @@ from friso.identification.logs.read import file_format
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identification.logs.time_base import Track, together, track
-from friso.quantities import quoted
+from friso.quantities import percent, quoted
 
 LEAST_SAMPLES = 50
 """Fewer samples than this are refused (our choice: no interval on anything would be worth its name)."""
@@ -167,7 +167,9 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
         if share > checks.CLIPPED:
-            lines.append(f"{role}: {share:.2%} of the samples lie on flat tops at its extremes: saturated or clipped")
+            lines.append(
+                f"{role}: {percent(share, 3)} of the samples lie on flat tops at its extremes: saturated or clipped"
+            )
     position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
     same_kind = ("position" in notes.units) == ("velocity" in notes.units)
     if position is not None and velocity is not None and same_kind:

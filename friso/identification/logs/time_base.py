@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.errors import LogError
 from friso.identification.logs.checks import repeated_stamps
+from friso.quantities import percent
 
 GAP = 1.5
 """A step of time above this many sample times is a gap: at least one sample is missing (one missing makes 2)."""
@@ -50,7 +51,9 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     steps = np.diff(time)
     gaps = steps > GAP * np.median(steps)
     if gaps.mean() > MOST_GAPS:
-        actual = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
+        actual = (
+            f"time stamps with {percent(gaps.mean())} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
+        )
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = float(steps[~gaps].mean())
     edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
@@ -77,7 +80,7 @@ def _evened(name: str, raw: Track) -> Track:
         scatter += float(np.sum((raw.time[part] - time[part]) ** 2))
     jitter = np.sqrt(scatter / time.size) / raw.period
     raw.read.append(
-        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {100 * jitter:.2g} % of a step"
+        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {percent(jitter)} of a step"
     )
     if jitter <= EVEN:
         raw.time = time

@@ -14,6 +14,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.readings.common import Mean, by_t, correlated_mean, stribeck_curve, t_value
+from friso.quantities import percent
 
 BRISTLE_RATE = 100.0
 """sigma_0 v_s [N/s] taken as the least there is where nothing better is known: that of Canudas de Wit et al. 1995; the
@@ -80,13 +81,15 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: flo
     """At one rate: the mean break-away is too low by at most the bound, and half of it is put in the value."""
     mean = correlated_mean(forces)
     share = share_below(float(np.median(rates)), bristle_rate)
-    method = f"mean break-away force at {np.median(rates):.3g} N/s; at rate 0 up to {share:.0%} higher is allowed for"
+    method = (
+        f"mean break-away force at {np.median(rates):.3g} N/s; at rate 0 up to {percent(share)} higher is allowed for"
+    )
     scatter = t_value(mean.freedom) * mean.error
     half = float(np.hypot(scatter, t_value(mean.freedom) * relative_error * mean.value))
     low, high = mean.value - half, (mean.value + half) / (1 - share) if share < 1 else np.inf
     low, high = float(low), float(high)
     if share > 2 * FAR:
-        reason = f"the force rises at {np.median(rates):.3g} N/s: too fast, break-away may be {share:.0%} below it"
+        reason = f"the force rises at {np.median(rates):.3g} N/s: too fast, break-away may be {percent(share)} below it"
         return Estimate.unknown(name, "N", method, reason, low, high)
     value = float(mean.value * (1 + share / (1 - share) / 2))
     return Estimate(name, "N", value, low, high, method, systematic=(high - low) / 2 - scatter)

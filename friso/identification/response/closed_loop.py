@@ -10,6 +10,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.response.period import find_periods
 from friso.identification.response.records import ResponseRecord, drift
 from friso.identification.response.response import Channels, FrequencyResponse
+from friso.quantities import percent
 
 OWN, OTHER = 60, 8
 """Past samples of the input, and of the output, from which the input is foretold. Its own past is looked at much
@@ -47,7 +48,7 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     chance, share = _foretold(driven, answer, direct)
     if chance > SURE or share < SHARE:
         return ()
-    finding = f"the output foretells {100 * share:.0f} % of the news in the input (chance {chance:.1g})"
+    finding = f"the output foretells {percent(share)} of the news in the input (chance {chance:.1g})"
     return (f"{finding}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.hunting.edges import ABOVE, BELOW, KINDS
 from friso.hunting.edges import UNKNOWN as NOT_TOLD
+from friso.quantities import percent
 from friso.studies.guideline.thesis_rig import ThesisCase
 from friso.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
 from friso.studies.thesis.claims import ABOUT, about
@@ -74,7 +75,7 @@ def _share(worked: Worked) -> GuidelineClaim:
     spread = (
         f", a spread by a factor of {edges.max() / edges.min():.2g}" if np.all(np.isfinite(edges) & (edges > 0)) else ""
     )
-    ends = ", ".join(f"{_edge(case)} at {share:.0%}" for share, case in zip(at, cases, strict=True))
+    ends = ", ".join(f"{_edge(case)} at {percent(share)}" for share, case in zip(at, cases, strict=True))
     return GuidelineClaim(
         "Fig. 15A",
         "the mass ratio does not affect the isolator",
@@ -113,8 +114,8 @@ def _stroke(worked: Worked) -> GuidelineClaim:
         "Sec. 4.1, 4.3.3",
         "a stroke of 0.3 mm is enough; above some stroke the limit no longer changes",
         f"edge {words}",
-        f"at {STROKES[0]:g} mm below {CLAIMED_AT:g} Hz and within {NEAR - 1:.0%} of that at {STROKES[2]:g} mm; at "
-        f"{STROKES[1]:g} mm within {SAME:.0%} of it",
+        f"at {STROKES[0]:g} mm below {CLAIMED_AT:g} Hz and within {percent(NEAR - 1)} of that at {STROKES[2]:g} mm; at "
+        f"{STROKES[1]:g} mm within {percent(SAME)} of it",
         _judged(
             [
                 _verdict(short < CLAIMED_AT, short),
@@ -139,7 +140,7 @@ def _edges(worked: Worked) -> GuidelineClaim:
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
-        f"free within {NEAR - 1:.0%} of the range, the highest locked edge within a factor of {ABOUT:g} of both "
+        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of {ABOUT:g} of both "
         "numbers",
         _judged(near),
     )

@@ -10,6 +10,8 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Literal
 
+from friso.quantities import percent
+
 if TYPE_CHECKING:
     import xarray as xr
 
@@ -32,7 +34,7 @@ TREND = 0.5
 
 CONVENTIONS = (
     f"Words have the same meaning in all claims: “about” is within a factor of {ABOUT:g}, “of the order of” within a "
-    f"factor of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {FEW:.0%} of a map, a "
+    f"factor of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(FEW)} of a map, a "
     f"“trend” is a rank correlation of at least {TREND:g}. A cell of a map “keeps moving” where peaks are counted "
     "after its run (Sec. 3.2.2; where the method is varied: where the run swings at its end), else it “comes to "
     "rest”. A “limit” lies halfway from the last cell that keeps moving to the next, with none that keeps moving "

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import rankdata
 
 from friso.hunting.criteria.run_outcome import FAILED
+from friso.quantities import percent
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,4 +73,4 @@ def share(part: np.ndarray, total: np.ndarray) -> float:
 
 def share_text(moving: np.ndarray, cells: np.ndarray) -> str:
     """The same share in words."""
-    return f"{share(moving, cells):.0%}" if cells.any() else "none"
+    return f"{percent(share(moving, cells))}" if cells.any() else "none"

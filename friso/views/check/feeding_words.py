@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from friso.hunting.feeding import Decline, Feeding
+from friso.quantities import percent
 
 
 def feeding_sentences(feeding: Feeding) -> list[str]:
@@ -28,7 +29,7 @@ def _course(name: str, decline: Decline) -> str:
     if decline.gone == 0:
         return f"it shrinks in proportion to the {name}, and is gone without it"
     if decline.gone is None:
-        return f"it lasts with {decline.lasts:.1%} of the {name}"
+        return f"it lasts with {percent(decline.lasts, 3)} of the {name}"
     return f"it lasts with {decline.lasts:.3g} times the {name} and is gone with {decline.gone:.3g} times"
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from friso.axis import axis_shown
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.verdict import BANDWIDTHS, STARTS
+from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase
 from friso.views.check.words import at_the_end, edge_text
 from friso.views.drawing.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
@@ -101,7 +102,7 @@ def _moves(case: Case) -> str:
     if moves is None:
         return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
     low, high = moves.interval
-    return f"{100 * moves.fraction:.0f} % ({100 * low:.0f} to {100 * high:.0f} %) of {moves.count} moves"
+    return f"{percent(moves.fraction)} ({percent(low)} to {percent(high)}) of {moves.count} moves"
 
 
 def _peaks(case: Case) -> str:

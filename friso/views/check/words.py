@@ -10,6 +10,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import DISTANCE, FARTHEST
 from friso.hunting.verdict import BANDWIDTHS, STARTS
+from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
@@ -88,7 +89,7 @@ def _bistable(case: Case) -> str:
     starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
         like = f"this move at {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and acceleration time"
-        starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
+        starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
     first = _unmoved(case) if case.unmoved else "settles after this move"
     if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
@@ -190,7 +191,7 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         return f"somewhere between {low} and {high}"
     if end.reserve < ROUGH:
         return _bandwidth(case, end.inside, up=None, digits=4)
-    return f"about {_bandwidth(case, end.inside, up=None)} (± {100 * rounded_up(end.reserve, 1):.1g} %)"
+    return f"about {_bandwidth(case, end.inside, up=None)} (± {percent(rounded_up(end.reserve, 1), 1)})"
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from friso.quantities import percent
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR
 from friso.studies.compare.study import LONGER, Comparison
 from friso.views.compare.figures import figures as compare_figures
@@ -45,7 +46,7 @@ def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
         paired=paired_rows(comparison),
         computed=(
             f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND:g} tolerances, model error "
-            f"{100 * MODEL_ERROR:g} %"
+            f"{percent(MODEL_ERROR)}"
         ),
         longer=LONGER,
         shaken=comparison.shaken,

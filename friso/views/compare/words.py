@@ -12,6 +12,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.equations.settings import SETTINGS, Setting
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
+from friso.quantities import percent
 from friso.stage import ControllerSection
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
@@ -80,7 +81,7 @@ def _about(option: Option, comparison: Comparison) -> str:
         "c": "the controller of the file",
         "d": f"the integrator pauses while the error is below {deadband}",
         "e": "the integrator is reset where the error changes sign",
-        "f": f"feedforward of Coulomb and viscous friction, both {100 * MODEL_ERROR:g} % too large or both too small, "
+        "f": f"feedforward of Coulomb and viscous friction, both {percent(MODEL_ERROR)} too large or both too small, "
         "drawn for each machine",
         "g": _bandwidth(option, comparison),
     }
@@ -185,7 +186,7 @@ def conclusion(comparison: Comparison) -> str:
     if not resting:
         best = max(comparison.results, key=lambda result: result.in_position_count)
         return (
-            f"No option brings {100 * ENOUGH:g} % of the {count} machines to rest within {within}. The best is "
+            f"No option brings {percent(ENOUGH)} of the {count} machines to rest within {within}. The best is "
             f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
         )
     first, *further = resting
@@ -249,7 +250,7 @@ def _performance(comparison: Comparison) -> list[str]:
         "rest (95 % confidence)."
         for result in resting
     ]
-    longer = f"Of {followed} machines followed {LONGER} times as long, {100 * ENOUGH:g} % or more stay at rest with "
+    longer = f"Of {followed} machines followed {LONGER} times as long, {percent(ENOUGH)} or more stay at rest with "
     return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from friso.quantities import percent
 from friso.stage.stage import declared_keys
 from friso.views.drawing.prefixes import listed, with_unit
 
@@ -59,7 +60,7 @@ def conversion_rows(conversion: LawConversion) -> list[tuple[str, list[str]]]:
             [
                 with_unit(item.before, item.unit),
                 with_unit(item.after, item.unit),
-                f"{100 * item.off:.2g} %",
+                f"{percent(item.off)}",
                 "yes" if item.kept else "no",
             ],
         )

@@ -6,6 +6,7 @@ from friso.design_method.method import Design
 from friso.design_method.verification import MachineOutcomes
 from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
 from friso.frequency.crossover import WANTED
+from friso.quantities import percent
 from friso.views.design.window import CrossoverBound, comfortable, lower, upper
 from friso.views.design.words import (
     DesignStep,
@@ -16,7 +17,7 @@ from friso.views.design.words import (
     seconds,
     settling,
 )
-from friso.views.drawing.prefixes import listed, percent
+from friso.views.drawing.prefixes import listed
 
 ROUNDED = 0.01
 """Share by which a crossover may stay below its bound without a word: it has three digits."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from friso.design_method.method import Design
 from friso.design_method.requirements import Requirement, Way
+from friso.quantities import percent
 from friso.views.design.words import DesignStep, hertz, leaves, plain, size
-from friso.views.drawing.prefixes import listed, percent
+from friso.views.drawing.prefixes import listed
 from friso.views.flexure.table import megapascals, newtons_per
 from friso.views.flexure.words import assumptions
 
@@ -33,7 +34,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
             requirement.name,
             _keys(requirement, lambda relaxable: relaxable.key),
             _keys(requirement, lambda relaxable: plain(relaxable.value, relaxable.unit)),
-            f"{100 * share:.1f} %{', binds' if share > BINDS else ''}",
+            f"{percent(share, 3)}{', binds' if share > BINDS else ''}",
         )
         for requirement, share in zip(choice.requirements, choice.excess, strict=True)
     ]

@@ -6,6 +6,7 @@ import math
 
 from friso.design_method.edges import Corners
 from friso.design_method.method import Design
+from friso.quantities import percent
 from friso.views.design.control import controller_step, moves_step
 from friso.views.design.leaves import leaves_step
 from friso.views.design.words import DesignStep, brings, corner, edge, gaps, hertz, plain, size
@@ -47,7 +48,7 @@ def joint_step(design: Design) -> DesignStep:
     held = (
         f"At full stroke the joint exerts {force}. The cart breaks away at no less than "
         f"{plain(task.friction, 'N')}; with the safety factor of {safety.breakaway:g} and a stiffness error of "
-        f"{safety.stiffness_tolerance:.0%} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
+        f"{percent(safety.stiffness_tolerance)} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
     sentences = [
         held,
@@ -59,7 +60,7 @@ def joint_step(design: Design) -> DesignStep:
     facts = (
         ("Drive stiffness", stiffness),
         ("Stroke to each side", f"{size(task.stroke)} mm"),
-        ("Deviation from linear over the stroke", f"{100 * beams.nonlinearity:.2g} %"),
+        ("Deviation from linear over the stroke", f"{percent(beams.nonlinearity)}"),
         ("Force at full stroke", force),
         ("Least static friction", plain(task.friction, "N")),
         (

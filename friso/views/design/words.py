@@ -14,9 +14,10 @@ from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
+from friso.quantities import percent
 from friso.stage.stage import numeric_keys
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
-from friso.views.drawing.prefixes import choose, percent, pretty, with_unit
+from friso.views.drawing.prefixes import choose, pretty, with_unit
 from friso.views.map.words import in_sentence
 
 SHOWN = 5

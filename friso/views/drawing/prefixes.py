@@ -9,13 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import unit_shown
+from friso.quantities import NOTHING
 from friso.views.drawing.figure import Array
 
 if TYPE_CHECKING:
     from friso.studies.shares import Share
-
-NOTHING = "–"
-"""Stands where there is nothing to say."""
 
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
 # times beyond seconds and slow frequencies are read best as they are.
@@ -100,14 +98,6 @@ def plus_minus(half: float, unit: str, digits: int = 3) -> str:
     """Half a range [unit] with the prefix that suits the whole of it, e.g. "±0.52 mm"."""
     factor, text = choose(np.array([2 * half]), unit)
     return f"±{half * factor:.{digits}g} {text}"
-
-
-def percent(share: float, digits: int = 2) -> str:
-    """A share in percent; a dash where there is none."""
-    if not math.isfinite(share):
-        return NOTHING
-    number = float(f"{100 * share:.{digits}g}")
-    return f"{number:.0f} %" if abs(number) >= 10**digits else f"{number:g} %"
 
 
 def share_with_interval(share: Share) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.evaluation import Evaluation, Mode
-from friso.views.drawing.prefixes import NOTHING, percent, with_unit
+from friso.quantities import percent
+from friso.views.drawing.prefixes import NOTHING, with_unit
 
 INTERFERES = "interferes"
 """Marks a mode that disturbs control: actuator and sensor both see it."""

@@ -8,8 +8,9 @@ from collections.abc import Callable, Mapping
 from friso.leaf_springs.both_models import BothModels
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import AXES, GRAVITY
+from friso.quantities import percent
 from friso.stage import Stage
-from friso.views.drawing.prefixes import listed, percent, with_unit
+from friso.views.drawing.prefixes import listed, with_unit
 from friso.views.flexure.table import megapascals, newtons_per
 
 RULE = 0.1
@@ -172,7 +173,7 @@ def _differences(flexure: BothModels) -> list[str]:
     if flexure.beams is None:
         return []
     shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}
-    far = [f"{name} by {100 * share:+.0f} %" for name, share in shares.items() if abs(share) > AGREE]
+    far = [f"{name} by {percent(share, signed=True)}" for name, share in shares.items() if abs(share) > AGREE]
     if not far:
         return []
     return [

@@ -13,6 +13,7 @@ from friso.evidence import entries, value
 from friso.frequency.crossover import WANTED
 from friso.hunting.edges import KINDS, ROUNDS, STEP
 from friso.hunting.persistence import DISTANCES
+from friso.quantities import percent
 from friso.studies.guideline import Guideline
 from friso.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
 from friso.studies.guideline.claims import claims
@@ -50,9 +51,9 @@ CONSTANTS: Mapping[str, Any] = {
     "gaps": GAPS,
     "margin": MARGIN,
     "at": CLAIMED_AT,
-    "step": f"{100 * (STEP - 1):.0f} %",
-    "apart": f"{100 * (DISTANCES[1] / DISTANCES[0] - 1):.0f} %",
-    "resolved": f"{100 * RESOLVED:.1g} %",
+    "step": f"{percent(STEP - 1)}",
+    "apart": f"{percent(DISTANCES[1] / DISTANCES[0] - 1)}",
+    "resolved": f"{percent(RESOLVED, 1)}",
     "largest_gap": LOCKED_BOX["gap"][1],
     "far": FAR,
     "comfortable": WANTED,

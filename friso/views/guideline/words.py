@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from friso.quantities import percent
 from friso.studies.guideline import Guideline
 from friso.studies.guideline.groups import GROUPS
 from friso.studies.guideline.laws import REFERENCE, FittedLaw
@@ -67,7 +68,7 @@ def number(value: float | None, digits: int = 3) -> str:
 
 def log_error(off: float) -> str:
     """An error of a logarithm as a share: 0.1 is 11 %."""
-    return f"{100 * math.expm1(off):.0f} %"
+    return f"{percent(math.expm1(off))}"
 
 
 def accuracy(guideline: Guideline) -> list[str]:
@@ -86,7 +87,7 @@ def parasitic_edges(cases: Sequence[ThesisCase]) -> str:
     if not edges:
         return "No edge is known with any of these modes."
     spread = max(edges) / min(edges) - 1
-    return f"Over these modes the edge differs by at most {100 * spread:.0f} %."
+    return f"Over these modes the edge differs by at most {percent(spread)}."
 
 
 def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:

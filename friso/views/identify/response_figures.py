@@ -7,6 +7,7 @@ import numpy as np
 from friso.identification.response.analysis import Bench
 from friso.identification.response.mass_line import StraightLine
 from friso.identification.response.response import FrequencyResponse
+from friso.quantities import percent
 from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
     BLUE,
@@ -25,7 +26,6 @@ from friso.views.drawing.figure import (
     Panel,
     Series,
 )
-from friso.views.drawing.prefixes import percent
 from friso.views.identify.kind_view import AREA
 from friso.views.identify.numbers import unit_of, with_interval
 

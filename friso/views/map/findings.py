@@ -9,8 +9,9 @@ import numpy as np
 
 from friso.axis import axis_shown
 from friso.hunting.criteria.run_outcome import BAND, CREEPS, LASTING, RESTS, SWINGS
+from friso.quantities import percent
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
-from friso.views.drawing.prefixes import listed
+from friso.views.drawing.prefixes import listed, percentage
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.views.map.words import (
     AT_ONCE,
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 MEANINGS = {
     "outcome": {
         SWINGS: f"the run still swings at its end: periodically, more than {2e6 * BAND:g} µm peak to peak in the last "
-        f"quarter, by at least {100 * LASTING:g} % of what it swings in the last half",
+        f"quarter, by at least {percent(LASTING)} of what it swings in the last half",
         CREEPS: f"the run ends more than {1e6 * BAND:g} µm off its reference without swinging: it drifts, sticks or "
         "decays",
         RESTS: f"the run comes to rest within {1e6 * BAND:g} µm of its reference",
@@ -171,12 +172,12 @@ def verification(runs: xr.Dataset) -> str:
     interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
     rtol = float(runs.attrs["verified_rtol"])
     text = (
-        f"{100 * surviving / checked:.1f} % of {grouped(checked)} outcomes are the same at rtol {rtol:g} "
-        f"(95 % confidence: {100 * interval.low:.1f} to {100 * interval.high:.1f} %)."
+        f"{percent(surviving / checked, 3)} of {grouped(checked)} outcomes are the same at rtol {rtol:g} "
+        f"(95 % confidence: {percentage(interval.low)} to {percentage(interval.high)} %)."
     )
     if inferred := int(runs.attrs.get("inferred_checked", 0)):
         confirmed = int(runs.attrs["inferred_confirmed"])
-        text += f" Of {grouped(inferred)} inferred outcomes {100 * confirmed / inferred:.1f} % are confirmed by a run."
+        text += f" Of {grouped(inferred)} inferred outcomes {percent(confirmed / inferred, 3)} are confirmed by a run."
     return text
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.criteria import distinct_peaks
 from friso.hunting.criteria.peak_count import RULE
+from friso.quantities import percent
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.studies import STUDIES, ThesisStudy
 from friso.views.check.figures import SHARES
@@ -57,8 +58,9 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
     if number == "14" and reproduction.tolerances:
         verdicts, counts = reproduction.changed
         zeros.append(
-            f"B: at the thesis's relative tolerance {verdicts:.1%} of the cells have counted peaks where the tight one "
-            f"has none, or the other way round, and {counts:.1%} another count."
+            f"B: at the thesis's relative tolerance {percent(verdicts, 3)} of the cells have counted peaks "
+            "where the tight one "
+            f"has none, or the other way round, and {percent(counts, 3)} another count."
         )
     return Figure(
         f"figure-{number}",

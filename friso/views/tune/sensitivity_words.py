@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from friso.quantities import percent
 from friso.remedies.method import Advice
 from friso.remedies.sensitivities import Sensitivities
 from friso.views.drawing.prefixes import with_unit
@@ -30,5 +31,5 @@ def ranked_sentences(sensitivities: Sensitivities) -> list[str]:
 def _signed(move: float, unit: str) -> str:
     """By how much, upward or downward; of a controller that states no bandwidth in percent of that."""
     if not unit:
-        return f"{100 * move:+.2g} % of the bandwidth"
+        return f"{percent(move, signed=True)} of the bandwidth"
     return f"{'+' if move > 0 else '-'}{with_unit(abs(move), unit, 2)}"

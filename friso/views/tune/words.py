@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.breakaway import breakaway, least_breakaway
+from friso.quantities import percent
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice
 from friso.remedies.relax import RelaxedGoal
@@ -18,7 +19,7 @@ from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
 from friso.stage.transmission import leading_friction
-from friso.views.drawing.prefixes import NOTHING, listed, percent, share_with_interval, with_unit
+from friso.views.drawing.prefixes import NOTHING, listed, share_with_interval, with_unit
 
 DOUBTS = {
     "verdict": "friso check does not say that it settles",

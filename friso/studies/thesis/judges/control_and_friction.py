@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA
+from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import counts, free_square, share, table, trend, trend_text
 
@@ -76,9 +77,10 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
             ),
             Part(
                 "every alpha and every beta has cells that keep moving, and the largest square at rest covers few "
-                f"cells (at most {FEW:.0%})",
+                f"cells (at most {percent(FEW)})",
                 free_lines == 0 and square <= FEW,
-                f"{share(moving, valid):.0%} of the cells keep moving; {free_lines} lines and a square of {square:.1%} "
+                f"{percent(share(moving, valid))} of the cells keep moving; {free_lines} lines and a square of "
+                f"{percent(square, 3)} "
                 "come to rest",
             ),
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import ends, share_text, table
 from friso.studies.thesis.studies import SOFT, thesis_rig
@@ -33,7 +34,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
             ),
             Part(
                 "the mean limits over the third and over the fourth quarter of the strokes differ by at most "
-                f"{_SAME:.0%}, and the limit of stroke 0 is higher than both by a factor of {ABOUT:g} at least",
+                f"{percent(_SAME)}, and the limit of stroke 0 is higher than both by a factor of {ABOUT:g} at least",
                 bool(abs(third - fourth) <= _SAME * third and limits[0] >= ABOUT * max(third, fourth)),
                 f"{third:.3g} Hz over the third and {fourth:.3g} Hz over the fourth quarter; {limits[0]:.3g} Hz at "
                 "stroke 0",

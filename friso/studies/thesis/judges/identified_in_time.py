@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identification.readings.rate_effect import static_friction
+from friso.quantities import percent
 from friso.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
 from friso.studies.thesis.experiments import (
     RANGE,
@@ -43,7 +44,7 @@ def judged_steps(steps: JointSteps) -> Finding:
         (
             Part(
                 f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
-                f"within {CLOSE:.0%} of it",
+                f"within {percent(CLOSE)} of it",
                 bool(read.holds(steps.stiffness) and read.half_width <= CLOSE * steps.stiffness),
                 f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
                 f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and "
@@ -52,7 +53,7 @@ def judged_steps(steps: JointSteps) -> Finding:
                 why=read.reason or "method: the interval misses it, or is wide",
             ),
             Part(
-                f"it is {_STIFFNESS / 1e3:g} N/mm (within {CLOSE:.0%})",
+                f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(CLOSE)})",
                 bool(abs(read.value / _STIFFNESS - 1) <= CLOSE),
                 f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
                 why="not in the model: cables, misalignment, the motor constant (Sec. 4.2.2). The latter alone, "
@@ -99,7 +100,7 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
                 bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
                 f"{range_read}, lower the faster the motion",
                 why=f"input: Table 2 takes {truth:g} N, more than was measured. Besides, peaks read at a finite speed "
-                f"lie below the static friction, here by up to {1 - forces.min() / truth:.0%}"
+                f"lie below the static friction, here by up to {percent(1 - forces.min() / truth)}"
                 if slips
                 else "no slips",
             ),
@@ -132,7 +133,8 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     return Finding(
         (
             Part(
-                f"the force oscillates at both speeds, joint free or locked (by more than {CLOSE:.0%} of its mean)",
+                f"the force oscillates at both speeds, joint free or locked (by more than {percent(CLOSE)} of "
+                "its mean)",
                 all(shares and min(shares) > CLOSE for shares in swings.values()),
                 f"standard deviation over mean at {' and '.join(f'{v * 1e3:g}' for v in free.speeds)} mm/s: {listed}. "
                 f"Assumed: {_UNIFORM}",

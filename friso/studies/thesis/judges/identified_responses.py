@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.experiments import BUILT, COULOMB, FORCE, FREQUENCIES, LINE, RANGE, LockedLine
 from friso.studies.thesis.judges.rig_loops import on_the_rig, weaker_motor
@@ -69,7 +70,7 @@ def judged_line(line: LockedLine) -> Finding:
                 f"the phase scatters most at {worst:.3g} Hz, by {np.degrees(np.nanmax(scatter)):.2g} degrees, and by "
                 f"{np.degrees(above):.2g} above. Assumed, as the thesis states neither: sines of {FORCE:g} N; places "
                 f"with static friction spread evenly over the {RANGE[0]:g} to {RANGE[1]:g} N of Fig. 20, "
-                f"{COULOMB:.0%} of it as Coulomb friction",
+                f"{percent(COULOMB)} of it as Coulomb friction",
             ),
         )
     )
@@ -87,12 +88,12 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"the first mode is about {FIRST:g} Hz (within {CLOSE:.0%}) with the cart stuck",
+                f"the first mode is about {FIRST:g} Hz (within {percent(CLOSE)}) with the cart stuck",
                 bool(abs(stuck.first / FIRST - 1) <= CLOSE),
                 f"{stuck.first:.3g} Hz stuck, {sliding.first:.3g} Hz sliding: the force hardly moved the cart",
             ),
             Part(
-                f"a parasitic mode is about {_PARASITIC:g} Hz (within {CLOSE:.0%})",
+                f"a parasitic mode is about {_PARASITIC:g} Hz (within {percent(CLOSE)})",
                 bool(abs(stuck.parasitic / _PARASITIC - 1) <= CLOSE),
                 f"{stuck.parasitic:.4g} Hz (entered in the simulation, from this figure)",
             ),
@@ -101,7 +102,7 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 bool(reads[0] > (seen * weighed) ** 0.5),
                 f"{reads[0]:.3g} to {reads[1]:.3g} kg",
                 why=f"not in the model: the line lies by a factor of {factor:.2f} off, in Fig. 17 by "
-                f"{CONSTANTS[0]:.2f}: one error of the motor constant {both} both (to {CLOSE:.0%}), and the first "
+                f"{CONSTANTS[0]:.2f}: one error of the motor constant {both} both (to {percent(CLOSE)}), and the first "
                 "mode does not depend on it. Simulation alone cannot tell",
             ),
             *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),

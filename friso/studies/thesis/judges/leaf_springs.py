@@ -12,6 +12,7 @@ from friso.leaf_springs.beams import beams
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
+from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.studies import thesis_rig
 
@@ -65,13 +66,13 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"the drive stiffness is {_STIFFNESS:g} N/m within {_CLOSE:.0%} for some stainless spring steel",
+                f"the drive stiffness is {_STIFFNESS:g} N/m within {percent(_CLOSE)} for some stainless spring steel",
                 _met(stiffness / _STIFFNESS),
                 f"{_range(stiffness)} N/m {over}; with {_YOUNG[-1] / 1e9:g} GPa as plain beams, without "
                 f"anticlastic stiffening: {_as_beams(_YOUNG[-1]):.4g} N/m",
             ),
             Part(
-                f"with the cart held the first mode is {_FIRST:g} Hz within {_CLOSE:.0%} for some of them",
+                f"with the cart held the first mode is {_FIRST:g} Hz within {percent(_CLOSE)} for some of them",
                 _met(first / _FIRST),
                 f"{_range(first)} Hz",
             ),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.thesis.claims import FEW, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import share, table
 from friso.studies.thesis.studies import STUDIES
@@ -18,14 +19,14 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
     column = int(np.argmin(np.abs(stage - marker["masses.stage"])))
     other = moving != moving[row, column]
     ratio = cart[:, None] / stage[None, :]
-    text = f"{share(other, valid):.1%} of {valid.sum()} cells differ from the marker's; "
+    text = f"{percent(share(other, valid), 3)} of {valid.sum()} cells differ from the marker's; "
     text += f"cart-to-stage mass ratio {ratio.min():.2g} to {ratio.max():.2g}"
     if (other & valid).any():
         text += f"; the others at {ratio[other & valid].min():.2g} to {ratio[other & valid].max():.2g}"
     return Finding(
         (
             Part(
-                f"the marker's masses come to rest, and few cells (at most {FEW:.0%}) keep moving",
+                f"the marker's masses come to rest, and few cells (at most {percent(FEW)}) keep moving",
                 bool(not moving[row, column] and share(other, valid) <= FEW),
                 text,
             ),
@@ -50,7 +51,7 @@ def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
                 "with the isolator the stage comes to rest for all valid pairs of friction forces",
                 not back.any(),
                 f"{back.sum()} of {valid.sum()} cells keep moving; of the {locked.sum()} that do with the joint locked "
-                f"{share(moving, locked):.1%}",
+                f"{percent(share(moving, locked), 3)}",
                 where,
             ),
         )

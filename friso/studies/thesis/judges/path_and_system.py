@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import ends, free_square, share, share_text, table, trend, trend_text
 from friso.studies.thesis.studies import STUDIES
@@ -29,18 +30,17 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
         (
             Part(
                 "every acceleration and every acceleration time that moves the stage has cells that keep moving, and "
-                f"the largest square at rest covers few cells (at most {FEW:.0%})",
+                f"the largest square at rest covers few cells (at most {percent(FEW)})",
                 free_lines == 0 and square <= FEW,
-                f"{share(moving, moved):.0%} of the paths that move the stage keep it moving; {free_lines} lines and a "
-                f"square of "
-                f"{square:.1%} come to rest",
+                f"{percent(share(moving, moved))} of the paths that move the stage keep it moving; {free_lines} "
+                f"lines and a square of {percent(square, 3)} come to rest",
             ),
             Part(
                 "above some hyperbola, acceleration times its time constant, every path keeps the stage "
                 "moving; below it some do not; "
                 "and at least half of the paths that move lie above it",
                 bool(resting.any() and above >= 0.5),
-                f"all keep it moving above {bound:.2g} m/s, {above:.0%} of the paths; "
+                f"all keep it moving above {bound:.2g} m/s, {percent(above)} of the paths; "
                 f"{share_text(moving, moved & (speed <= bound))} keep it moving below",
             ),
         )

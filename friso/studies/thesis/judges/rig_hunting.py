@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
@@ -15,7 +16,7 @@ from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, j
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 
 _ASSUMED = (
-    f"Assumed: friction that varies by {AS_BUILT['rail.static_deviation']:.0%} over "
+    f"Assumed: friction that varies by {percent(AS_BUILT['rail.static_deviation'])} over "
     f"{AS_BUILT['rail.correlation_length']} along the rail, {AS_BUILT['drive.delay']} of delay"
 )
 
@@ -88,7 +89,8 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
             Part(
                 f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
                 started > 0,
-                f"{started} of {int(settle.sum())} such rails, released {max(DISPLACEMENTS):.0%} of the move to either "
+                f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the "
+                "move to either "
                 "side",
                 why="here the place on the rail decides, not the start; friso rig hunting finds such rails at other "
                 "crossovers",
@@ -172,7 +174,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
                 why="too few keep swinging",
             ),
             Part(
-                f"there it is less regular from cycle to cycle (period scatters by more than {_IRREGULAR:.0%})",
+                f"there it is less regular from cycle to cycle (period scatters by more than {percent(_IRREGULAR)})",
                 scatter > _IRREGULAR,
                 f"median scatter of the period {number_text(scatter, '.2%')}",
                 why="friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
@@ -230,10 +232,10 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 f"ratio of RMS values: {number_text(ratio, '.2g')}",
             ),
             Part(
-                f"the joint lacks damping: ten times as much removes at least {_RECOVERED:.0%} of the difference",
+                f"the joint lacks damping: ten times as much removes at least {percent(_RECOVERED)} of the difference",
                 tenfold >= _RECOVERED,
-                f"{tenfold:.0%} at {10 * standstill.own_damping:g} N s/m, "
-                f"{standstill.recovered.max():.0%} at the most tried",
+                f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
+                f"{percent(standstill.recovered.max())} at the most tried",
                 why="stiffness: the sticking bearing holds the locked stage with its bristles, the free one is held "
                 "only by the joint and the controller",
             ),

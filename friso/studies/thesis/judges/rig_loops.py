@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.rig.excitation import SLIDING
 from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, highest_stable, nearest
 from friso.studies.thesis.as_built import AS_BUILT, RigLoops
@@ -19,7 +20,7 @@ BEYOND = 3.0
 
 ASSUMED = (
     f"Assumed: sample time, encoder and peak force of Sec. 3.5; a delay of {AS_BUILT['drive.delay']}, a current loop "
-    f"of {AS_BUILT['drive.current_bandwidth']}, a rail that varies by {AS_BUILT['rail.static_deviation']:.0%}, a "
+    f"of {AS_BUILT['drive.current_bandwidth']}, a rail that varies by {percent(AS_BUILT['rail.static_deviation'])}, a "
     f"multisine of {SLIDING.strength:g} times the static friction"
 )
 

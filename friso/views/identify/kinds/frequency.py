@@ -10,7 +10,8 @@ import numpy as np
 from friso.identification.response.analysis import Bench
 from friso.identification.response.departure import Drag
 from friso.identification.response.mass_line import StraightLine
-from friso.views.drawing.prefixes import percent, range_with_unit
+from friso.quantities import percent
+from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
 from friso.views.identify.numbers import digits, name_of, with_interval

@@ -10,8 +10,9 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.profile import Profile
+from friso.quantities import percent
 from friso.views.drawing.figure import Figure
-from friso.views.drawing.prefixes import percent, range_with_unit
+from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import ends_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
 from friso.views.identify.moves_figures import FORCE, moves_figures, record_panels

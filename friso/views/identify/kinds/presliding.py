@@ -7,6 +7,7 @@ from typing import Any
 
 from friso.identification.experiments.presliding import Presliding
 from friso.identification.kind import Source
+from friso.quantities import percent
 from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import TIME, Facts, KindView
@@ -20,7 +21,7 @@ def _facts(result: Presliding) -> Facts:
         ("Moving mass", with_interval(result.mass)),
     ]
     if len(result.time):
-        facts += [("Residual friction", f"{result.unexplained:.1%} of its standard deviation")]
+        facts += [("Residual friction", f"{percent(result.unexplained, 3)} of its standard deviation")]
     return tuple(facts)
 
 
@@ -44,7 +45,7 @@ def presliding_caption(result: Presliding) -> str:
     """What the bristles are, and how much of the force they explain."""
     return (
         f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
-        f"{with_interval(result.damping)}. {result.unexplained:.1%} of the friction remains unexplained."
+        f"{with_interval(result.damping)}. {percent(result.unexplained, 3)} of the friction remains unexplained."
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from friso.identification.experiments.slow_sliding import SlowSliding
 from friso.identification.kind import Source
 from friso.identification.readings.common import stribeck_curve
+from friso.quantities import percent
 from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import TIME, Facts, KindView
@@ -23,7 +24,7 @@ def _facts(result: SlowSliding) -> Facts:
     names = ("Coulomb friction", "Static friction", "Stribeck velocity")
     facts = [(name, with_interval(estimate)) for name, estimate in zip(names, result.estimates, strict=True)]
     if len(result.time):
-        facts += [("Residual friction", f"{result.unexplained:.1%} of its standard deviation")]
+        facts += [("Residual friction", f"{percent(result.unexplained, 3)} of its standard deviation")]
     return tuple(facts)
 
 
@@ -45,7 +46,8 @@ def slow_sliding_caption(result: SlowSliding) -> str:
     coulomb, static, stribeck = (with_interval(estimate) for estimate in result.estimates)
     return (
         "Force less inertia, and the friction of LuGre bristles in the measured motion. Coulomb "
-        f"friction: {coulomb}; static friction: {static}; Stribeck velocity: {stribeck}. {result.unexplained:.1%} of "
+        f"friction: {coulomb}; static friction: {static}; Stribeck velocity: {stribeck}. "
+        f"{percent(result.unexplained, 3)} of "
         "the friction remains unexplained."
     )
 

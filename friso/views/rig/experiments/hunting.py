@@ -9,6 +9,7 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.hunting.criteria.peak_count import COUNTED_ABOVE, CRITERION, DISTINCT_CRITERION
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
+from friso.quantities import percent
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
 from friso.studies.rig.moves_on_rails import BAND, RailRuns
 from friso.studies.rig.outcome import Outcome
@@ -42,7 +43,7 @@ AFTERWARDS = 5.0
 
 def share_text(share: Share, count: int) -> str:
     """A share of rails with its interval, in words."""
-    return f"{round(share.probability * count)} of {count} rails ({share.low:.0%} to {share.high:.0%})"
+    return f"{round(share.probability * count)} of {count} rails ({percent(share.low)} to {percent(share.high)})"
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -81,7 +82,9 @@ def _limit(moves: HuntingResult, case: str) -> str:
         return f"no peaks are counted from {moves.crossovers[0]:.3g} to {moves.crossovers[-1]:.3g} Hz."
     above = moves.crossovers[moves.crossovers > last]
     bound = moves.shares(case)[-1].high
-    beyond = f"none from {above[0]:.3g} Hz on (at most {bound:.0%} of all rails)" if len(above) else "none tried above"
+    beyond = (
+        f"none from {above[0]:.3g} Hz on (at most {percent(bound)} of all rails)" if len(above) else "none tried above"
+    )
     name = f"rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else "it"
     reach = f"on {name} up to {on_rail:.3g} Hz" if np.isfinite(on_rail) else f"none on {name}"
     return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {reach}."

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.rig.experiments.in_position import BITS, CASES, SETTLING, SOURCES, InPosition, Standstill
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import BLUE, GREEN, GREY, ORANGE, VERMILLION, Axis, Figure, Limit, Panel, Series
@@ -47,13 +48,15 @@ def _damping(result: InPosition) -> str:
     if recovered[best] < 0.01:
         return "More damping in the joint recovers none of the difference."
     return (
-        f"Damping in the joint recovers little of the difference: {recovered[ten]:.0%} at {factor[ten]:.3g} times its "
-        f"own {with_unit(result.own_damping, 'N*s/m')}, and at most {recovered[best]:.0%}, at "
+        f"Damping in the joint recovers little of the difference: {percent(recovered[ten])} at "
+        f"{factor[ten]:.3g} times its "
+        f"own {with_unit(result.own_damping, 'N*s/m')}, and at most {percent(recovered[best])}, at "
         f"{with_unit(result.damping[best], 'N*s/m')}. The rest is due to stiffness: the locked stage is held by the "
         "sticking bearing, the free one only by the joint and the controller."
         if recovered[ten] < 0.5
-        else f"Damping in the joint recovers {recovered[ten]:.0%} of the difference at {factor[ten]:.3g} times its own "
-        f"{with_unit(result.own_damping, 'N*s/m')}, and {recovered[best]:.0%} at "
+        else f"Damping in the joint recovers {percent(recovered[ten])} of the difference at {factor[ten]:.3g} "
+        "times its own "
+        f"{with_unit(result.own_damping, 'N*s/m')}, and {percent(recovered[best])} at "
         f"{with_unit(result.damping[best], 'N*s/m')}."
     )
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.rig.experiments.measured_cycles import (
     AS_SLOW,
     BINS,
@@ -38,7 +39,7 @@ def sentences(outcome: Outcome) -> list[str]:
     return [
         f"On an even rail the cycle swings {with_unit(float(even.swing[0]), 'm')} peak to peak with a period "
         f"of {with_unit(float(even.period[0]), 's')}; from cycle to cycle its period scatters by "
-        f"{float(even.period_scatter[0]):.1%}.",
+        f"{percent(float(even.period_scatter[0]), 3)}.",
         _field(result),
         _asymmetry(result),
         _rolling(result),
@@ -63,12 +64,15 @@ def _asymmetry(result: CycleComparison) -> str:
     """What ends hunting on rails that vary."""
     rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], result.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
-    parts = [f"{even.probability:.0%} keep swinging where it differs by less than {high:.0%} (period {slow:.3g} times)"]
+    parts = [
+        f"{percent(even.probability)} keep swinging where it differs by less than {percent(high)} (period "
+        f"{slow:.3g} times)"
+    ]
     for low, high, share, slow in rows[1:]:
         if np.isfinite(share.probability):
-            upper = f"{low:.0%} to {high:.0%}" if np.isfinite(high) else f"more than {low:.0%}"
+            upper = f"{percent(low)} to {percent(high)}" if np.isfinite(high) else f"more than {percent(low)}"
             times = f" ({slow:.3g} times)" if np.isfinite(slow) else ""
-            parts.append(f"{share.probability:.0%} at {upper}{times}")
+            parts.append(f"{percent(share.probability)} at {upper}{times}")
     return (
         "A difference in friction between the two places where the stage sticks slows a cycle down, and ends it: "
         f"{', '.join(parts)}."
@@ -77,7 +81,7 @@ def _asymmetry(result: CycleComparison) -> str:
 
 def _rolling(result: CycleComparison) -> str:
     swings = result.rolling.swings.mean(axis=1)
-    parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(swings, result.harmonics, strict=True)]
+    parts = [f"{percent(share)} at {percent(size)}" for share, size in zip(swings, result.harmonics, strict=True)]
     return (
         f"With rolling elements of {with_unit(result.pitch, 'm')} pitch, the following shares keep swinging, by first "
         "harmonic: "
@@ -97,7 +101,8 @@ def _irregular(result: CycleComparison) -> str:
     )
     return (
         f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to "
-        f"cycle they repeat: the period scatters by {scatter:.1%}, the heights by {heights:.1%} of the swing. "
+        f"cycle they repeat: the period scatters by {percent(scatter, 3)}, the heights by {percent(heights, 3)} "
+        "of the swing. "
         "Friction at a given place is the same every time, so a varying rail does not make a cycle irregular; what "
         "changes from cycle to cycle is not in the model."
     )
@@ -149,9 +154,8 @@ def _cycles(result: CycleComparison) -> Figure:
     lines = [Series(*_late(even.time, even.deviation), "even rail", BLUE)]
     if varied is not None:
         assert result.slowest is not None
-        label = (
-            f"deviation {result.slowest[0]:.0%} over {with_unit(result.slowest[1], 'm')}, rail {result.slowest[2]:.0f}"
-        )
+        deviation, length, rail = result.slowest
+        label = f"deviation {percent(deviation)} over {with_unit(length, 'm')}, rail {rail:.0f}"
         lines.append(Series(*_late(varied.time, varied.deviation), label, VERMILLION))
     panel = Panel("", Axis("Time", "s"), Axis("Position minus reference", "m"), tuple(lines))
     caption = "The slowest cycle of a similar swing among the rails that vary (Fig. 27: measured and simulated)."
@@ -166,7 +170,7 @@ def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
 def _maps(result: CycleComparison) -> Figure:
     lengths, deviations = (
         [with_unit(length, "m") for length in result.lengths],
-        [f"{length:.0%}" for length in result.deviations],
+        [percent(length) for length in result.deviations],
     )
     x, y = Axis("Correlation length", "", words=(*lengths,)), Axis("Deviation of friction", "", words=(*deviations,))
     columns, rows = (np.arange(float(len(words))) for words in (lengths, deviations))
