@@ -13,7 +13,7 @@ from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_
 if TYPE_CHECKING:
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
 
-COUNTS = {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
+COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 
 
 def laws_sentences(laws: VerdictsByLaw) -> list[str]:
@@ -27,14 +27,13 @@ def laws_sentences(laws: VerdictsByLaw) -> list[str]:
 
 
 def _sentence(laws: VerdictsByLaw, case: str) -> str:
-    hunts, names = laws.hunts(case), [verdict.law for verdict in laws.verdicts]
-    count, edges = COUNTS.get(len(names), str(len(names))), _edges(laws, case)
+    hunts, edges = laws.hunts(case), _edges(laws, case)
     if hunts is not None:
-        return f"under all {count} laws that reproduce the measurements the stage {_does(hunts)}{edges}."
+        return f"under {_all(laws)} the stage {_does(hunts)}{edges}."
     silent = [verdict.law for verdict in laws.verdicts if not verdict.answers(case)]
     unsure = [f"under {listed(silent, 'and')} that is not certain"] if silent else []
     if not laws.answers(case):
-        return f"the verdict is certain under none of the {count} laws that reproduce the measurements."
+        return "the verdict is not certain under any law that reproduces the measurements."
     parts = [
         f"{_does(answer)} under {listed(under, 'and')}"
         for answer in (True, False)
@@ -46,6 +45,14 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
     measure = listed(laws.deciding(case), "and")
     decide = f" To decide, measure {measure}." if measure else ""
     return f"the verdict depends on the friction law: the stage {'; '.join([*parts, *unsure])}{edges}.{decide}"
+
+
+def _all(laws: VerdictsByLaw) -> str:
+    """The laws that were tried."""
+    count = len(laws.verdicts)
+    if count == 1:
+        return "the one law that reproduces the measurements"
+    return f"{'both' if count == 2 else f'all {COUNTS.get(count, count)}'} laws that reproduce the measurements"
 
 
 def _does(hunts: bool) -> str:
