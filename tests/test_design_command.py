@@ -260,7 +260,7 @@ def test_an_isolator_that_is_needed_says_why(designed: Design, snapshots: Snapsh
 def test_the_joint_is_held_below_the_static_friction(designed: Design, wording: Wording) -> None:
     text = " ".join(joint_step(designed).sentences)
     allowed = 1 / (1.1 * 1.1)  # [N]: friction over the safety factor and the stiffness error
-    for fact in ("no less than 1 N", "factor of 1.1", "error of 10%", f"{allowed:.3g} N", "stroke of 1 mm"):
+    for fact in ("no less than 1 N", "factor of 1.1", "error of 10 %", f"{allowed:.3g} N", "stroke of 1 mm"):
         assert fact in text
     unknown = replace(designed.edges, unknown=2)
     wording(" ".join(joint_step(replace(designed, edges=unknown)).sentences))
