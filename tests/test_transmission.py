@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from refusals import Wording
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -252,13 +253,12 @@ def test_without_backlash_and_friction_nothing_hunts(backlash_alone: Stage) -> N
     assert cannot_hunt(backlash_alone.replace({"transmission.backlash": "0 um"}))
 
 
-def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage) -> None:
+def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, wording: Wording) -> None:
     """All motions shrink with it, so that no small share of it ends them."""
     result = feeding(backlash_alone)
     assert result is not None
     assert (result.friction, result.backlash.needed, result.backlash.gone) == (None, True, 0.0)
-    (sentence,) = feeding_sentences(result)
-    assert sentence.startswith("The backlash feeds it")
+    wording(" ".join(feeding_sentences(result)))
 
 
 def test_what_feeds_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -270,14 +270,13 @@ def test_what_feeds_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert result == Feeding(Decline(0.001, None, True), Decline(1.0, 0.001, True))
 
 
-def test_what_feeds_it_is_told() -> None:
+def test_what_feeds_it_is_told(wording: Wording) -> None:
     keys = dry_friction(machine().flat())
     assert {"friction.static", "motor_friction.bristle_stiffness", "friction.bristle_damping"} <= {*keys}
     assert "friction.viscous" not in keys
     lasting, ending = Decline(0.001, None, True), Decline(0.5, 0.3, True)
-    (sentence,) = feeding_sentences(Feeding(lasting, ending))
-    assert sentence.startswith("The backlash feeds it, not the friction")
-    assert feeding_sentences(Feeding(ending, lasting))[0].startswith("Friction feeds it, not the backlash")
+    for result in (Feeding(lasting, ending), Feeding(ending, lasting)):
+        wording(" ".join(feeding_sentences(result)))
     assert len(feeding_sentences(Feeding(None, Decline(0.5, 0.3, False)))) == 2
 
 

@@ -101,13 +101,16 @@ def _force_moved(log: Log, lag: int, width: int) -> Log:
 def _timing_sentence(lag: int, width: int, step: float) -> str:
     shift = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
     if width == 1:
-        return f"a force {shift} fits much better: a delay between the channels?"
+        return f"a force {shift} fits much better, which suggests a delay between the channels"
     also = f" and a force {shift}" if lag else ""
     span = f"{abs(width) * step * 1e3:.3g} ms"
     if width > 0:
-        return f"motion averaged over {span}{also} fits much better: a force that is averaged or filtered?"
+        return f"motion averaged over {span}{also} fits much better, which suggests an averaged or filtered force"
     also = f", {shift}," if lag else ""
-    return f"a force averaged over {span}{also} fits much better: a position that is filtered, or not measured?"
+    return (
+        f"a force averaged over {span}{also} fits much better, which suggests a position that is filtered, or not "
+        "measured"
+    )
 
 
 def _with_columns(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alternative]:
@@ -158,6 +161,6 @@ def _feed_forward(model: InverseModel, log: Log) -> str:
     mass = f"{-model.value(ACCELERATION):.2g} {unit_of('kg', log)}"
     coulomb = f"{-model.value(DIRECTION):.2g} {log.unit('force')}"
     return (
-        f"{mass} times the acceleration of the reference and {coulomb} in its direction are missing: a feed-forward "
-        "that is not part of this force?"
+        f"{mass} times the acceleration of the reference and {coulomb} in its direction are missing, which suggests a "
+        "feed-forward that is not part of this force"
     )

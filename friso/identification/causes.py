@@ -36,14 +36,14 @@ class Cause:
 def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
     """What may be wrong with a log that the inverse model does not describe, as far as the log tells; nothing where
     none of these explains it."""
-    better = [Cause(one.sentence, one.model, True) for one in alternatives(log, inverse, cart_share)]
+    better = [Cause(other.sentence, other.model, True) for other in alternatives(log, inverse, cart_share)]
     plain = [_constant(inverse, log.unit("force")), "" if better else _oscillation(inverse)]
     return [*better, *_clipped(log), *(Cause(sentence) for sentence in plain if sentence)]
 
 
 def _clipped(log: Log) -> list[Cause]:
     share = clipped_share(log["force"])
-    sentence = f"{percent(share)} of the force is cut off at its extremes: more force than this channel shows?"
+    sentence = f"{percent(share)} of the force is cut off at its extremes: the channel does not show all of it"
     return [Cause(sentence, None, True)] if share > CLIPPED else []
 
 
@@ -51,7 +51,8 @@ def _constant(inverse: InverseModel, unit: str) -> str:
     offset, coulomb = (abs(inverse.value(name)) for name in ("offset", "coulomb"))
     if offset <= max(coulomb, 0.1 * float(np.std(inverse.measured))):
         return ""
-    return f"a constant force of {inverse.value('offset'):.3g} {unit} is larger than friction: gravity, or an offset?"
+    force = f"{inverse.value('offset'):.3g} {unit}"
+    return f"a constant force of {force} is larger than friction: gravity, or an offset of the channel"
 
 
 def _oscillation(inverse: InverseModel) -> str:
@@ -62,4 +63,4 @@ def _oscillation(inverse: InverseModel) -> str:
     share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
     if share < PEAK or peak == 0:
         return ""
-    return f"{percent(share)} of what is left swings at {rates[peak]:.3g} Hz: a mode in the band?"
+    return f"{percent(share)} of what is left swings at {rates[peak]:.3g} Hz, probably a mode in the band"

@@ -10,7 +10,7 @@ def feeding_sentences(feeding: Feeding) -> list[str]:
     """Whether hunting ends without friction, or without backlash, and where."""
     friction, backlash = feeding.friction, feeding.backlash
     if friction is None:
-        feeds = "The backlash feeds it" if backlash.needed else "It is not the backlash that feeds it"
+        feeds = "The backlash feeds it" if backlash.needed else "The backlash does not feed it"
         return [f"{feeds}: there is no dry friction; {_course('backlash', backlash)}.", *_doubt(backlash)]
     feeds = {
         (True, True): "Friction and backlash feed it together, and it ends without either of them",
@@ -29,8 +29,8 @@ def _course(name: str, decline: Decline) -> str:
     if decline.gone == 0:
         return f"it shrinks in proportion to the {name}, and is gone without it"
     if decline.gone is None:
-        return f"it lasts with {percent(decline.lasts, 3)} of the {name}"
-    return f"it lasts with {decline.lasts:.3g} times the {name} and is gone with {decline.gone:.3g} times"
+        return f"it lasts down to {percent(decline.lasts, 3)} of the {name}"
+    return f"it persists at {decline.lasts:.3g} times the {name} and disappears at {decline.gone:.3g} times"
 
 
 def _doubt(*declines: Decline) -> list[str]:

@@ -22,11 +22,11 @@ def isolator_sentence(suggestion: Suggestion) -> str:
         f"{with_unit(flat['joint.stroke'], 'm')} and damping {with_unit(flat['joint.damping'], 'N*s/m')}"
     )
     if not suggestion.settles:
-        return f"It would not settle on {joint}, nor on those of shorter strokes that were tried."
+        return f"It would not settle on {joint}, or on any shorter stroke tried."
     low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
     masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     return (
         f"On {joint} between {masses[0]} on the cart and {masses[1]} on the stage it would settle: nothing was found "
         f"to attract it down to 1/{DISTANCE:g} of this bandwidth. Its modulus margin would be {suggestion.margin:.2f}"
-        f"{low}. This is a first look: friso tune finds the best isolator and verifies it."
+        f"{low}. This is a first estimate: friso tune finds the best isolator and verifies it."
     )
