@@ -23,11 +23,12 @@ from made_up import (
 )
 from pages import packed_values
 
+from friso.quantities import percent
 from friso.views.check.figures import check_figures
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Axis, Figure, Map, Panel, Series
-from friso.views.drawing.prefixes import choose, percent, plus_minus, pretty, range_with_unit, with_unit
+from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
 from friso.views.drawing.thinning import BUCKETS, KEPT, thin
 
 # ---------------------------------------------------------------- plain data

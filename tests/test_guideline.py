@@ -40,7 +40,7 @@ from friso.studies.guideline.groups import (
     parameters_of,
     values_of,
 )
-from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fitted, in_series
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fitted, rates_in_series
 from friso.studies.guideline.parasitic import holding
 from friso.studies.guideline.thesis_rig import plain
 from friso.studies.thesis.studies import thesis_rig
@@ -278,7 +278,7 @@ def test_law_is_not_led_astray_by_outliers() -> None:
 
 def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
     values, edges = made(256, 1, 0.0)
-    wrong = fitted(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(in_series, 1.0)), values, edges)
+    wrong = fitted(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(rates_in_series, 1.0)), values, edges)
     others, held_out = made(256, 2, 0.0)
     assert Errors.between(wrong.edge(others), held_out).rms > 0.5
 

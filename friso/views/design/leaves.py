@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.design_method.method import Design
-from friso.design_method.requirements import Requirement, Way
+from friso.design_method.requirements import RelaxableKey, Requirement
 from friso.quantities import percent
 from friso.views.design.words import DesignStep, hertz, leaves, plain, size
 from friso.views.drawing.prefixes import listed
@@ -40,7 +40,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
     ]
 
 
-def _keys(requirement: Requirement, text: Callable[[Way], str]) -> str:
+def _keys(requirement: Requirement, text: Callable[[RelaxableKey], str]) -> str:
     return ", ".join(map(text, requirement.keys))
 
 
