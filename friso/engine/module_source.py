@@ -6,7 +6,7 @@ A module needs no SymPy to run, so that a warm start loads neither the equations
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import sympy as sp
 
@@ -100,7 +100,6 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
     names |= {r: f"r[{i}]" for i, r in enumerate(model.fixed)} | {TIME: "t"}
     names |= {s: f"s[{i}]" for i, s in enumerate(STEADY)}
     names |= {kink.beyond: f"m[{k}]" for k, kink in enumerate(model.kinks)}
-    rename: Rename = names.__getitem__
     functions = {
         "constants(p)": writer.constants.expressions,
         "scales(p)": [state.scale for state in model.states],
@@ -114,9 +113,12 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
         "right_hand_side(x, m, t, r, p)": model.rhs,
         "outputs(x, m, t, r, p)": [output.expression for output in model.outputs.values()],
     }
-    return "\n\n".join(_function(head, body, rename) for head, body in functions.items())
+    return "\n\n".join(_function(head, body, names) for head, body in functions.items())
 
 
-def _function(head: str, expressions: Iterable[sp.Expr], rename: Rename) -> str:
-    lines = [f"        {print_numpy(sp.sympify(e), rename)}," for e in expressions]
-    return "\n".join([f"def {head}:", "    return [", *lines, "    ]"])
+def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
+    shared, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("w"), order="none")
+    rename: Rename = {**names, **{symbol: symbol.name for symbol, _ in shared}}.__getitem__
+    steps = [f"    {symbol.name} = {print_numpy(e, rename)}" for symbol, e in shared]
+    lines = [f"        {print_numpy(e, rename)}," for e in reduced]
+    return "\n".join([f"def {head}:", *steps, "    return [", *lines, "    ]"])

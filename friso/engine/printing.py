@@ -85,6 +85,14 @@ class _Renamed(NumPyPrinter):
     def _print_sine(self, expr: sp.Expr) -> str:
         return f"sine({self._print(expr.args[0])})"
 
+    def _print_Piecewise(self, expr: sp.Piecewise) -> str:
+        """As `where` in `where`: quicker than the `select` of SymPy's own."""
+        text = "np.nan"
+        for value, condition in reversed(expr.args):
+            value = self._print(value)
+            text = value if condition == sp.true else f"np.where({self._print(condition)}, {value}, {text})"
+        return text
+
     def _module_format(self, fqn: str, register: bool = True) -> str:
         return fqn.replace("numpy.", "np.")
 

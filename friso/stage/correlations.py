@@ -22,7 +22,7 @@ from friso.quantities import as_toml, percent, quoted
 from friso.stage.controllers import as_tuned
 from friso.stage.files import parsed, text_of
 from friso.stage.section import unknown_key
-from friso.stage.stage import Stage, numeric_keys, violations
+from friso.stage.stage import Stage, violations
 
 _EXPECTED = "a file with keys and the matrix of their correlations"
 _EXAMPLE = 'keys = ["friction.coulomb", "friction.viscous"] and matrix = [[1.0, -0.8], [-0.8, 1.0]]'
@@ -121,7 +121,7 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
     """Raises StageError for a key that the stage does not have, or that is not uncertain there."""
-    keys, uncertain = numeric_keys(stage.flat()), stage.uncertain()
+    keys, uncertain = stage.numeric_keys(), stage.uncertain()
     for key in correlations.keys:
         if key not in keys:
             raise unknown_key(key, keys, _EXAMPLE)
@@ -197,7 +197,7 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
 
 def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Which draws a stage may have, and which rule between keys ("" none) the others break, both of shape (count,)."""
-    fields = numeric_keys(stage.flat())
+    fields = stage.numeric_keys()
     within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)
     why = np.full(count, "", dtype=object)
     chosen = np.flatnonzero(within)

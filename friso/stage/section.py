@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import cache
 from types import NoneType
 from typing import Any, ClassVar, Self, TypeVar, get_args
 
@@ -222,19 +223,22 @@ class TableArray:
         return core_schema.with_info_plain_validator_function(self.read)
 
 
-def table_arrays(cls: type[Section]) -> dict[str, TableArray]:
+@cache
+def table_arrays(cls: type[Section]) -> Mapping[str, TableArray]:
     """The keys of a table that take an array of tables."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, TableArray)}
 
 
-def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
+@cache
+def numeric_fields(cls: type[Section]) -> Mapping[str, Quantity | Number]:
     """Unit, bound and example of each numeric key of a table."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, Quantity | Number)}
 
 
-def list_fields(cls: type[Section]) -> dict[str, Several]:
+@cache
+def list_fields(cls: type[Section]) -> Mapping[str, Several]:
     """The keys of a table that take an array, and what of."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, Several)}

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
+from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
@@ -111,6 +112,11 @@ class Stage(Section):
     def __init__(self, /, **data: Any) -> None:
         self._take(data, _axis_written(data))
 
+    def __getstate__(self) -> dict[Any, Any]:
+        """What is pickled: the tables, without what has been worked out from them."""
+        state = super().__getstate__()
+        return state | {"__dict__": {key: item for key, item in state["__dict__"].items() if not key.startswith("_")}}
+
     @property
     def axis_kind(self) -> AxisKind:
         """Linear or rotary, which decides on the units."""
@@ -204,18 +210,42 @@ class Stage(Section):
         `swept`, dotted keys to SI numbers or arrays, is laid over the stage before the defaults that follow
         other keys are filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
         """
+        if not swept:
+            return dict(self._complete)
+        for key in swept:
+            if key not in self._sweepable:
+                raise StageError.of(unknown_key(key, self._sweepable))
+        return derived(_with_defaults({**self._declared, **swept}))
+
+    def numeric_keys(self) -> Mapping[str, Quantity | Number]:
+        """Unit, bound and example of every numeric key that this stage can have."""
+        return self._numeric_keys
+
+    @cached_property
+    def _declared(self) -> dict[str, Any]:
+        """The flat keys that the stage file gives."""
         flat: dict[str, Any] = {"friction.model": "none"}
         for table, section in self:
             if isinstance(section, UncertainSection):
                 values = {key: value for key, value in section.numbers.items() if value is not None}
                 flat |= {f"{table}.{key}": _plain(value) for key, value in values.items()}
-        keys = numeric_keys(flat)
-        if self.flexure:
-            keys = {key: item for key, item in keys.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
-        for key in swept or {}:
-            if key not in keys:
-                raise StageError.of(unknown_key(key, keys))
-        return derived(_with_defaults(flat | dict(swept or {})))
+        return flat
+
+    @cached_property
+    def _complete(self) -> dict[str, Any]:
+        return derived(_with_defaults(dict(self._declared)))
+
+    @cached_property
+    def _numeric_keys(self) -> Mapping[str, Quantity | Number]:
+        return numeric_keys(self._complete)
+
+    @cached_property
+    def _sweepable(self) -> Mapping[str, Quantity | Number]:
+        """The numeric keys that may be laid over the stage: not those that follow from the leaf springs."""
+        keys = numeric_keys(self._declared)
+        if not self.flexure:
+            return keys
+        return {key: item for key, item in keys.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
 
     def uncertain(self) -> dict[str, Interval]:
         """Dotted keys of the uncertain quantities to their intervals; their centres stand in `flat`.

@@ -12,7 +12,7 @@ import numpy as np
 from friso.axis import AxisKind
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted
-from friso.stage import Stage, numeric_keys, parse_set
+from friso.stage import Stage, parse_set
 
 Values = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
@@ -66,7 +66,7 @@ def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = F
     `free`: links use the name, so it need not be a key. With `log` a range that does not say how
     it is spaced is logarithmic. Raises InputError.
     """
-    field = numeric_keys(stage.flat()).get(name)
+    field = stage.numeric_keys().get(name)
     if field is None and not free:
         return _words(stage, name, values)
     reader = _Reader(field, stage.axis_kind)

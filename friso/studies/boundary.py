@@ -11,7 +11,7 @@ from friso.errors import InputError
 from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.cycle.hunting import DITHERS, cannot_hunt
-from friso.stage import Stage, numeric_keys, violations
+from friso.stage import Stage, violations
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.links import check_links, names
@@ -74,7 +74,7 @@ def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) 
         raise InputError(
             name, repr(text), "a range FIRST..LAST, without a number of points", range_example(stage.flat())
         )
-    field = numeric_keys(stage.flat()).get(name)
+    field = stage.numeric_keys().get(name)
     if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
         raise InputError(name, repr(text), f"values {field.bound.text}", example)
     return KeyRange(name, read.first, read.last, read.scale == "log", read.unit)

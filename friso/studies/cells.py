@@ -17,7 +17,7 @@ from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.measures import BANDS, Measures, measure, options
 from friso.hunting.verdict import Motions, can_hunt, judge_runs
-from friso.stage import Stage, numeric_keys, violations
+from friso.stage import Stage, violations
 from friso.studies.links import linked
 
 Columns = dict[str, np.ndarray]
@@ -158,7 +158,7 @@ def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.nda
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The flat SI form of all cells, links followed; numeric columns only."""
-    numeric = numeric_keys(stage.flat())
+    numeric = stage.numeric_keys()
     keys = {name: column for name, column in columns.items() if name in numeric}
     if not links:
         return stage.flat(keys)

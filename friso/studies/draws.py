@@ -14,7 +14,7 @@ from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.hunting.cycle.hunting import why_not
 from friso.hunting.verdict import judge_many
 from friso.progress import Progress, Tally, silent
-from friso.stage import Stage, numeric_keys
+from friso.stage import Stage
 from friso.stage.correlations import Sample, laid_over
 from friso.studies.shares import Share, share
 
@@ -82,7 +82,7 @@ class Draws:
 
     def unit(self, key: str) -> str:
         """The SI unit of a key."""
-        return numeric_keys(self.stage.flat())[key].unit
+        return self.stage.numeric_keys()[key].unit
 
 
 def different(stage: Stage) -> dict[str, Stage]:

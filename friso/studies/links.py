@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.stage import Stage, numeric_keys
+from friso.stage import Stage
 
 EXAMPLE = 'masses.stage = "0.3 * mass" or friction.static = "max(friction.static, friction.coulomb)"'
 
@@ -47,7 +47,7 @@ def names(links: Mapping[str, str]) -> frozenset[str]:
 
 def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
     """Refuse links to no key, and expressions with names that are neither keys nor `axes`. Raises InputError."""
-    numeric = numeric_keys(stage.flat())
+    numeric = stage.numeric_keys()
     for key in links:
         if key not in numeric:
             stage.flat({key: 0.0})  # raises, and names the nearest key

@@ -14,7 +14,6 @@ from friso.design_method.geometry import Geometry
 from friso.design_method.method import SLOW, Design, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
-from friso.stage.stage import numeric_keys
 from friso.views.design.control import parallel_gains
 from friso.views.design.window import lower, upper
 from friso.views.design.words import need, refusal
@@ -62,7 +61,7 @@ def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
 
 
 def _corners(corners: Corners, design: Design) -> dict[str, Any]:
-    units = {key: field.unit for key, field in numeric_keys(design.stage.flat()).items()}
+    units = {key: field.unit for key, field in design.stage.numeric_keys().items()}
     worst = corners.population.of(corners.worst)
     return {
         "hunts": corners.hunts,

@@ -284,7 +284,7 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
         present = crossover(outcome.remedy.stage)
         low, high, unit = low * present, high * present, "Hz"
     else:
-        keys = numeric_keys(outcome.remedy.stage.flat())
+        keys = outcome.remedy.stage.numeric_keys()
         unit = keys[name].unit if name in keys else ""
     first, last = (number(value, unit) for value in (low, high))
     first = f"{first} (the least tried)" if window.open_below else first
