@@ -157,12 +157,10 @@ class Kernel:
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
         """The parameters of each run [SI], each of shape (runs,), from flat keys to numbers or arrays."""
-        return [
-            np.broadcast_to(np.asarray(value, dtype=float), (runs,))
-            if np.ndim(value)
-            else np.full(runs, value, dtype=float)
-            for value in (flat[name] for name in self.parameters)
-        ]
+        rows = np.empty((len(self.parameters), runs))
+        for row, name in zip(rows, self.parameters, strict=True):
+            row[:] = flat[name]
+        return list(rows)
 
 
 @dataclass(frozen=True)

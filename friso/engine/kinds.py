@@ -80,7 +80,13 @@ def kind_of(example: Any) -> Kind:
     raise TypeError(f"compiled loops are not given anything like {example!r}")
 
 
-def packed(kinds: Sequence[Kind], arguments: Sequence[Any]) -> bytes:
-    """Arguments of these kinds one after another. Arrays must outlive it."""
-    words = [word for kind, argument in zip(kinds, arguments, strict=True) for word in kind.words(argument)]
-    return struct.pack("".join(kind.form for kind in kinds), *words)
+class Packing:
+    """How arguments of some kinds are handed over: one after another."""
+
+    def __init__(self, kinds: Sequence[Kind]) -> None:
+        self._kinds, self._struct = tuple(kinds), struct.Struct("".join(kind.form for kind in kinds))
+
+    def packed(self, arguments: Sequence[Any]) -> bytes:
+        """The words of the arguments. Arrays must outlive them. Raises TypeError for arguments of other kinds."""
+        words = (word for kind, argument in zip(self._kinds, arguments, strict=True) for word in kind.words(argument))
+        return self._struct.pack(*words)

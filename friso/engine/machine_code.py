@@ -11,7 +11,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from llvmlite import ir
 
-from friso.engine.kinds import Kind, packed
+from friso.engine.kinds import Kind, Packing
 from friso.engine.processor import processor
 
 
@@ -58,8 +58,8 @@ class Loops:
     """Compiled loops (`friso.engine.scalar_code`), called without the interpreter's lock."""
 
     def __init__(self, address: int, kinds: Sequence[Kind]) -> None:
-        self._call, self._kinds = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(address), tuple(kinds)
+        self._call, self._packing = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(address), Packing(kinds)
 
     def __call__(self, *arguments: Any) -> None:
         """Raises TypeError for arguments of other kinds than those the loops were compiled for."""
-        self._call(packed(self._kinds, arguments))
+        self._call(self._packing.packed(arguments))

@@ -40,7 +40,7 @@ def _types(kind: Kind) -> Sequence[ir.Type]:
 
 def written(function: Callable[..., None], kinds: Sequence[Kind]) -> ir.Module:
     """A function of arguments of these kinds as LLVM has it, called `run`. It takes the address at which the arguments
-    lie one after another (`friso.engine.kinds.packed`)."""
+    lie one after another (`friso.engine.kinds.Packing`)."""
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
     builder: Any = ir.IRBuilder(entry.append_basic_block())

@@ -161,10 +161,12 @@ class Ensemble:
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
         parts = list(run_chunks(kernel(self.structure, variational, along=along), flat, self.count, options, starts))
-        order = np.argsort(np.concatenate([part.numbers for part in parts]))
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
-        columns = zip(*(_with_room(part.results, room) for part in parts), strict=True)
-        results = Results(*(np.concatenate(column)[order] for column in columns))
+        rooms = [_with_room(part.results, room) for part in parts]
+        results = rooms[0]
+        if len(parts) > 1:
+            order = np.argsort(np.concatenate([part.numbers for part in parts]))
+            results = Results(*(np.concatenate(column)[order] for column in zip(*rooms, strict=True)))
         return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
 
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
@@ -182,6 +184,8 @@ def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_room(results: Results, room: int) -> Results:
     """The results with room for so many turning points."""
+    if results.turn_times.shape[1] == room:
+        return results
     gap = ((0, 0), (0, max(0, room - results.turn_times.shape[1])))
     times, values = (np.pad(turns[:, :room], gap) for turns in (results.turn_times, results.turn_values))
     return results._replace(turn_times=times, turn_values=values)

@@ -17,6 +17,9 @@ STEPS = 40
 RENEWED = 1e-5
 """Gap, as a share of the states' magnitudes, above which every step has a Jacobian of its own."""
 
+SERVES = 0.1
+"""Share to which a step with an older Jacobian has to bring the gap for that Jacobian to serve for another."""
+
 STALLED = (3, 8, 1)
 """Steps after which an orbit whose gap has not halved gets no closer: while it is above `RENEWED`, below that, and once
 the orbit is closed: what is left then is rounding, and halves by chance."""
@@ -107,7 +110,8 @@ def close(
 
     `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one; `swings` are those in that time, if they are
     not as few as there may be. The phase is that at which the integrator's
-    state makes the actuator exert no force on a stage at rest. Where a limiter chatters, the flow's derivative changes
+    state makes the actuator exert no force on a stage at rest. A Jacobian serves for as long as steps with it bring the gap
+    down fast. Where a limiter chatters, the flow's derivative changes
     from one nanometre to the next and points nowhere; the last Jacobian from farther away then serves for as many
     steps as it takes.
     """
@@ -169,16 +173,16 @@ class _Shooting:
         self.best_states, self.best_times, self.best_places = states.copy(), times.copy(), self.places.copy()
         self.gaps, self.idle = np.full(count, np.inf), np.zeros(count, np.int64)
         self.inverses: list[np.ndarray] = [np.empty(0)] * count
-        self.active = np.ones(count, bool)
+        self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
         self.finest = FINEST_CHATTERING if self.chatters else FINEST
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
-        far = self.gaps > (RENEWED if self.chatters else self.finest)
-        for which in (np.flatnonzero(self.active & far), np.flatnonzero(self.active & ~far)):
+        renewed = self.gaps > RENEWED if self.chatters else ~self.serves
+        for which in (np.flatnonzero(self.active & renewed), np.flatnonzero(self.active & ~renewed)):
             if which.size:
-                self._advance(which, renew=bool(far[which[0]]))
+                self._advance(which, renew=bool(renewed[which[0]]))
         return bool(self.active.any())
 
     def _advance(self, which: np.ndarray, renew: bool) -> None:
@@ -193,10 +197,12 @@ class _Shooting:
             results = stages.run(states, times, self.rtol)
             ends, fine = self.sign * results.ends, done(results)
         misses = ends - states
-        gaps = np.max(np.abs(misses) / stages.scales, axis=1)
-        self._keep_best(which, np.where(fine, gaps, np.inf))
+        gaps = np.where(fine, np.max(np.abs(misses) / stages.scales, axis=1), np.inf)
+        self.serves[which] = renew | (gaps < np.maximum(SERVES * self.gaps[which], self.finest))
+        kept = self.serves[which] | self.chatters  # the others are shot once more from where they are
+        self._keep_best(which[kept], gaps[kept])
         residual = self._residual(which, stages)
-        for k, miss, other in zip(which, misses, residual, strict=True):
+        for k, miss, other in zip(which[kept], misses[kept], residual[kept], strict=True):
             self._step(k, self.inverses[k] @ -np.concatenate([miss, other]), stages.sticking)
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
