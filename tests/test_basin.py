@@ -7,13 +7,13 @@ import pytest
 from cycles import by_gains
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.stats import qmc
+from scipy.stats import binom, qmc
 from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 
 import friso
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Target
-from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, MoveShare, displacements, ends_in, moves, pushes
+from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, MoveShare, displacements, ends_in, evenly, moves, pushes
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
@@ -149,7 +149,7 @@ def test_moves_by_single_runs() -> None:
     """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
     result = moves(MOVING, target())
     assert result is not None
-    drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(result.accelerations, result.times, strict=True))
+    drawn = qmc.scale(evenly(MOVES).T, *zip(result.accelerations, result.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
     item, completed, _ = ends_in(own, MOVES, target())
     assert completed.all()
@@ -180,16 +180,14 @@ def test_motions_without_acceleration_have_no_share() -> None:
 
 @given(drawn=st.integers(1, 500), data=st.data())
 def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
-    """Wilson 1927, doi:10.1080/01621459.1927.10502953: at its ends the share p is 1.96 sqrt(p (1-p)/n) off."""
+    """Clopper and Pearson 1934: at its lower end so many hits or more have a probability of 2.5 %, at its upper end so
+    many or fewer."""
     hunting = data.draw(st.integers(0, drawn))
     result = MoveShare(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
     low, high = result.interval
     assert 0 <= low <= result.fraction <= high <= 1
-    for p in (low, high):
-        if 0 < p < 1:
-            assert abs(p - result.fraction) == pytest.approx(
-                1.959964 * np.sqrt(p * (1 - p) / drawn), rel=1e-5, abs=1e-9
-            )
+    assert low == 0.0 or binom.sf(hunting - 1, drawn, low) == pytest.approx(0.025, rel=1e-6)
+    assert high == 1.0 or binom.cdf(hunting, drawn, high) == pytest.approx(0.025, rel=1e-6)
 
 
 def equal_gains(crossover: float) -> Stage:

@@ -23,6 +23,7 @@ from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
 from friso.hunting.criteria import end_of_traces, outcomes
+from friso.shares import share
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
 from friso.stage.lists import element_keys
@@ -32,7 +33,6 @@ from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median
 from friso.studies.compare.study import Comparison, Result, compare
-from friso.studies.shares import share
 from friso.views.compare.document import compare_document
 from friso.views.compare.figures import figures
 from friso.views.compare.page import page

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest
 
 from friso.design_method.population import Population, sampled
 from friso.design_method.spec import Spec
@@ -18,6 +17,7 @@ from friso.equations.structure import shared_structure
 from friso.hunting.criteria.run_outcome import CREEPS, FAILED, RESTS, SWINGS, outcomes
 from friso.hunting.measures import end_of, turns_of
 from friso.progress import Progress, silent
+from friso.shares import share_interval
 from friso.stage import Stage
 
 MACHINES = 10_000
@@ -83,10 +83,7 @@ class MachineOutcomes:
     @property
     def interval(self) -> tuple[float, float]:
         """The range that holds the probability of not coming to rest with 95 % (Clopper and Pearson)."""
-        if not self.tried:
-            return 0.0, 1.0
-        proportion = binomtest(self.missed, self.tried).proportion_ci(0.95, method="exact")
-        return float(proportion.low), float(proportion.high)
+        return share_interval(self.missed, self.tried)
 
     def slower_than(self, share: float) -> float:
         """The settling time [s] that is exceeded by a share of the moves; infinite where more of them do not settle."""

@@ -117,8 +117,11 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 
 
 def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbol, str]) -> str:
-    shared, reduced = sp.cse(list(expressions), symbols=sp.numbered_symbols("w"), order="none")
-    rename: Rename = {**names, **{symbol: symbol.name for symbol, _ in shared}}.__getitem__
-    steps = [f"    {symbol.name} = {print_numpy(e, rename)}" for symbol, e in shared]
-    lines = [f"        {print_numpy(e, rename)}," for e in reduced]
+    """A function of what stands in its head; what has cases is worked out once, however often it occurs."""
+    expressions = [sp.sympify(e) for e in expressions]
+    cases = sorted({case for e in expressions for case in e.atoms(sp.Piecewise)}, key=sp.count_ops)
+    shared = {case: sp.Symbol(f"w{k}") for k, case in enumerate(cases)}
+    rename: Rename = {**names, **{symbol: symbol.name for symbol in shared.values()}}.__getitem__
+    steps = [f"    {symbol.name} = {print_numpy(case, rename)}" for case, symbol in shared.items()]
+    lines = [f"        {print_numpy(e.xreplace(shared), rename)}," for e in expressions]
     return "\n".join([f"def {head}:", *steps, "    return [", *lines, "    ]"])

@@ -8,7 +8,6 @@ from math import comb, factorial
 from typing import Any
 
 import numpy as np
-from scipy.signal import tf2ss
 
 from friso.errors import InputError
 from friso.frequency.system import Complex, System
@@ -145,6 +144,7 @@ def delayed(machine: System, delay: float, loop: float) -> System:
         text = f"{delay:g} s, {turn / (2 * np.pi):.3g} periods of the fastest mode"
         raise InputError("drive.delay", text, expected, 'delay = "100 us"')
     from control import pade
+    from scipy.signal import tf2ss  # 0.8 s to import
 
     for k in range(sections):
         machine = _behind(machine, tf2ss(*pade(delay / sections, PADE)), f"delay_{k}")

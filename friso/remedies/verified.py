@@ -19,8 +19,8 @@ from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
 from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile
 from friso.remedies.window import VariableWindow
+from friso.shares import Share, share
 from friso.stage import Stage
-from friso.studies.shares import Share, share
 
 ONE = np.zeros((1, 0))
 """The shares of the one point of a remedy without variables."""

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import mannwhitneyu
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import shared_structure
@@ -14,9 +13,9 @@ from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.hunting.cycle.hunting import why_not
 from friso.hunting.verdict import judge_many
 from friso.progress import Progress, Tally, silent
+from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.correlations import Sample, laid_over
-from friso.studies.shares import Share, share
 
 CHUNK = 256
 """Stages whose verdicts are found at once: between chunks progress is reported."""
@@ -46,6 +45,8 @@ class Fates:
         It is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 where all that hunt have the larger
         values, -1 where all have the smaller ones, 0 where the key separates nothing. Empty where all share one fate.
         """
+        from scipy.stats import mannwhitneyu  # 0.7 s to import
+
         attracted = np.isin(self.verdicts, ATTRACTED)
         others = ~attracted & (self.verdicts != "failed")
         if not (attracted.any() and others.any()):

@@ -11,6 +11,7 @@ from friso.equations.motion import last_corner
 from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.progress import Progress, silent
+from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.machines import Machines, draw_machines
@@ -25,7 +26,6 @@ from friso.studies.compare.measures import (
 )
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
-from friso.studies.shares import Share, share
 from friso.virtual_rig.run import Recorded, run
 from friso.virtual_rig.task import MoveTask, own_motion
 

@@ -17,10 +17,10 @@ from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside
 from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import scan
 from friso.progress import Progress, silent
+from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.sizes import interval, jointed, pace, quicker
-from friso.studies.shares import Share, share
 from friso.virtual_rig.run import Recorded, run
 from friso.virtual_rig.task import MoveTask, point_to_point
 

@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from friso.hunting.feeding import Feeding
     from friso.hunting.outward import AttractionEnd
     from friso.remedies.suggestion import Suggestion
+    from friso.shares import Share
     from friso.studies.draws import Draws
     from friso.studies.laws.verdicts import VerdictsByLaw
-    from friso.studies.shares import Share
 
 
 def check_document(

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from friso.equations.motion import last_corner
+from friso.shares import Share
 from friso.studies.compare.study import LONGER, Comparison, Result
-from friso.studies.shares import Share
 from friso.views.compare.words import label
 from friso.views.drawing.figure import (
     BLUE,

@@ -13,7 +13,7 @@ from friso.quantities import NOTHING
 from friso.views.drawing.figure import Array
 
 if TYPE_CHECKING:
-    from friso.studies.shares import Share
+    from friso.shares import Share
 
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
 # times beyond seconds and slow frequencies are read best as they are.

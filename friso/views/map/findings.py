@@ -10,6 +10,7 @@ import numpy as np
 from friso.axis import axis_shown
 from friso.hunting.criteria.run_outcome import BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.quantities import percent
+from friso.shares import share_interval
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
 from friso.views.drawing.prefixes import listed, percentage
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, dims_of
@@ -166,14 +167,12 @@ def verification(runs: xr.Dataset) -> str:
     checked = int(runs.attrs.get("verified_cells", 0))
     if not checked:
         return "Not verified: no outcome was checked at a tighter tolerance."
-    from scipy.stats import binomtest
-
     surviving = int(runs.attrs["verified_surviving"])
-    interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
+    low, high = share_interval(surviving, checked)
     rtol = float(runs.attrs["verified_rtol"])
     text = (
         f"{percent(surviving / checked, 3)} of {grouped(checked)} outcomes are the same at rtol {rtol:g} "
-        f"(95 % confidence: {percentage(interval.low)} to {percentage(interval.high)} %)."
+        f"(95 % confidence: {percentage(low)} to {percentage(high)} %)."
     )
     if inferred := int(runs.attrs.get("inferred_checked", 0)):
         confirmed = int(runs.attrs["inferred_confirmed"])

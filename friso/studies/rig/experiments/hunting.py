@@ -12,6 +12,7 @@ from itertools import product
 import numpy as np
 
 from friso.progress import Progress
+from friso.shares import Share
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
@@ -29,7 +30,6 @@ from friso.studies.rig.moves_on_rails import (
 )
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import pace
-from friso.studies.shares import Share
 from friso.virtual_rig.run import Recorded
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8

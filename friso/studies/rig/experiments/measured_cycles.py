@@ -17,6 +17,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.progress import Progress
+from friso.shares import Share, share
 from friso.stage import Stage
 from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.moves_on_rails import (
@@ -33,7 +34,6 @@ from friso.studies.rig.moves_on_rails import (
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, rig_log
-from friso.studies.shares import Share, share
 from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.task import MoveTask
 

@@ -10,10 +10,10 @@ from friso.axis import axis_shown
 from friso.hunting.criteria.peak_count import COUNTED_ABOVE, CRITERION, DISTINCT_CRITERION
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
 from friso.quantities import percent
+from friso.shares import Share
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
 from friso.studies.rig.moves_on_rails import BAND, RailRuns
 from friso.studies.rig.outcome import Outcome
-from friso.studies.shares import Share
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,
