@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting import Case, check
+from friso.hunting.attractors import Attractors
 from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
@@ -24,8 +25,8 @@ class Edge:
 
 @dataclass(frozen=True)
 class Claim:
-    """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named), and
-    displacements [m] that are said to start hunting."""
+    """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named),
+    displacements [m] that are said to start hunting, and what attracts, as it was surveyed (None: it was not)."""
 
     case: str
     stage: Stage
@@ -33,6 +34,7 @@ class Claim:
     sure: bool
     edge: Edge | None
     kicks: tuple[float, ...]
+    surveyed: Attractors | None = None
 
     @property
     def attracted(self) -> bool:
@@ -73,4 +75,4 @@ def _claim(name: str, case: Case) -> Claim:
     edge = Edge(said.margin.factor, sure and said.margin.certain, said.margin.reserve) if said.margin else None
     windows = said.displacement.windows if said.displacement else ()
     kicks = tuple((low * high) ** 0.5 for low, high in windows)
-    return Claim(name, case.stage, case.verdict, sure, edge, kicks)
+    return Claim(name, case.stage, case.verdict, sure, edge, kicks, said.hunting.surveyed)

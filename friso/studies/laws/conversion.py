@@ -106,8 +106,12 @@ def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
         actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
     keys = friction_law(law).keeping(before, elements)
-    made = stage.replace({"friction": _table(stage, law, keys)})
-    return compared(stage, made, before)
+    return compared(stage, with_friction(stage, law, keys), before)
+
+
+def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
+    """The stage with the named law in the place of its own, with such keys [SI]."""
+    return stage.replace({"friction": _table(stage, law, keys)})
 
 
 def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConversion:

@@ -1,0 +1,106 @@
+"""The cycles that friso closes by shooting, followed by SciPy: whether they close, how large they are, how a deviation
+grows; and by brute force at two tolerances."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.laws.by_hand import by_hand
+from benchmarks.truth.claims import Claim
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import Cycles
+
+RTOL, BRUTE = 1e-9, (1e-7, 1e-9)
+"""Tolerance of SciPy, and those of the simulations by brute force."""
+
+AWAY = 1e-4
+"""Share of the distance at which a stage sticks by which a run begins beside its cycle."""
+
+GAP, SIZE, GROWTH = 1e-5, 1e-4, 2e-3
+"""By how much an orbit may fail to close, as a share of its states' magnitudes; amplitudes may differ; and multipliers
+may."""
+
+PERIODS, KEPT = 6, 0.02
+"""Periods for which brute force follows a cycle that attracts, and the share of its amplitude that it keeps to."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A cycle of a claim: amplitude [m], multiplier, the share by which SciPy finds it open, and its amplitude over,
+    friso's; the multiplier that SciPy finds (NaN where a limiter chatters), and by how much the amplitude differs by
+    brute force, as a share."""
+
+    case: str
+    amplitude: float
+    multiplier: float
+    gap: float
+    size: float
+    growth: float
+    brute: float
+
+    @property
+    def wrong(self) -> str:
+        """What refutes the cycle; "" where nothing does."""
+        reasons = []
+        if not self.gap < GAP:
+            reasons.append(f"it does not close, by {self.gap:.2g}")
+        if not self.size < SIZE:
+            reasons.append(f"its amplitude is off by {self.size:.2g}")
+        if np.isfinite(self.growth) and not abs(self.growth - self.multiplier) < GROWTH + 0.01 * abs(self.multiplier):
+            reasons.append(f"a deviation grows by {self.growth:.4g}")
+        if not self.brute < KEPT:
+            reasons.append(f"brute force is off by {self.brute:.2g}")
+        return ", ".join(reasons)
+
+
+@np.errstate(all="ignore")
+def cycles_of(claim: Claim, surveyed: Any) -> Iterator[Shown]:
+    """The cycles of a claim, those that repel too."""
+    families = [family for family in surveyed.families if family.closed[0] and not family.attracting[0]]
+    closed = [m.cycles.take(np.array([m.number])) for m in surveyed.motions if m.cycles is not None]
+    for cycle in (*closed, *families):
+        yield _shown(claim, cycle)
+
+
+def _shown(claim: Claim, cycle: Cycles) -> Shown:
+    ensemble, equations = Ensemble.held(claim.stage.flat(), 1), by_hand(claim.stage.flat())
+    names, time, sign = ensemble.kernel.states, float(cycle.orbits.times[0]), cycle.sign
+    start = equations.state(dict(zip(names, cycle.states[0], strict=True)))
+    end, rates, high, low = equations.run(start, time, RTOL)
+    gap = float(np.max(np.abs(_on_section(end, rates, sign, start) - start) / equations.scales))
+    other_high, other_low = (-low, -high) if sign < 0 else (high, low)
+    size = (max(high, other_high) - min(low, other_low)) / 2 / float(cycle.amplitude[0]) - 1
+    growth = np.nan
+    if not ensemble.chatters:
+        body = 0 if equations.joint == "rigid" else 2
+        direction = equations.state(dict(zip(names, cycle.direction[0], strict=True)))
+        away = AWAY * abs(start[body])
+        ends = [equations.run(start + way * away * direction, time, RTOL)[0] for way in (1, -1)]
+        off = [_on_section(each, rates, sign, start)[body] for each in ends]
+        growth = float(off[0] - off[1]) / (2 * away)
+    return Shown(
+        claim.case, float(cycle.amplitude[0]), float(cycle.multiplier[0]), gap, abs(size), growth,
+        _brute(ensemble, cycle),
+    )  # fmt: skip
+
+
+def _on_section(end: np.ndarray, rates: np.ndarray, sign: float, start: np.ndarray) -> np.ndarray:
+    """Where a run that ended beside the section, on which the integrator's state is that of the start, crosses it; the
+    mirror image of half a period."""
+    return sign * end - sign * rates * (sign * end[5] - start[5]) / (sign * rates[5])
+
+
+def _brute(ensemble: Ensemble, cycle: Cycles) -> float:
+    """By how much the amplitude after some periods differs, at most, at two tolerances; 0 of a cycle that repels."""
+    if not cycle.attracting[0]:
+        return 0.0
+    period, off = float(cycle.period[0]), []
+    for rtol in BRUTE:
+        results = ensemble.run(cycle.states, np.array([PERIODS * period]), rtol, interval=period / 2000)
+        late = results.samples[0][-2001:, ensemble.kernel.position]
+        off.append(abs(float(np.ptp(late)) / 2 / float(cycle.amplitude[0]) - 1))
+    return max(off)

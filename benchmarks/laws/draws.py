@@ -1,0 +1,50 @@
+"""Stages drawn at random under a friction law: those of `benchmarks.truth` with LuGre, their friction replaced."""
+
+from __future__ import annotations
+
+from itertools import count, islice
+from typing import Any
+
+import numpy as np
+
+from benchmarks.truth.draws import Form, draw, forms
+from friso.stage import Stage
+from friso.stage.tables import friction_law
+from friso.studies.laws.conversion import with_friction
+
+JOINTS = (Form("rigid"), Form("free"), Form("locked"))
+"""What is drawn of the structures there."""
+
+ELEMENTS = {"rigid": 4, "free": 2, "locked": 6}
+"""Elements of a law with several: one number a structure, since every number is a kernel to compile."""
+
+
+def numbers(stages: int) -> list[int]:
+    """The numbers of the first stages with LuGre friction, a van Dijk controller and nothing else."""
+    pool = forms()
+    return list(islice((n for n in count() if pool[n % len(pool)] in JOINTS), stages))
+
+
+def under(law: str, seed: int, number: int) -> Stage:
+    """The stage with this number under a law whose shape before sliding is drawn too, not that of LuGre."""
+    stage, rng = draw(seed, number), np.random.default_rng([seed, number, 11])
+    joint = forms()[number % len(forms())].joint
+    measured = friction_law("lugre").shown(stage.flat())
+    keys = friction_law(law).keeping(measured, ELEMENTS[joint])
+    return with_friction(stage, law, keys | _shape(law, keys, rng))
+
+
+def _shape(law: str, keys: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Keys that a law leaves to what happens before sliding, anywhere within their ranges."""
+    if law == "elasto_plastic":
+        most = keys["friction.coulomb"] / keys["friction.bristle_stiffness"]
+        return {"friction.breakaway_deflection": float(rng.uniform(0.05, 0.95)) * most}
+    if law == "rolling":
+        return {"friction.rolling_exponent": float(rng.uniform(1.0, 2.5))}
+    if law == "gms":
+        share = rng.dirichlet(np.full(sum("share" in key for key in keys), 3.0))
+        lag = keys["friction.attraction"] * float(np.exp(rng.uniform(-2.3, 2.3)))
+        return {f"friction.element_share.{n}": float(value) for n, value in enumerate(share, 1)} | {
+            "friction.attraction": lag
+        }
+    return {}
