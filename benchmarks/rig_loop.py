@@ -27,6 +27,7 @@ import numpy as np
 
 from benchmarks.identify import Answer, Count, goals, rows
 from benchmarks.report import Goal, print_goals, print_table
+from friso.equations.rail import friction_factors
 from friso.errors import InputError
 from friso.hunting.check import check
 from friso.identification.method import Identification, identify
@@ -40,7 +41,6 @@ from friso.studies.rig.many_speeds import many_speeds_logs
 from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.sizes import freed, locked, travel
 from friso.studies.rig.slow_sliding import slow_sliding_logs
-from friso.virtual_rig.rail import friction_factors
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from rig_machines import Machine, built, mean_level, sources, through_files

@@ -38,6 +38,17 @@ def _stroke(a: float, ramp: float, t: float) -> tuple[float, float, float]:
     return a * ramp * ramp, 0.0, 0.0
 
 
+def under_conditions(flat: Flat, acceleration: float) -> Flat:
+    """With static and Coulomb friction as the conditions have them (no rail)."""
+    if "conditions.load" not in flat:
+        return flat
+    get = {name.removeprefix("conditions."): value for name, value in flat.items() if name.startswith("conditions.")}
+    load = get["load"] + get["load_per_acceleration"] * abs(acceleration)
+    cold = 1 + (get["cold"] - 1) * exp(-get["running_time"] / get["warm_up_time"])
+    factor = (1 + get["load_share"] * (load - 1)) * cold
+    return {**flat, **{key: factor * flat[key] for key in ("friction.static", "friction.coulomb")}}
+
+
 def stribeck_level(flat: Flat, v: float) -> float:
     ratio = abs(v / flat["friction.stribeck_velocity"]) ** flat["friction.stribeck_exponent"]
     gap = flat["friction.static"] - flat["friction.coulomb"]
@@ -238,12 +249,12 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
         force, rate = control(flat, s, y, v, *reference(flat, t))
         force += flat.get("bias.stage", 0.0)
         rate |= {"position": v}
-        cart_velocity = s.get("cart_velocity", v)
+        cart_velocity, rubbing = s.get("cart_velocity", v), under_conditions(flat, reference(flat, t)[2])
         if flat["friction.model"] in SIDE_BY_SIDE:
-            drag, rates_within = SIDE_BY_SIDE[flat["friction.model"]](flat, cart_velocity, s)
+            drag, rates_within = SIDE_BY_SIDE[flat["friction.model"]](rubbing, cart_velocity, s)
             rate |= rates_within
         else:
-            drag, rate["bristle_deflection"] = friction(flat, cart_velocity, s.get("bristle_deflection", 0.0))
+            drag, rate["bristle_deflection"] = friction(rubbing, cart_velocity, s.get("bristle_deflection", 0.0))
         drag -= flat.get("bias.cart", 0.0)
         if "joint.limiter_stiffness" not in flat:
             rate["velocity"] = (force - drag) / (flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0))

@@ -15,13 +15,13 @@ import numpy as np
 from machines import Machine, drawn
 
 import friso
+from friso.equations.rail import friction_factors
 from friso.identification.kind import Source
 from friso.identification.logs.mapping import Mapping, mapping_text, sidecar
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.sources import LogFile, read_all
 from friso.studies.rig.outcome import RigLog
 from friso.views.rig.log_files import write_csv
-from friso.virtual_rig.rail import friction_factors
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "thesis_drive.toml"
 

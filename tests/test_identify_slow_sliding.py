@@ -11,6 +11,7 @@ from refusals import Refused, Wording
 from rig_machines import EXAMPLE, built
 
 import friso
+from friso.equations.rail import friction_factors
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
@@ -19,7 +20,6 @@ from friso.identification.readings.common import deflections, record
 from friso.studies.rig import many_speeds, slow_sliding
 from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.sizes import locked
-from friso.virtual_rig.rail import friction_factors
 
 DT, SECONDS, FINE = 2e-4, 4.0, 10
 MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0

@@ -170,6 +170,14 @@ def stage(
     return friso.loads("\n".join(f"[{name}]\n{body}\n" for name, body in sections.items() if body))
 
 
+CONDITIONS = {
+    f"conditions.{key}": value
+    for key, value in {
+        **{"load": 1.3, "load_share": 0.8, "load_per_acceleration": "0.01 s^2/m"},
+        **{"cold": 1.6, "running_time": "5 min", "warm_up_time": "20 min"},
+    }.items()
+}
+
 FULL = {"kp": 3000, "ki": 2000, "kd": 60}
 
 VARIANTS: dict[str, Stage] = {
@@ -201,6 +209,7 @@ VARIANTS: dict[str, Stage] = {
         there_and_back(), friction=elasto_plastic(1), joint=free(), controller=gains(**FULL, tau=1e-3)
     ),
     "rigid, rolling": stage(release(), friction=rolling(), controller=van_dijk()),
+    "rigid, conditions": stage(there_and_back(), friction=lugre(2), controller=van_dijk()).replace(CONDITIONS),
     "rigid, GMS": stage(release(), friction=gms(damping=MICRO_DAMPING), controller=van_dijk()),
     "free, parasitic, GMS 1": stage(
         there_and_back(), friction=gms(1), joint=free(), parasitic=PARASITIC, controller=van_dijk()

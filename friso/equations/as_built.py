@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.structure import Structure, structure
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class AsBuilt:
     def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
         """The form of a stage's drive, given as flat keys."""
         samples = round(flat.get("drive.velocity_samples", 1.0))
-        return cls(structure(flat), whole_samples(flat), "drive.current_bandwidth" in flat, samples)
+        return cls(structure(anywhere(flat)), whole_samples(flat), "drive.current_bandwidth" in flat, samples)
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:
@@ -113,10 +114,6 @@ def _varied(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
     if isinstance(there, Switch):
         return Switch(there.name, there.enter, there.leave, kink.at_start, there.entered, there.left)
     return Kink(there.name, there.surface, narrow=there.narrow, starts=kink.at_start)
-
-
-LEVELS = ("static", "coulomb")
-"""Names of the keys of friction that vary along a rail."""
 
 
 def _shaken(part: Any) -> sp.Expr:

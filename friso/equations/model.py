@@ -11,6 +11,7 @@ import sympy as sp
 
 from friso.equations.blocks import Controller, Loop, direction
 from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
+from friso.equations.conditions import under_acceleration
 from friso.equations.continuous import Continuous, continuous_controller
 from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
@@ -127,6 +128,8 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     """
     chain = _bodies(structure)
     friction = friction_law(structure.friction).declare(chain.cart.velocity, structure.friction_variant)
+    if friction and structure.load_follows:
+        friction = friction.with_values(under_acceleration(REFERENCE[2]))
     motor_friction = _motor_friction(structure, chain)
     position, velocity, acceleration = REFERENCE
     reference = position + velocity * TIME + acceleration * TIME**2 / 2

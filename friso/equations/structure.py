@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from friso.equations.conditions import DECISIVE, load_follows
 from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLERS,
@@ -65,7 +66,8 @@ class Structure:
     """The choices that decide which states, terms and kinks there are.
 
     `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is
-    whatever else the friction law's equations depend on (the Stribeck exponent where it is a whole number).
+    whatever else the friction law's equations depend on (the Stribeck exponent where it is a whole number);
+    `load_follows` whether its levels grow with the acceleration of the reference.
     """
 
     masses: tuple[str, ...]
@@ -75,6 +77,7 @@ class Structure:
     friction_variant: Hashable
     controller: ControllerForm | None
     biased: tuple[str, ...] = ()
+    load_follows: bool = False
     transmission: TransmissionForm | None = None
 
     @property
@@ -94,6 +97,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         friction_variant=friction_law(law).variant(flat),
         controller=controller_form(flat) if KIND in flat else None,
         biased=tuple(name for name in ("cart", "stage") if flat.get(f"bias.{name}", 0.0) != 0),
+        load_follows=load_follows(flat),
         transmission=_transmission_form(flat) if MOTOR_MASS in flat else None,
     )
 
@@ -106,7 +110,7 @@ def shared_structure(flat: Mapping[str, Any]) -> Structure:
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
     law, control = friction_law(flat["friction.model"]), controller_of(flat)
-    of_stage = ("joint.stroke", "bias.cart", "bias.stage", BACKLASH)
+    of_stage = ("joint.stroke", "bias.cart", "bias.stage", BACKLASH, *DECISIVE)
     at_motor: tuple[str, ...] = ()
     if f"{MOTOR_FRICTION}.model" in flat:
         names = friction_law(flat[f"{MOTOR_FRICTION}.model"]).decisive

@@ -16,7 +16,7 @@ from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, sine
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
-from friso.stage.transmission import STATE_PREFIX, as_friction, leading_friction
+from friso.stage.transmission import STATE_PREFIX, leading_friction, of_motor
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
@@ -74,7 +74,7 @@ def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
 def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
     """The same as `operating_point` at the motor, which moves with the load and bears no bias."""
     unbiased = replace(members, bias=np.zeros(len(members)))
-    point = operating_point({**flat, "friction.model": "none", **as_friction(flat)}, unbiased)
+    point = operating_point(of_motor(flat), unbiased)
     beyond = "beyond_"
     return {
         f"{beyond}{STATE_PREFIX}{name.removeprefix(beyond)}" if name.startswith(beyond) else f"{STATE_PREFIX}{name}": at

@@ -70,9 +70,9 @@ def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
 
 
 FRISO = {
-    "friso.controllers": "friso.equations.controllers",
-    "friso.friction": "friso.equations.friction",
-    "friso.derivations": "friso.leaf_springs.joint",
+    "friso.controllers": ("friso.equations.controllers",),
+    "friso.friction": ("friso.equations.friction",),
+    "friso.derivations": ("friso.leaf_springs.joint", "friso.equations.conditions"),
 }
 """The modules that register what is friso's own, by group: they stand on floors above, and are imported when a stage
 is first read."""
@@ -80,8 +80,9 @@ is first read."""
 
 def load_own(group: str) -> None:
     """Import friso's own modules of a group."""
-    if group in FRISO and FRISO[group] not in sys.modules:
-        importlib.import_module(FRISO[group])
+    for module in FRISO.get(group, ()):
+        if module not in sys.modules:
+            importlib.import_module(module)
 
 
 @cache

@@ -12,6 +12,7 @@ from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, quoted
+from friso.stage.conditions import Conditions
 from friso.stage.controllers import (
     ANTI_WINDUP,
     CONTROLLER,
@@ -46,7 +47,7 @@ from friso.stage.tables import (
     Parasitic,
     friction_law,
 )
-from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, as_friction, motor_mass
+from friso.stage.transmission import MOTOR_FRICTION, MOTOR_MASS, Encoder, Transmission, motor_mass, of_motor
 
 _FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
 _TRANSMISSION = Table(lambda _: Transmission, '[transmission] inertia = "1.2e-4 kg*m^2", lead = "10 mm" ...')
@@ -59,6 +60,7 @@ _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
 _CONTROLLER = Table(CONTROLLERS.pick, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
 _DRIVE = Table(lambda _: Drive, '[drive] sample_time = "50 us"')
 _RAIL = Table(lambda _: Rail, '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm" ...')
+_CONDITIONS = Table(lambda _: Conditions, "[conditions] load = 1.3, load_share = 0.8")
 _CABLE = Table(lambda _: Cable, '[cable] stiffness = "50 N/m"')
 _FLOOR = Table(lambda _: Floor, '[floor] frequency = ["1 Hz", "100 Hz"] ...')
 _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = "20 s"')
@@ -84,6 +86,7 @@ class Stage(Section):
     controller: Annotated[ControllerSection, _CONTROLLER]
     drive: Annotated[Drive | None, _DRIVE] = None
     rail: Annotated[Rail | None, _RAIL] = None
+    conditions: Annotated[Conditions | None, _CONDITIONS] = None
     cable: Annotated[Cable | None, _CABLE] = None
     floor: Annotated[Floor | None, _FLOOR] = None
     motion: Annotated[Motion, _MOTION]
@@ -346,7 +349,7 @@ def _broken_rules(flat: Mapping[str, Any]) -> Iterator[tuple[Rule, Any]]:
         at_motor = name == MOTOR_FRICTION
         for rule in owner.rules:
             keys = tuple(key.replace("friction.", f"{name}.", 1) for key in rule.keys) if at_motor else rule.keys
-            holds = rule.holds({**flat, **as_friction(flat)} if at_motor else flat)
+            holds = rule.holds(of_motor(flat) if at_motor else flat)
             yield replace(rule, keys=keys), np.logical_not(holds)
         for place, row in _rows(flat, name, owner):
             for rule in (rule.at(place) for rule in row.rules):
@@ -368,6 +371,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "bias": Bias,
         "drive": Drive,
         "rail": Rail,
+        "conditions": Conditions,
         "cable": Cable,
         **({CONTROLLER: controller_of(flat)} if KIND in flat else {}),
         "motion": MOTION.classes[flat["motion.kind"]],

@@ -42,6 +42,8 @@ class FrictionSection(UncertainSection):
     model: Any
     decisive: ClassVar[tuple[str, ...]] = ()
     """The numeric keys on which `variant` depends."""
+    under_conditions: ClassVar[bool] = False
+    """Whether static and Coulomb friction are multiplied by what [conditions] make of them."""
     decided_by: ClassVar[Mapping[str, str]] = {}
     """The experiment that would tell the value of a key that other measurements leave open; under "", the one that
     tells the law from others."""

@@ -10,6 +10,7 @@ from pydantic import model_validator
 
 from friso.errors import StageError
 from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage.conditions import CONDITIONS
 from friso.stage.section import UncertainSection
 
 TRANSMISSION, MOTOR_FRICTION, ENCODER = "transmission", "motor_friction", "encoder"
@@ -74,12 +75,18 @@ def motor_mass(flat: Mapping[str, Any]) -> Any:
 def leading_friction(flat: Mapping[str, Any]) -> Mapping[str, Any]:
     """The keys with the friction at the motor in the place of that of the guide, where it alone is there."""
     alone = flat["friction.model"] == "none" and f"{MOTOR_FRICTION}.model" in flat
-    return {**flat, **as_friction(flat)} if alone else flat
+    return of_motor(flat) if alone else flat
 
 
 def moving_mass(flat: Mapping[str, Any]) -> Any:
     """All that the controller moves [kg], at the load."""
     return sum(flat.get(key, 0.0) for key in ("masses.cart", "masses.stage", MOTOR_MASS))
+
+
+def of_motor(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys with the friction at the motor in the place of that of the guide, whose conditions are not its."""
+    kept = {key: value for key, value in flat.items() if not key.startswith(("friction.", f"{CONDITIONS}."))}
+    return {**kept, "friction.model": "none", **as_friction(flat)}
 
 
 def as_friction(flat: Mapping[str, Any]) -> dict[str, Any]:

@@ -11,7 +11,8 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, options_of, prepare, run_batch
 from friso.engine.kernel import Kernel, empty_results, kernel
-from friso.equations.as_built import COMMANDED, LEVELS, NEUTRAL, READING, AsBuilt, whole_samples
+from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
+from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.stage import Stage
@@ -61,7 +62,7 @@ class Recorded:
 def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The flat keys of a stage with a complete drive: what it does not tell is ideal. `changes` are SI numbers, or
     arrays with one for each run."""
-    flat = stage.flat(changes)
+    flat = anywhere(stage.flat(changes))
     flat.setdefault("drive.sample_time", SAMPLE_TIME)
     flat = {**NEUTRAL, **flat, "drive.integrator_reset": float(flat.get("drive.integrator_reset", False))}
     flat["drive.late"] = flat["drive.delay"] - whole_samples(flat) * flat["drive.sample_time"]

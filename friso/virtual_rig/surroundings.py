@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Tables
+from friso.equations.rail import friction_factors
 from friso.stage.rig import Floor
 from friso.virtual_rig.floor import floor_acceleration
-from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.task import MoveTask
 
 PER_LENGTH, PER_WAVE = 12, 40

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from friso.equations.conditions import friction_level
 from friso.equations.friction.common import Friction, StribeckCurve, viscous_force
-from friso.equations.friction.measured import MeasuredFriction, levels_of
+from friso.equations.friction.measured import MeasuredFriction, levels_under_conditions
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -31,7 +32,7 @@ def bristle_friction(
         + key("friction.bristle_damping") * rate
         + viscous_force(velocity, kinks[0].sign, variant)
     )
-    static = key("friction.static")
+    static = friction_level("static", variant.conditions)
     bristle = State(deflection, rate, "m", static / stiffness, Role.BRISTLE)
     outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
     return Friction(force, static, Component((bristle,), tuple(kinks), outputs), sliding)
@@ -50,7 +51,7 @@ def keeping_bristle(measured: MeasuredFriction, **shape: float) -> dict[str, Any
 def bristles_active(flat: Mapping[str, Any], softer: float = 1.0, power: str = "") -> str:
     """The condition under which damped bristles on a Stribeck curve are passive, where it is not met. Those bent most
     give way `softer` times as fast as LuGre's; `power` writes that in the condition."""
-    levels, damping = levels_of(flat), flat["friction.bristle_damping"]
+    levels, damping = levels_under_conditions(flat), flat["friction.bristle_damping"]
     least = damping * (levels.static / levels.coulomb - 1) * softer
     viscous = levels.viscous * (1 - abs(levels.viscous_asymmetry))  # in the direction in which it damps less
     if viscous >= least:

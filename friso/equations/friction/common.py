@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
+from friso.equations.conditions import LEVELS, friction_level, has_conditions
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
 from friso.stage import FrictionSection, Rule
 
@@ -18,6 +20,13 @@ COULOMB_BELOW_STATIC = Rule(
     lambda flat: flat["friction.coulomb"] <= flat["friction.static"],
     expected="Coulomb friction no larger than static friction",
     example='static = "3 N", coulomb = "1 N"',
+)
+
+STEADY_LOAD = Rule(
+    ("conditions.load_per_acceleration",),
+    lambda flat: flat.get("conditions.load_per_acceleration", 0.0) == 0,
+    expected="a load that does not follow the acceleration: this law slips at limits that would jump with it",
+    example='load_per_acceleration = "0 s^2/m", or model = "lugre"',
 )
 
 
@@ -42,6 +51,16 @@ class Friction:
         sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
     ) -> None:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
+
+    def with_values(self, values: Mapping[Any, Any]) -> Friction:
+        """The law with expressions in the place of others, but for its scales and its steady motion."""
+        part = self.component
+        states = tuple(replace(x, derivative=x.derivative.xreplace(values)) for x in part.states)
+        outputs = {name: replace(x, expression=x.expression.xreplace(values)) for name, x in part.outputs.items()}
+        component = replace(
+            part, states=states, kinks=tuple(k.with_values(values) for k in part.kinks), outputs=outputs
+        )
+        return Friction(self.force.xreplace(values), self.breakaway, component, self.sliding)
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """The law's own states, and the sides of its kinks but the direction, in a steady motion at the velocity.
@@ -106,11 +125,13 @@ DIRECTION = "forward"
 
 class StribeckCurve(NamedTuple):
     """What the equations of a Stribeck curve depend on: the exponent where it is a small whole number (then it is
-    written out as products), else None; and whether friction, and viscous friction, differ between the directions."""
+    written out as products), else None; whether friction, and viscous friction, differ between the directions; and
+    whether there are conditions that multiply the levels."""
 
     exponent: int | None
     asymmetric: bool
     viscous_asymmetric: bool
+    conditions: bool = False
 
 
 class StribeckSection(FrictionSection):
@@ -124,6 +145,7 @@ class StribeckSection(FrictionSection):
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
     asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     viscous_asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
+    under_conditions: ClassVar[bool] = True
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
     words: ClassVar[Mapping[str, str]] = LEVEL_WORDS
     decisive: ClassVar[tuple[str, ...]] = (
@@ -140,6 +162,7 @@ class StribeckSection(FrictionSection):
             int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None,
             flat.get("friction.asymmetry", 0.0) != 0,
             flat.get("friction.viscous_asymmetry", 0.0) != 0,
+            has_conditions(flat),
         )
 
 
@@ -149,15 +172,15 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp
 
     from friso.equations.component import key
 
-    static, coulomb = key("friction.static"), key("friction.coulomb")
+    static, coulomb = (friction_level(name, curve.conditions) for name in LEVELS)
     exponent = curve.exponent
     ratio = velocity / key("friction.stribeck_velocity")
     if exponent is None:
         power = (ratio**2 + TINY) ** (key("friction.stribeck_exponent") / 2)
     else:
         power = ratio**exponent if exponent % 2 == 0 else (sign * ratio) ** exponent
-    level = coulomb + (static - coulomb) * exp(-power)
-    return level * (1 + key("friction.asymmetry") * sign) if curve.asymmetric else level
+    force = coulomb + (static - coulomb) * exp(-power)
+    return force * (1 + key("friction.asymmetry") * sign) if curve.asymmetric else force
 
 
 def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Expr:
@@ -167,8 +190,8 @@ def stribeck_level_from_speed(velocity: sp.Expr, curve: StribeckCurve) -> sp.Exp
     from friso.equations.component import key
 
     speed = sqrt(velocity**2 + TINY)
-    level = stribeck_level(speed, Integer(1), curve._replace(asymmetric=False))
-    return level * (1 + key("friction.asymmetry") * velocity / speed) if curve.asymmetric else level
+    force = stribeck_level(speed, Integer(1), curve._replace(asymmetric=False))
+    return force * (1 + key("friction.asymmetry") * velocity / speed) if curve.asymmetric else force
 
 
 TINY = 1e-60

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
+from friso.equations.conditions import friction_level, has_conditions
 from friso.equations.friction.common import LEVEL_WORDS, Friction, direction
 from friso.equations.friction.measured import Levels, MeasuredFriction, displacements
 from friso.quantities import Quantity, Value, non_negative, positive
@@ -27,14 +28,21 @@ class Dahl(FrictionSection):
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
 
+    under_conditions: ClassVar[bool] = True
+
     @staticmethod
-    def declare(velocity: sp.Symbol, variant: None) -> Friction:
+    def variant(flat: Mapping[str, Any]) -> Any:
+        """Whether there are conditions that multiply the level."""
+        return has_conditions(flat)
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: bool) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import Component, Output, Role, State, key, state
 
         forward = direction(velocity)
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
-        coulomb = key("friction.coulomb")
+        coulomb = friction_level("coulomb", variant)
         rate = velocity - stiffness * forward.sign * velocity / coulomb * deflection
         bristles = State(deflection, rate, "m", coulomb / stiffness, Role.BRISTLE)
         outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
+from friso.equations.conditions import level_under_conditions
 from friso.equations.friction.bristles import bristle_friction, bristles_active, keeping_bristle
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
+    STEADY_LOAD,
     Friction,
     StribeckCurve,
     StribeckSection,
@@ -28,7 +30,7 @@ BREAKAWAY_BELOW_COULOMB = Rule(
     ("friction.breakaway_deflection", "friction.bristle_stiffness", "friction.coulomb"),
     lambda flat: (
         flat["friction.breakaway_deflection"] * flat["friction.bristle_stiffness"]
-        < flat["friction.coulomb"] * (1 - abs(flat.get("friction.asymmetry", 0.0)))
+        < level_under_conditions(flat, "coulomb") * (1 - abs(flat.get("friction.asymmetry", 0.0)))
     ),
     expected="bristles that hold less than Coulomb friction in either direction when they begin to slip",
     example='breakaway_deflection = "7 um" with bristle_stiffness = "1e5 N/m" and coulomb = "1 N"',
@@ -51,7 +53,7 @@ class ElastoPlastic(StribeckSection):
         "": "the drift under a load that oscillates below break-away",
         "friction.breakaway_deflection": "the largest oscillating load under which the stage does not drift",
     }
-    rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC, BREAKAWAY_BELOW_COULOMB)
+    rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC, BREAKAWAY_BELOW_COULOMB, STEADY_LOAD)
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:

@@ -13,8 +13,10 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
+from friso.equations.conditions import friction_level
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
+    STEADY_LOAD,
     TINY,
     Friction,
     StribeckCurve,
@@ -24,7 +26,7 @@ from friso.equations.friction.common import (
     stribeck_level_from_speed,
     viscous_force,
 )
-from friso.equations.friction.measured import MeasuredFriction, displacements, levels_of
+from friso.equations.friction.measured import MeasuredFriction, displacements, levels_of, levels_under_conditions
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage import Rule, Several, Values, element_keys, register_friction
 
@@ -88,6 +90,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
             "shares that add up to 1",
             "element_share = [0.4, 0.6]",
         ),
+        STEADY_LOAD,
     )
 
     @staticmethod
@@ -110,7 +113,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
             stribeck_level(velocity, forward.sign, curve),
             stribeck_level_from_speed(velocity, curve),
         )
-        static, attraction = key("friction.static"), key("friction.attraction")
+        static, attraction = friction_level("static", curve.conditions), key("friction.attraction")
         force = viscous_force(velocity, forward.sign, curve)
         states, switches, outputs, sliding = [], [], {}, {}
         for number in range(1, variant.number + 1):
@@ -172,7 +175,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
     def active(flat: Mapping[str, Any]) -> str:
         """Passive where static and Coulomb friction are the same: else a slip that slows down loads the elements
         without a displacement, and they give that back as they are unloaded."""
-        levels, stiffness, share = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
+        levels, stiffness, share = levels_under_conditions(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         gained = float((share**2 * (levels.static**2 - levels.coulomb**2) / (2 * stiffness)).sum())
         return (
             f"static = coulomb; with more static friction a reversal gives back up to {gained:.3g} J" if gained else ""

@@ -4,10 +4,12 @@ sliding from rest (the virgin curve), and damping at rest. Laws declare theirs, 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
+
+from friso.equations.conditions import LEVELS, level_under_conditions
 
 REACH, POINTS = 60.0, 2000
 """How far the virgin curve goes, in units of the deflection that static friction would cause at the first stiffness;
@@ -64,9 +66,14 @@ def displacements(static: float, stiffness: float) -> np.ndarray:
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
-    """The Stribeck curve of a law that has one."""
+    """The Stribeck curve of a law that has one, as it was measured: without what [conditions] make of it."""
     values = {field.name: flat.get(f"friction.{field.name}", field.default) for field in fields(Levels)}
     return Levels(**{name: float(value) for name, value in values.items()})
+
+
+def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
+    """The same under the conditions of [conditions]."""
+    return replace(levels_of(flat), **{name: float(level_under_conditions(flat, name)) for name in LEVELS})
 
 
 def on_bristles(flat: Mapping[str, Any], force: np.ndarray) -> MeasuredFriction:

@@ -22,7 +22,14 @@ from friso.equations.friction.common import (
     direction,
     stribeck_level,
 )
-from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, levels_of, on_bristles
+from friso.equations.friction.measured import (
+    MeasuredFriction,
+    as_good,
+    best,
+    displacements,
+    levels_under_conditions,
+    on_bristles,
+)
 from friso.quantities import Bound, Number, Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
@@ -80,7 +87,7 @@ class Rolling(StribeckSection):
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
         """Passive where sigma_2 >= sigma_1 ((F_s - F_c)/F_c)^i: z' v >= -v^2 ((F_s - F_c)/F_c)^i; the power rounded."""
-        levels, exponent = levels_of(flat), flat["friction.rolling_exponent"]
+        levels, exponent = levels_under_conditions(flat), flat["friction.rolling_exponent"]
         softer = softening(levels.static / levels.coulomb - 1, exponent)
         return bristles_active(flat, softer, "" if exponent == 1 else f"^{exponent:g}")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 
+from friso.equations.conditions import friction_level
 from friso.equations.friction.common import (
     Friction,
     StribeckCurve,
@@ -44,8 +45,9 @@ class Stribeck(StribeckSection):
         force = level * tanh(velocity / key("friction.regularisation_velocity"))
         even = variant.exponent is None or variant.exponent % 2 == 0
         smooth = even and not variant.asymmetric  # at rest
+        static = friction_level("static", variant.conditions)
         component = Component(kinks=() if smooth else (forward,))
-        return Friction(force + viscous_force(velocity, forward.sign, variant), key("friction.static"), component)
+        return Friction(force + viscous_force(velocity, forward.sign, variant), static, component)
 
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:

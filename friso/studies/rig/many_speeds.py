@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.rail import friction_factors
 from friso.frequency.friction import steady_force
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identification.readings.passes import passes
@@ -21,7 +22,6 @@ from friso.stage import Stage
 from friso.stage.transmission import moving_mass
 from friso.studies.rig.outcome import RigLog, rig_log
 from friso.studies.rig.sizes import interval, longest_travel, pace, quicker, travel
-from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.equations.rail import friction_factors
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.readings.at_bearing import between
 from friso.identification.readings.passes import passes
@@ -19,7 +20,6 @@ from friso.stage.transmission import moving_mass
 from friso.studies.rig.many_speeds import speeds_of
 from friso.studies.rig.outcome import RigLog, rig_log
 from friso.studies.rig.sizes import interval, pace, travel
-from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.run import as_built_keys, run
 from friso.virtual_rig.task import legs
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.equations.rail import friction_factors
 from friso.progress import Progress
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -34,7 +35,6 @@ from friso.studies.rig.moves_on_rails import (
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, rig_log
-from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.task import MoveTask
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)

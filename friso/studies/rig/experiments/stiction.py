@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.rail import friction_factors
 from friso.errors import InputError
 from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import freed, friction, interval, pace, travel
-from friso.virtual_rig.rail import friction_factors
 from friso.virtual_rig.run import Recorded, run
 from friso.virtual_rig.task import legs
 

@@ -1,4 +1,4 @@
-"""The bearing along the rail: by what it multiplies static and Coulomb friction at each place."""
+"""The bearing along its rail: by what it multiplies static and Coulomb friction at each place."""
 
 from __future__ import annotations
 

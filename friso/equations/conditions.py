@@ -1,0 +1,104 @@
+"""The conditions under which a machine runs: what multiplies static and Coulomb friction of its guide, for every law.
+
+Friction grows with the normal force beside a part of its own (seals, preload), and is larger in the cold: Carvalho
+Bittencourt, Gunnarsson 2012, doi:10.1115/1.4006589. A machine that runs gets warm exponentially in time: Simoni,
+Beschi, Legnani, Visioli 2019, doi:10.1017/S0263574717000509. Along a rail it varies as `friso.equations.rail` has it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.stage.conditions import CONDITIONS
+from friso.stage.flexure import register_derivation
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+LEVELS = ("static", "coulomb")
+"""Names of the keys of friction that conditions multiply."""
+
+GROWTH = f"{CONDITIONS}.growth"
+"""By what share the factors grow with the acceleration of the reference [s^2/m]."""
+
+DECISIVE = (f"{CONDITIONS}.load_per_acceleration", f"{CONDITIONS}.load_share")
+"""The numeric keys that decide on whether the load follows the acceleration."""
+
+
+def factor_key(level: str) -> str:
+    """The flat key of the factor of a level."""
+    return f"{CONDITIONS}.{level}_factor"
+
+
+def has_conditions(flat: Mapping[str, Any]) -> bool:
+    """Whether a stage given as flat keys states its conditions."""
+    return factor_key("static") in flat
+
+
+def load_follows(flat: Mapping[str, Any]) -> bool:
+    """Whether the load follows the acceleration of the reference."""
+    return bool(np.any(flat.get(GROWTH, 0.0)))
+
+
+def friction_level(name: str, conditions: bool) -> sp.Expr:
+    """Static or Coulomb friction [N], under `conditions` if there are any, while the reference does not accelerate."""
+    from friso.equations.component import key
+
+    measured = key(f"friction.{name}")
+    return measured * key(factor_key(name)) if conditions else measured
+
+
+def level_under_conditions(flat: Mapping[str, Any], name: str) -> Any:
+    """The same [N] of a stage given as flat keys."""
+    return flat[f"friction.{name}"] * flat.get(factor_key(name), 1.0)
+
+
+def under_acceleration(acceleration: sp.Expr) -> dict[Any, Any]:
+    """The factors while the reference accelerates [m/s^2], for those at constant speed."""
+    from sympy import Abs
+
+    from friso.equations.component import key
+
+    factors = [key(factor_key(name)) for name in LEVELS]
+    return {factor: factor * (1 + key(GROWTH) * Abs(acceleration)) for factor in factors}
+
+
+@register_derivation(CONDITIONS)
+def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Flat keys of the factors that follow from [conditions], numbers or arrays, at its place on the rail. Raises
+    InputError for a correlation length that is no more than a speck of the places' range."""
+    own = {key.removeprefix(f"{CONDITIONS}."): flat[key] for key in flat if key.startswith(f"{CONDITIONS}.")}
+    loaded = 1 - own["load_share"] + own["load_share"] * own["load"]
+    warm = np.exp(-own["running_time"] / own.get("warm_up_time", np.inf))
+    common = loaded * (1 + (own["cold"] - 1) * warm)
+    place = _at_place(flat, own["place"]) if "place" in own and "rail.seed" in flat else np.ones(len(LEVELS))
+    made = {factor_key(name): common * there for name, there in zip(LEVELS, place, strict=True)}
+    made[GROWTH] = own["load_share"] * own["load_per_acceleration"] / loaded
+    return {key: value if np.ndim(value) else float(value) for key, value in made.items()}
+
+
+def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The flat keys for a machine that moves along its rail: the factors are not those of one place."""
+    if not has_conditions(flat):
+        return dict(flat)
+    free = {key: value for key, value in flat.items() if key != f"{CONDITIONS}.place"}
+    return free | factors(free)
+
+
+def _at_place(flat: Mapping[str, Any], place: Any) -> np.ndarray:
+    """Factors of static and Coulomb friction of the rail at places [m], shape (2,) or (2, n)."""
+    from friso.equations.rail import friction_factors
+
+    rail = {key: value for key, value in flat.items() if key.startswith("rail.")}
+    if not any(np.ndim(value) for value in rail.values()):
+        there = friction_factors(rail, np.atleast_1d(place))
+        return there if np.ndim(place) else there[:, 0]
+    columns = np.broadcast_arrays(place, *rail.values())
+    one_by_one = [
+        friction_factors(dict(zip(rail, values, strict=True)), np.array([at]))[:, 0]
+        for at, *values in zip(*columns, strict=True)
+    ]
+    return np.transpose(one_by_one)

@@ -1,0 +1,53 @@
+"""The table [conditions]: under which the machine runs that [friction] was measured of."""
+
+from __future__ import annotations
+
+from typing import Annotated, ClassVar
+
+from friso.quantities import Bound, Number, Quantity, Value, any_sign, non_negative, positive
+from friso.stage.section import Rule, UncertainSection
+from friso.stage.tables import friction_law
+
+CONDITIONS = "conditions"
+
+from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
+
+
+class Conditions(UncertainSection):
+    """Where on its rail, under what load and how warm the guide is: factors on static and Coulomb friction."""
+
+    place: Annotated[Value | None, Quantity("m", any_sign, "120 mm")] = None
+    """On the rail, whose factors there apply ([rail]); a drive as built moves along it instead."""
+    load: Annotated[float, Number(positive, "1.3")] = 1.0
+    """Normal force on the guide over that at which [friction] was measured."""
+    load_per_acceleration: Annotated[Value, Quantity("s^2/m", non_negative, "0.02 s^2/m")] = Value(0, "0 s^2/m")
+    """By how much the load grows with the acceleration of the reference, as from a centre of mass beside the drive."""
+    load_share: Annotated[float, Number(from_0_to_1, "0.8")] = 1.0
+    """Share of the friction that goes with the normal force; the rest is that of seals and preload."""
+    cold: Annotated[float, Number(positive, "1.6")] = 1.0
+    """Friction of the cold machine over that of the warm one, of which [friction] tells."""
+    running_time: Annotated[Value, Quantity("s", non_negative, "5 min")] = Value(0, "0 s")
+    """For how long the machine has run since it was cold; a motion is short beside the warm-up."""
+    warm_up_time: Annotated[Value | None, Quantity("s", positive, "20 min")] = None
+    """Time constant with which it gets warm."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("friction.model",),
+            lambda flat: friction_law(flat["friction.model"]).under_conditions,
+            "a law of the guide whose levels [conditions] multiply",
+            'model = "lugre"',
+        ),
+        Rule(
+            ("conditions.place",),
+            lambda flat: "conditions.place" not in flat or "rail.seed" in flat,
+            "a [rail] on which the place is",
+            '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm"',
+        ),
+        Rule(
+            ("conditions.cold", "conditions.warm_up_time"),
+            lambda flat: (flat.get("conditions.cold", 1.0) == 1) | ("conditions.warm_up_time" in flat),
+            "the time constant of the warm-up of a machine that is colder than [friction] tells",
+            'warm_up_time = "20 min"',
+        ),
+    )

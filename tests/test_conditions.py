@@ -1,0 +1,67 @@
+"""Load, temperature and place on the rail: factors on the levels of friction, the same for every command."""
+
+import numpy as np
+import pytest
+from plain import under_conditions
+from refusals import Refused
+from variants import CONDITIONS, VARIANTS
+
+import friso
+from friso.equations.rail import friction_factors
+from friso.frequency.friction import level
+from friso.stage import Stage
+from friso.virtual_rig.run import as_built_keys
+
+RAIL = {"rail": {"seed": 3, "static_deviation": 0.2, "coulomb_deviation": 0.1, "correlation_length": "5 mm"}}
+PLACE = "conditions.place"
+LEVELS = ("static", "coulomb")
+GMS = VARIANTS["rigid, GMS"].as_written()["friction"]
+
+
+@pytest.fixture(scope="module")
+def warming() -> Stage:
+    """Released, so that its reference does not accelerate."""
+    return VARIANTS["rigid, conditions"].replace({"motion": VARIANTS["rigid"].as_written()["motion"]})
+
+
+def test_a_stage_under_conditions_moves_as_one_with_such_levels(warming: Stage) -> None:
+    by_hand = under_conditions(warming.flat(), 0.0)
+    levels = {f"friction.{name}": f"{by_hand[f'friction.{name}']!r} N" for name in LEVELS}
+    alike = warming.replace({"conditions": None, **levels})
+    ours, theirs = (friso.simulate(stage, rtol=1e-9, sample_time=0.1).position for stage in (warming, alike))
+    assert ours.to_numpy() == pytest.approx(theirs.to_numpy(), abs=1e-9)
+    assert level(warming.flat(), True) == pytest.approx(level(alike.flat(), True), rel=1e-12)
+
+
+def test_the_place_on_the_rail_decides_and_may_be_swept() -> None:
+    stage, places = VARIANTS["rigid"].replace({**RAIL, PLACE: "12 mm"}), np.array([0.012, -0.03])
+    factors = friction_factors(stage.flat(), places)
+    swept = stage.flat({PLACE: places})
+    for name, row in zip(LEVELS, factors, strict=True):
+        assert swept[f"conditions.{name}_factor"] == pytest.approx(row, rel=1e-12)
+        assert stage.flat()[f"conditions.{name}_factor"] == pytest.approx(row[0], rel=1e-12)
+    rails = stage.flat({PLACE: places, "rail.seed": np.array([3.0, 4.0])})["conditions.static_factor"]
+    assert rails[0] == pytest.approx(factors[0, 0], rel=1e-12)
+    assert rails[1] != pytest.approx(factors[0, 1], rel=1e-3)
+
+
+def test_a_drive_as_built_moves_along_the_rail_whatever_the_place() -> None:
+    stage = VARIANTS["rigid"].replace({**RAIL, PLACE: "12 mm", "conditions.load": 2.0})
+    assert [as_built_keys(stage)[f"conditions.{name}_factor"] for name in LEVELS] == [2.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({PLACE: "12 mm"}, PLACE),
+        ({"conditions.cold": 1.5}, "conditions.cold, conditions.warm_up_time"),
+        ({"friction": None, "conditions.load": 2.0}, "friction.model"),
+        (
+            {"friction": VARIANTS["rigid, GMS"].as_written()["friction"], **CONDITIONS},
+            "conditions.load_per_acceleration",
+        ),
+    ],
+)
+def test_conditions_that_cannot_be(changes: dict[str, object], key: str, refused: Refused) -> None:
+    with refused(key):
+        VARIANTS["rigid"].replace(changes)
