@@ -16,6 +16,7 @@ from friso.engine.machine_code import object_code
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
 from friso.equations.as_built import AsBuilt, as_built
+from friso.equations.dragged import Dragged, dragged
 from friso.equations.driven import Driven, driven
 from friso.equations.imposed import Imposed, imposed
 from friso.equations.model import Model, assemble
@@ -56,6 +57,8 @@ def _code(module: ModuleType) -> bytes:
 
 
 def _model(form: Form) -> Model:
+    if isinstance(form, Dragged):
+        return dragged(form)
     if isinstance(form, Imposed):
         return imposed(form)
     if isinstance(form, AsBuilt):

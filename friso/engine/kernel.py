@@ -19,6 +19,7 @@ from friso.engine.kinds import Kind, kind_of
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
 from friso.engine.machine_code import Loops, load
 from friso.equations.as_built import AsBuilt
+from friso.equations.dragged import Dragged
 from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
 from friso.equations.roles import Role, Steady
@@ -194,7 +195,12 @@ class KernelRequest:
         return ", ".join([*words, *([f"along {len(self.along)} keys"] if self.along else [])])
 
 
-_CIRCUMSTANCES = {Imposed: "imposed motion", Driven: "following a log", AsBuilt: "drive as built"}
+_CIRCUMSTANCES = {
+    Imposed: "imposed motion",
+    Dragged: "along a measured motion",
+    Driven: "following a log",
+    AsBuilt: "drive as built",
+}
 """What a form is for that is not a stage by itself, for people."""
 
 

@@ -128,6 +128,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     """
     chain = _bodies(structure)
     friction = friction_law(structure.friction).declare(chain.cart.velocity, structure.friction_variant)
+    unaccelerated = friction
     if friction and structure.load_follows:
         friction = friction.with_values(under_acceleration(REFERENCE[2]))
     motor_friction = _motor_friction(structure, chain)
@@ -169,7 +170,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         rate=rate,
         breakaway=breakaway,
         stiffness=loop_stiffness(structure.controller),
-        steady=_steady(chain, friction, motor_friction),
+        steady=_steady(chain, unaccelerated, motor_friction),
         jumps=resets(kinks),
         held=acting.held if acting else (),
     )

@@ -72,6 +72,16 @@ class FrictionSection(UncertainSection):
         side by side, of a law that has several."""
         return {}
 
+    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {}
+    """Numbers that a fit finds besides steady friction, stiffness and damping before sliding: the least that each may
+    be, one to begin with, the most; all greater than 0."""
+
+    @staticmethod
+    def shaped(measured: Any, shape: Mapping[str, float]) -> dict[str, Any]:
+        """Keys of the law, as flat SI values, with the steady friction, stiffness and damping measured and numbers of
+        its `shape`; a law that declares it can be fitted (`friso.identification.laws`)."""
+        return {}
+
     @staticmethod
     def left_open(measured: Any) -> dict[str, tuple[float, float]]:
         """The keys on which the measurements do not decide, and their ranges."""

@@ -69,6 +69,11 @@ class Dahl(FrictionSection):
             "friction.bristle_stiffness": measured.stiffness,
         }
 
+    @staticmethod
+    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
+        """All that there is."""
+        return Dahl.keeping(measured, 1)
+
 
 NO_SPEED = 1e-3
 """Stribeck velocity [m/s] of a law whose friction does not depend on speed: any will do."""

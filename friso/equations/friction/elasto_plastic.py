@@ -95,6 +95,14 @@ class ElastoPlastic(StribeckSection):
         """Bristles as stiff and damped as measured; the break-away deflection fits the virgin curve best."""
         return keeping_bristle(measured, breakaway_deflection=best(*_tried(measured)))
 
+    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}
+
+    @staticmethod
+    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
+        """Bristles that slip from a share of Coulomb friction on."""
+        begins = shape["elastic_share"] * _most(measured)
+        return keeping_bristle(measured, breakaway_deflection=begins)
+
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Break-away deflections with which the virgin curve is hardly another."""
@@ -106,11 +114,16 @@ class ElastoPlastic(StribeckSection):
         return bristles_active(flat)
 
 
+def _most(measured: MeasuredFriction) -> float:
+    """The break-away deflection [m] at which bristles hold Coulomb friction in the weaker direction."""
+    levels = measured.levels
+    return levels.coulomb * (1 - abs(levels.asymmetry)) / measured.stiffness
+
+
 def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
     """Break-away deflections [m], and how far the virgin curve is off with each."""
     levels, stiffness = measured.levels, measured.stiffness
-    most = levels.coulomb * (1 - abs(levels.asymmetry)) / stiffness
-    tried = np.linspace(0.02, 0.98, 49) * most
+    tried = np.linspace(0.02, 0.98, 49) * _most(measured)
     curves = (virgin(levels.static, stiffness, begins, measured.displacement) for begins in tried)
     return tried, np.array([measured.misfit(curve) for curve in curves])
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from friso.equations.conditions import friction_level
+from friso.equations.friction import rolling
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
     STEADY_LOAD,
@@ -154,15 +155,26 @@ class GeneralisedMaxwellSlip(StribeckSection):
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """The virgin curve as a polygon of its tangents: the first stiffness and break-away are kept exactly. The
         attraction lets friction lag as LuGre's does at the Stribeck velocity, s/C = g/(sigma_0 v_s)."""
-        stiffness, slips = polygon(measured, elements)
-        strength = stiffness * slips
-        damped = {f"{DAMPING}.{n}": measured.damping * k / measured.stiffness for n, k in enumerate(stiffness, 1)}
-        return {
-            **measured.levels.keys,
-            **{f"{STIFFNESS}.{n}": float(k) for n, k in enumerate(stiffness, 1)},
-            **{f"{SHARE}.{n}": float(f) for n, f in enumerate(strength / strength.sum(), 1)},
-            **(damped if measured.damping else {}),
-            "friction.attraction": measured.stiffness * measured.levels.stribeck_velocity,
+        return _elements_with(measured, *polygon(measured, elements)) | {
+            "friction.attraction": measured.stiffness * measured.levels.stribeck_velocity
+        }
+
+    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {
+        "rolling_exponent": (1.0, 1.5, 4.0),
+        "lag": (0.01, 1.0, 100.0),
+    }
+
+    @staticmethod
+    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
+        """`FITTED` elements on the virgin curve of rolling friction, at even slopes; friction that lags so many times
+        as long as LuGre's does at the Stribeck velocity."""
+        levels, stiffness = measured.levels, measured.stiffness
+        way = displacements(levels.static, stiffness)
+        curve = rolling.virgin(levels.static, stiffness, shape["rolling_exponent"], way)
+        whole = MeasuredFriction(levels, stiffness, measured.damping, way, curve)
+        parts = _tangents(whole, (1 - np.arange(FITTED + 1) / FITTED) ** EVEN)
+        return _elements_with(whole, *parts) | {
+            "friction.attraction": stiffness * levels.stribeck_velocity / shape["lag"]
         }
 
     @staticmethod
@@ -182,10 +194,25 @@ class GeneralisedMaxwellSlip(StribeckSection):
         )
 
 
+def _elements_with(measured: MeasuredFriction, stiffness: np.ndarray, slips: np.ndarray) -> dict[str, Any]:
+    """The keys of elements with a stiffness [N/m] and a deflection at which they slip [m], both of shape (elements,)."""
+    strength = stiffness * slips
+    damped = {f"{DAMPING}.{n}": measured.damping * k / measured.stiffness for n, k in enumerate(stiffness, 1)}
+    return {
+        **measured.levels.keys,
+        **{f"{STIFFNESS}.{n}": float(k) for n, k in enumerate(stiffness, 1)},
+        **{f"{SHARE}.{n}": float(f) for n, f in enumerate(strength / strength.sum(), 1)},
+        **(damped if measured.damping else {}),
+    }
+
+
 def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
     """The values of a list, shape (elements,)."""
     return np.array([flat[name] for name in element_keys(flat, key)])
 
+
+FITTED, EVEN = 4, 1.5
+"""Elements that are fitted to a record, and how closely their tangents lie towards the end of the virgin curve."""
 
 POWERS = np.linspace(0.6, 4.0, 69)
 """How closely the tangents may lie towards the end of the virgin curve."""

@@ -57,6 +57,11 @@ class LuGre(StribeckSection):
         return keeping_bristle(measured)
 
     @staticmethod
+    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
+        """All that there is."""
+        return keeping_bristle(measured)
+
+    @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
         """Passive where sigma_2 >= sigma_1 (F_s - F_c)/F_c (Barabanov, Ortega 2000, doi:10.1109/9.839944)."""
         return bristles_active(flat)

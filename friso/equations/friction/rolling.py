@@ -79,6 +79,13 @@ class Rolling(StribeckSection):
         """Bristles as stiff and damped as measured; the exponent fits the virgin curve best."""
         return keeping_bristle(measured, rolling_exponent=best(*_tried(measured)))
 
+    shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"rolling_exponent": (1.0, 1.5, 4.0)}
+
+    @staticmethod
+    def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
+        """Bristles with the exponent."""
+        return keeping_bristle(measured, rolling_exponent=shape["rolling_exponent"])
+
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Exponents with which the virgin curve is hardly another."""

@@ -127,6 +127,11 @@ class BearingRecord:
         """About where the body on the bearing is [m], shape (n,)."""
         return self.position if self.bent is None else self.position - self.bent
 
+    def beginning(self, count: int) -> BearingRecord:
+        """The first so many samples."""
+        bent = None if self.bent is None else self.bent[:count]
+        return BearingRecord(self.time[:count], self.position[:count], bent, self.force[:count])
+
     def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
         """With the motion low-passed at a frequency [Hz], about its start, and every `step`th sample."""
         place = low_pass(self.position, self.interval, cutoff)

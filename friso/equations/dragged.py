@@ -1,0 +1,59 @@
+"""The friction law of a stage on a body that is dragged along a measured motion, sample by sample: nothing acts back.
+
+Beside the law's own states the impulse of the friction force is integrated: its differences are the mean forces from
+sample to sample, whatever the law."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from friso.equations.imposed import Imposed
+from friso.stage.tables import friction_law
+
+if TYPE_CHECKING:
+    from friso.equations.friction.common import Friction
+    from friso.equations.model import Model
+
+IMPULSE = "impulse"
+"""State that grows by the friction force [N s]."""
+
+
+@dataclass(frozen=True)
+class Dragged(Imposed):
+    """Which law, and what else its equations depend on (see `Structure`)."""
+
+
+def dragged(form: Dragged) -> Model:
+    """The equations of the law on a body with the position [m], velocity [m/s] and acceleration [m/s^2] of a
+    reference, as `friso.engine.driven.follow` gives them at every sample."""
+    import sympy as sp
+
+    from friso.equations.component import Output, Role, State, key, state
+    from friso.equations.masses import Body
+    from friso.equations.model import MOTION_SIZE, REFERENCE, Model, resets
+
+    body, rate = Body.named("", sp.oo), 1 / key("motion.duration")
+    friction: Friction = friction_law(form.friction).declare(body.velocity, form.friction_variant)
+    component, size = friction.component, friction.breakaway
+    states = (
+        State(body.position, body.velocity, "m", MOTION_SIZE, Role.POSITION),
+        State(body.velocity, REFERENCE[2], "m/s", MOTION_SIZE * rate, Role.VELOCITY),
+        *component.states,
+        State(state(IMPULSE), friction.force, "N*s", size / rate, Role.SUM),
+    )
+    return Model(
+        states=states,
+        stage=body,
+        cart=body,
+        kinks=component.kinks,
+        outputs={"friction_force": Output(friction.force, "N", "friction force")},
+        deviation=body.position,
+        deviation_rate=body.velocity,
+        length=MOTION_SIZE,
+        rate=rate,
+        breakaway=size,
+        stiffness=sp.S.Zero,
+        jumps=resets(component.kinks),
+        inputs=(*REFERENCE, key("external.force"), key("external.rate")),
+    )

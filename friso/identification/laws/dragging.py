@@ -1,0 +1,89 @@
+"""A log as a body that is dragged along what was measured: the friction force on it, and that of a law."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.engine.driven import Inputs, follow
+from friso.engine.kernel import kernel
+from friso.equations.dragged import Dragged
+from friso.identification.logs.log import Log
+from friso.identification.readings.at_bearing import (
+    Between,
+    LowPass,
+    at_bearing,
+    cutoff_of,
+    record_of,
+    why_unseen,
+)
+from friso.stage.tables import friction_law
+
+FEWEST, MOST = 400, 8000
+"""Samples of a record at least, and at most: what follows is left out."""
+
+MOTION, FINE = 5.0, 20
+"""Band of the motion over that of the force, and samples per period of the latter that are enough."""
+
+RTOL = 1e-5
+"""Relative tolerance of the runs."""
+
+
+@dataclass(frozen=True)
+class DraggedRecord:
+    """A log by its name. Over time [s], shape (n,): the position [m] of the body on the bearing; and low-passed, inside,
+    shape (m,): the force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass."""
+
+    name: str
+    position: np.ndarray
+    low_pass: LowPass
+    force: np.ndarray
+    acceleration: np.ndarray
+
+    @property
+    def interval(self) -> float:
+        """Between samples [s]."""
+        return float(self.low_pass.time[1] - self.low_pass.time[0])
+
+    def friction(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
+        """Friction force [N] of laws of one structure, given as flat keys to numbers or arrays of shape (runs,), along
+        the record, low-passed, shape (runs, m); NaN for runs that failed. The bristles begin unbent."""
+        law = flat["friction.model"]
+        first = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
+        shape = kernel(Dragged(law, friction_law(law).variant(first)))
+        inputs = Inputs(self.position, np.zeros(len(self.position)), self.interval)
+        starts = np.zeros((runs, shape.initial_size))
+        starts[:, shape.position] = self.position[0]
+        forces = np.full((runs, len(self.force)), np.nan)
+        for part in follow(shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, RTOL):
+            impulse = part.states[:, :, -1]
+            mean = np.diff(impulse, axis=1) / self.interval
+            middle = np.pad((mean[:, 1:] + mean[:, :-1]) / 2, ((0, 0), (1, 1)), mode="edge")
+            done = np.isfinite(middle).all(axis=1)
+            forces[part.numbers[done]] = [self.low_pass(row) for row in middle[done]]
+        return forces
+
+
+def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
+    """The longest stretch of a log; or why nothing can be read from it. Raises InputError for missing channels."""
+    whole = record_of(log, log.longest, between)
+    if why := why_unseen(whole, FEWEST):
+        return why
+    cutoff = cutoff_of(whole)
+    record = whole.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * whole.interval)), 1)).beginning(MOST)
+    low_pass = LowPass(record.time, cutoff)
+    body, force, acceleration = at_bearing(record, between, between.mass)
+    return DraggedRecord(log.name, body, low_pass, low_pass(force), low_pass(acceleration))
+
+
+def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
+    """What is left out by turns, by record, as masks of shape (m,): of several records each as a whole; of one, each of
+    its pieces in time."""
+    if len(records) > 1:
+        return [[np.full(len(r.force), r is out) for r in records] for out in records]
+    (record,) = records
+    piece = np.arange(len(record.force)) * pieces // len(record.force)
+    return [[piece == number] for number in range(pieces)]

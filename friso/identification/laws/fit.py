@@ -1,0 +1,152 @@
+"""One friction law fitted to records: mass, steady friction, bristles and whatever shape the law has before sliding."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from friso.equations.friction.measured import Levels, MeasuredFriction
+from friso.identification.laws.dragging import DraggedRecord
+from friso.stage.tables import friction_law
+
+STEP = 1e-4
+"""Change of a logarithm for derivatives."""
+
+FAR = {"mass": 3.0, "coulomb": 30.0, "gap": 100.0, "stribeck_velocity": 100.0, "viscous": 100.0, "stiffness": 30.0,
+       "damping": 100.0}  # fmt: skip
+"""Numbers that are fitted to every law, and the factor by which they may differ from what was known beforehand."""
+
+LEAST = 1e-3
+"""Share of what a number is measured by (friction, or damping of the bristles) that one begins at which was 0."""
+
+STIFFER = (0.2, 1.0, 5.0)
+"""Factors of the stiffness from which is begun."""
+
+EVALUATIONS = 40
+"""At most, of a fit from one start."""
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """A law fitted to records: the mass [kg], the keys of the law [SI], and the numbers behind them."""
+
+    law: str
+    mass: float
+    keys: Mapping[str, float]
+    numbers: np.ndarray
+
+
+@dataclass(frozen=True)
+class LawProblem:
+    """A law, what is known beforehand (mass [kg] and friction), and the Stribeck exponent, which is not fitted."""
+
+    law: str
+    mass: float
+    before: MeasuredFriction
+    records: Sequence[DraggedRecord]
+
+    @property
+    def names(self) -> list[str]:
+        """Of the numbers that are fitted; each as a logarithm."""
+        return [*FAR, *friction_law(self.law).shape]
+
+    @property
+    def start(self) -> np.ndarray:
+        """The numbers as known beforehand, shape (parameters,)."""
+        levels, before = self.before.levels, self.before
+        speed = levels.static / levels.stribeck_velocity
+        known = {
+            "mass": self.mass,
+            "coulomb": levels.coulomb,
+            "gap": max(levels.static - levels.coulomb, LEAST * levels.static),
+            "stribeck_velocity": levels.stribeck_velocity,
+            "viscous": max(levels.viscous, LEAST * speed),
+            "stiffness": before.stiffness,
+            "damping": max(before.damping, LEAST * np.sqrt(before.stiffness * self.mass)),
+        }
+        shape = [start for _, start, _ in friction_law(self.law).shape.values()]
+        return np.log([*(known[name] for name in FAR), *shape])
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the numbers, shape (parameters,) each."""
+        far, shape = np.log(list(FAR.values())), friction_law(self.law).shape.values()
+        known = self.start[: len(far)]
+        low, high = ([np.log(limits[end]) for limits in shape] for end in (0, 2))
+        return np.concatenate([known - far, low]), np.concatenate([known + far, high])
+
+    def keys(self, numbers: np.ndarray) -> dict[str, float]:
+        """The keys of the law [SI] for some numbers, shape (parameters,)."""
+        value = dict(zip(self.names, np.exp(numbers), strict=True))
+        static = value["coulomb"] + value["gap"]
+        exponent = self.before.levels.stribeck_exponent
+        levels = Levels(static, value["coulomb"], value["stribeck_velocity"], exponent, value["viscous"])
+        measured = MeasuredFriction(levels, value["stiffness"], value["damping"], np.zeros(1), np.zeros(1))
+        law = friction_law(self.law)
+        return law.shaped(measured, {name: value[name] for name in law.shape})
+
+    def errors(self, rows: np.ndarray) -> list[np.ndarray]:
+        """What is left of the force [N] in each record, about its mean, shape (rows, m), for numbers of shape (rows,
+        parameters); infinite where a run failed."""
+        columns = [self.keys(row) for row in rows]
+        flat = {key: np.array([keys[key] for keys in columns]) for key in columns[0]}
+        # numbers that decide on the equations are the same in all rows
+        flat |= {key: value[0] for key, value in flat.items() if key in friction_law(self.law).decisive}
+        left = []
+        for record in self.records:
+            friction = record.friction({**flat, "friction.model": self.law}, len(rows))
+            rest = record.force - np.exp(rows[:, :1]) * record.acceleration - friction
+            rest -= rest.mean(axis=1, keepdims=True)
+            left.append(np.where(np.isfinite(rest), rest, np.inf))
+        return left
+
+    def fitted(self, used: Sequence[np.ndarray], starts: np.ndarray) -> LawFit:
+        """The best fit from some starts, shape (starts, parameters), to the samples that are `used` of each record,
+        masks of shape (m,)."""
+        weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
+
+        def residual(numbers: np.ndarray) -> np.ndarray:
+            return self._weighed(numbers[None], weights)[0]
+
+        def jacobian(numbers: np.ndarray) -> np.ndarray:
+            rows = self._weighed(np.vstack([numbers, numbers + STEP * np.eye(len(numbers))]), weights)
+            return (rows[1:] - rows[0]).T / STEP
+
+        low, high = self.bounds
+        inside = partial(np.clip, a_min=low + 2 * STEP, a_max=high - 2 * STEP)
+        results = [
+            least_squares(
+                residual, inside(start), jacobian, (low, high), max_nfev=EVALUATIONS, xtol=1e-5, ftol=1e-5, x_scale=1.0
+            )
+            for start in starts
+        ]
+        best = min(results, key=lambda result: float(result.cost)).x
+        return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
+
+    def everywhere(self) -> np.ndarray:
+        """Starts, shape (starts, parameters): bristles softer and stiffer than known beforehand."""
+        starts = np.tile(self.start, (len(STIFFER), 1))
+        starts[:, self.names.index("stiffness")] += np.log(STIFFER)
+        return starts
+
+    def _pairs(self, used: Sequence[np.ndarray]) -> list[tuple[np.ndarray, DraggedRecord]]:
+        return list(zip(used, self.records, strict=True))
+
+    def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
+        """Residuals of all records, shape (rows, samples); a large number where a run failed."""
+        parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
+        return np.nan_to_num(np.hstack(parts), nan=FAILED, posinf=FAILED, neginf=-FAILED)
+
+
+FAILED = 1.0
+"""Weighed residual of a run that failed: much worse than no model at all."""
+
+
+def friction_of(flat: Mapping[str, Any]) -> MeasuredFriction:
+    """What is known beforehand of the friction of a stage given as flat keys."""
+    return friction_law(flat["friction.model"]).shown(flat)
