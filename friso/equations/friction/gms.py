@@ -195,7 +195,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
 
 def _elements_with(measured: MeasuredFriction, stiffness: np.ndarray, slips: np.ndarray) -> dict[str, Any]:
-    """The keys of elements with a stiffness [N/m] and a deflection at which they slip [m], both of shape (elements,)."""
+    """The keys of elements by stiffness [N/m] and the deflection at which they slip [m], of shape (elements,)."""
     strength = stiffness * slips
     damped = {f"{DAMPING}.{n}": measured.damping * k / measured.stiffness for n, k in enumerate(stiffness, 1)}
     return {

@@ -34,8 +34,8 @@ RTOL = 1e-5
 
 @dataclass(frozen=True)
 class DraggedRecord:
-    """A log by its name. Over time [s], shape (n,): the position [m] of the body on the bearing; and low-passed, inside,
-    shape (m,): the force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass."""
+    """A log by its name. Over time [s], shape (n,): the position [m] of the body on the bearing; and low-passed,
+    inside, shape (m,): the force [N] that has arrived and the acceleration [m/s^2] of the whole moving mass."""
 
     name: str
     position: np.ndarray
