@@ -112,6 +112,7 @@ def identify(
     bandwidth: str | float | None = None,
     band: str | None = None,
     period: str | float | None = None,
+    laws: bool = False,
     folder: Path = Path(),
     keep: Keeper = lambda _: None,
     progress: Progress = silent,
@@ -142,6 +143,8 @@ def identify(
         Band of the response: "3 Hz .. 20 Hz".
     period : str or float, optional
         Period of a periodic excitation, "5 s" or a number [s].
+    laws : bool
+        Whether to fit every friction law to the logs and to say which of them the record supports; needs a stage.
     folder : Path
         Where what was said of channels is looked for, if not beside the logs.
     keep : callable, optional
@@ -181,8 +184,11 @@ def identify(
     check_predictions(sources, others, assumed)
     from friso.identification.method import identify as identification
     from friso.identification.method import predict as predicted
+    from friso.identification.method import with_laws
 
     result = identification(sources, assumed, settings, progress)
+    if laws:
+        result = with_laws(result, [source for source, _ in sources], assumed, progress)
     predictions = [predicted(result, log, settings, assumed) for log in others]
     return IdentifyAnswer(result, inputs, predictions, axis_kind)
 

@@ -14,6 +14,7 @@ from friso.identification.combine import combined, correlations
 from friso.identification.estimate import Estimate
 from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identification.kinds import KINDS, in_order
+from friso.identification.laws.comparison import LawComparison, compare_laws
 from friso.identification.logs.log import Log
 from friso.identification.stage_file import identified, origins
 from friso.identification.stage_keys import Fitting, fitting
@@ -39,7 +40,7 @@ class Identification:
     (one per key), and what the engineer should know (`warnings`).
 
     `doubts` are sentences that speak against believing it, and `failed` is whether an analysis failed, whatever of it
-    still holds. `origins` says of each key of the stage where it comes from."""
+    still holds. `origins` says of each key of the stage where it comes from; `laws` compares friction laws where asked."""
 
     stage: Stage | None
     correlations: Correlations
@@ -49,6 +50,7 @@ class Identification:
     doubts: tuple[str, ...] = ()
     failed: bool = False
     origins: Mapping[str, str] = field(default_factory=dict)
+    laws: LawComparison | None = None
 
 
 @dataclass(frozen=True)
@@ -71,6 +73,9 @@ def identify(
     With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
     InputError for logs that cannot be used.
     """
+    if base is not None and base.conditions is not None:
+        expected = "none: what a log shows of friction holds under the conditions of that day"
+        raise InputError("conditions", "a stage with [conditions]", expected, "the stage file without [conditions]")
     groups = _groups(logs)
     stage = base or _around(logs)
     experiments: list[Experiment] = []
@@ -102,6 +107,21 @@ def identify(
         failed,
         origins(fitted, fits.estimates, fits.follows, base is not None),
     )
+
+
+def with_laws(
+    identification: Identification, logs: Sequence[Source], base: Stage | None, progress: Progress = silent
+) -> Identification:
+    """The same with the friction laws that its logs support, begun from the estimates and from `base`. Raises
+    InputError without a base, and as `compare_laws`."""
+    if base is None:
+        raise InputError(
+            "--laws", "no stage", "the stage, for its masses and what lies before its guide", "--stage stage.toml"
+        )
+    known = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
+    times = [log for log in logs if isinstance(log, Log)]
+    laws = compare_laws(times, identification.stage or base, Prior(base, True, known), progress)
+    return replace(identification, laws=laws)
 
 
 def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:

@@ -61,6 +61,9 @@ def identify(
     period: Annotated[
         str | None, typer.Option("--period", metavar="TIME", help="Period of a periodic excitation.")
     ] = None,
+    laws: Annotated[
+        bool, typer.Option("--laws", help="Fit every friction law too, and say which of them the record supports.")
+    ] = False,
     out: DefaultFolder = Path("identified"),
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -81,6 +84,7 @@ def identify(
     target.check([STAGE])
     options = {"stage": stage, "set": overrides, "as_": kind, "map": maps, "unit": units, "scale": scales, "dt": dt}
     options |= {"axis": axis, "predict": predict or [], "bandwidth": bandwidth, "band": band, "period": period}
+    options |= {"laws": laws}
     with ProgressBar(lines=PIPED) as progress, named_as_options(options):
         try:
             answer = question(

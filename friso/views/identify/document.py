@@ -13,6 +13,7 @@ from friso.identification.sources import LogFile
 from friso.views.documents import plain_json
 from friso.views.identify.estimates import key_document
 from friso.views.identify.kind_view import view_of
+from friso.views.identify.laws import laws_document
 from friso.views.identify.words import headline, prediction_view
 
 
@@ -30,6 +31,7 @@ def identify_document(
             {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
             for prediction in predictions
         ],
+        **({} if identification.laws is None else {"friction_laws": laws_document(identification.laws)}),
         "failed": identification.failed,
         "doubts": [axis_shown().text(doubt) for doubt in identification.doubts],
         "warnings": [axis_shown().text(warning) for warning in identification.warnings],

@@ -11,6 +11,7 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.identify.kind_view import Facts, PredictionView, view_of
+from friso.views.identify.laws import TITLE, how, law_facts, law_sentence
 from friso.views.identify.numbers import interval_text, name_of, value_text, with_interval, within
 
 if TYPE_CHECKING:
@@ -176,7 +177,13 @@ def _row(estimate: Estimate) -> EstimateRow:
 def summaries(identification: Identification) -> list[ExperimentSummary]:
     """The experiments, in words."""
     several = zip(identification.experiments, labels(identification), strict=True)
-    return [_summary(experiment, label) for experiment, label in several]
+    experiments = [_summary(experiment, label) for experiment, label in several]
+    laws = identification.laws
+    return (
+        experiments
+        if laws is None
+        else [*experiments, ExperimentSummary("laws", TITLE, (how(laws),), law_facts(laws), ())]
+    )
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
@@ -231,6 +238,7 @@ def answer(identification: Identification, files: Sequence[LogFile], predictions
 def sentences(identification: Identification, predictions: Sequence[Prediction]) -> list[str]:
     """The answer, how well other logs are predicted, and notes."""
     lines = [sentence for _, sentence in headline(identification)]
+    lines += [] if identification.laws is None else [law_sentence(identification.laws)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
     return lines + [f"note: {axis_shown().text(warning)}" for warning in identification.warnings]
 

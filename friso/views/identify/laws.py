@@ -1,0 +1,85 @@
+"""What a comparison of friction laws says: which of them the record supports."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from friso.identification.laws.comparison import LawComparison, LawPrediction
+
+TITLE = "Friction laws, fitted to the same logs"
+
+
+def law_sentence(comparison: LawComparison) -> str:
+    """The answer, in a sentence."""
+    best, supported = comparison.predictions[0], comparison.supported
+    if not supported:
+        return (
+            f"None of the laws predicts the record: {best.law}, the best, is off by {_share(best)} of the friction "
+            "where it was not fitted."
+        )
+    names = _listed(supported)
+    if len(supported) == len(comparison.predictions):
+        return (
+            f"The record does not tell the laws apart: {names} predict what they were not fitted to. Loops of force "
+            "over displacement before sliding, of several amplitudes, would."
+        )
+    others = [law for law in comparison.predictions if law not in supported]
+    verb = "predicts" if len(supported) == 1 else "predict"
+    return (
+        f"The record supports {names}, which {verb} best what was left out of the fit; {_listed(others)} predict worse."
+    )
+
+
+def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
+    """Each law by name: by how much it is off, and what was fitted; and the logs left out, with the reason."""
+    laws = tuple((prediction.law, _fact(prediction)) for prediction in comparison.predictions)
+    return laws + tuple((f"{name}, left out", why) for name, why in comparison.left_out.items())
+
+
+def how(comparison: LawComparison) -> str:
+    """How they were compared, in a sentence."""
+    parts = "each of the logs" if len(comparison.logs) > 1 else f"each of {comparison.parts} pieces of the log"
+    return (
+        f"Left out by turns: {parts}. Errors are RMS, as shares of the standard deviation of the friction; laws within "
+        "a standard error of the best are supported."
+    )
+
+
+def laws_document(comparison: LawComparison) -> dict[str, Any]:
+    """For the JSON document."""
+    supported = [law.law for law in comparison.supported]
+    return {
+        "supported": supported,
+        "logs": list(comparison.logs),
+        "left_out": dict(comparison.left_out),
+        "laws": [
+            {
+                "law": prediction.law,
+                "supported": prediction.law in supported,
+                "error": prediction.error,
+                "errors": prediction.errors.tolist(),
+                "mass_kg": prediction.fit.mass,
+                "keys": dict(prediction.fit.keys),
+            }
+            for prediction in comparison.predictions
+        ],
+    }
+
+
+def _share(prediction: LawPrediction) -> str:
+    return f"{100 * prediction.error:.2g} %"
+
+
+def _listed(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
+    return ", ".join(f"{law.law} (off by {_share(law)})" for law in laws)
+
+
+def _fact(prediction: LawPrediction) -> str:
+    low, high = 100 * prediction.errors.min(), 100 * prediction.errors.max()
+    return f"off by {_share(prediction)} ({low:.2g} to {high:.2g} %); {_keys(prediction.fit.keys)}"
+
+
+def _keys(keys: Mapping[str, float]) -> str:
+    return ", ".join(f"{key.removeprefix('friction.')} {value:.4g}" for key, value in keys.items())
