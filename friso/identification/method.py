@@ -40,7 +40,7 @@ class Identification:
     (one per key), and what the engineer should know (`warnings`).
 
     `doubts` are sentences that speak against believing it, and `failed` is whether an analysis failed, whatever of it
-    still holds. `origins` says of each key of the stage where it comes from; `laws` compares friction laws where asked."""
+    still holds. `origins` says of each key of the stage where it comes from; `laws`, if asked, which laws fit."""
 
     stage: Stage | None
     correlations: Correlations
