@@ -105,8 +105,8 @@ class LawProblem:
         return left
 
     def fitted(self, used: Sequence[np.ndarray], starts: np.ndarray) -> LawFit:
-        """The fit from the best of some starts, shape (starts, parameters), to the samples that are `used` of each record,
-        masks of shape (m,)."""
+        """The fit from the best of some starts, shape (starts, parameters), to the samples that are `used` of each
+        record, masks of shape (m,)."""
         weights = [mask / np.sqrt(max(int(mask.sum()), 1)) / record.force.std() for mask, record in self._pairs(used)]
 
         rows: dict[bytes, np.ndarray] = {}  # the residual with its derivatives: as many runs side by side cost one
