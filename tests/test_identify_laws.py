@@ -26,33 +26,33 @@ def rig() -> Stage:
 
 
 @pytest.fixture(scope="module")
-def known(rig: Stage) -> MeasuredFriction:
+def lugre(rig: Stage) -> MeasuredFriction:
     return friction_law("lugre").shown(rig.flat())
 
 
 @pytest.mark.parametrize("law", comparable())
 def test_a_law_that_is_fitted_shows_the_friction_and_the_stiffness_it_is_made_with(
-    law: str, rig: Stage, known: MeasuredFriction
+    law: str, rig: Stage, lugre: MeasuredFriction
 ) -> None:
     shape = {name: start for name, (_, start, _) in friction_law(law).shape.items()}
-    shown = friction_law(law).shown(with_friction(rig, law, friction_law(law).shaped(known, shape)).flat())
-    assert shown.stiffness == pytest.approx(known.stiffness, rel=1e-9)
+    shown = friction_law(law).shown(with_friction(rig, law, friction_law(law).shaped(lugre, shape)).flat())
+    assert shown.stiffness == pytest.approx(lugre.stiffness, rel=1e-9)
     assert (shown.levels.coulomb, shown.levels.viscous) == pytest.approx((2.0, 0.5), rel=1e-9)
-    assert shown.force[-1] == pytest.approx(shown.levels.static, rel=1e-3)
+    assert shown.force[-1] == pytest.approx(shown.levels.static, rel=2e-3)  # a power law gets there slowly
 
 
-def test_a_law_finds_its_own_numbers_in_a_record(known: MeasuredFriction) -> None:
+def test_a_law_finds_its_own_numbers_in_a_record(lugre: MeasuredFriction) -> None:
     """Elasto-plastic friction under loops of several amplitudes and a slow stroke, from other numbers."""
     law, time = "elasto_plastic", np.arange(3000) * STEP
     place = np.interp(time, [0, 1, 2, 3], [4e-6, 1e-5, 3e-5, 3e-4]) * np.sin(2 * np.pi * 1.5 * time)
-    true = friction_law(law).shaped(known, {"elastic_share": 0.6})
+    true = friction_law(law).shaped(lugre, {"elastic_share": 0.6})
     drag = DraggedRecord("made", place, LowPass(time, 1 / STEP), np.zeros(len(time) - 4), np.zeros(0))
     friction = np.pad(drag.friction({**true, "friction.model": law}, 1)[0], 2, mode="edge")
     force = friction + MASS * np.gradient(np.gradient(place, STEP), STEP)
     force += NOISE * np.random.default_rng(1).standard_normal(len(time))
     read = dragged_record(record("made.csv", STEP, position=place, force=force), Between(delay=0.0, mass=MASS))
     assert isinstance(read, DraggedRecord)
-    off = replace(known, stiffness=1.6e5, damping=60.0, levels=replace(known.levels, static=2.4, coulomb=1.7))
+    off = replace(lugre, stiffness=1.6e5, damping=60.0, levels=replace(lugre.levels, static=2.4, coulomb=1.7))
     problem = LawProblem(law, 1.3 * MASS, off, [read])
     fit = problem.fitted([np.ones(len(read.force), bool)], problem.start[None])
     assert fit.mass == pytest.approx(MASS, rel=0.3)

@@ -58,9 +58,9 @@ def _record(law: str, seed: int, number: int) -> dict[str, Any]:
                 cycles.append([claim.case, cycle.amplitude, cycle.multiplier, cycle.gap, cycle.size, cycle.growth])
                 if cycle.wrong:
                     wrong.append(f"WRONG: {claim.case}, cycle of {cycle.amplitude:.4g} m: {cycle.wrong}")
-        for each in refutations(claim, number):
-            word = "WRONG" if each.sure else "wrong, but not sure"
-            wrong.append(f"{word}: {claim.case}, {each.of}: {each.why}")
+        for refutation in refutations(claim, number):
+            word = "WRONG" if refutation.sure else "wrong, but not sure"
+            wrong.append(f"{word}: {claim.case}, {refutation.of}: {refutation.why}")
     return {
         "law": law, "number": number, "cpu": said.cpu, "attack_cpu": time.process_time() - start,
         "says": [str(claim) for claim in said.claims], "sure": [claim.sure for claim in said.claims],

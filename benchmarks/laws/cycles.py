@@ -80,7 +80,7 @@ def _shown(claim: Claim, cycle: Cycles) -> Shown:
         direction = equations.state(dict(zip(names, cycle.direction[0], strict=True)))
         away = AWAY * abs(start[body])
         ends = [equations.run(start + way * away * direction, time, RTOL)[0] for way in (1, -1)]
-        off = [_on_section(each, rates, sign, start)[body] for each in ends]
+        off = [_on_section(other, rates, sign, start)[body] for other in ends]
         growth = float(off[0] - off[1]) / (2 * away)
     return Shown(
         claim.case, float(cycle.amplitude[0]), float(cycle.multiplier[0]), gap, abs(size), growth,

@@ -6,33 +6,43 @@ from collections.abc import Iterable, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from friso.answers.answer import Answer, question
+from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import tolerance_of
 from friso.progress import Progress, silent
 from friso.studies.thesis.reproduce import POINTS, Reproduction
 
 if TYPE_CHECKING:
+    from friso.studies.thesis.laws import ConclusionsByLaw
     from friso.views.drawing.figure import Figure
     from friso.views.files import Files
 
 
 class ReproduceAnswer(Answer):
-    """The thesis recomputed: `result` is a `Reproduction` with maps, responses and a verdict per claim."""
+    """The thesis recomputed: `result` is a `Reproduction` with maps, responses and a verdict per claim; `laws`, where
+    asked, how its conclusions are judged under each friction law."""
 
     command = "reproduce"
 
-    def __init__(self, result: Reproduction) -> None:
-        self.result = result
+    def __init__(self, result: Reproduction, laws: ConclusionsByLaw | None = None) -> None:
+        self.result, self.laws = result, laws
 
     @cached_property
     def _document(self) -> dict[str, Any]:
         from friso.views.reproduce.document import reproduce_document
 
-        return reproduce_document(self.result)
+        return reproduce_document(self.result, self.laws)
 
     def sentences(self) -> Sequence[str]:
-        """How many of the claims hold."""
-        return [self._document["conclusion"]]
+        """How many of the claims hold, and how many survive other friction laws."""
+        from friso.views.reproduce.laws import laws_sentences
+
+        return [self._document["conclusion"], *(laws_sentences(self.laws) if self.laws else [])]
+
+    def tables(self) -> Sequence[AnswerTable]:
+        """The conclusions under each law."""
+        from friso.views.reproduce.laws import TITLE, laws_rows
+
+        return [AnswerTable(TITLE, self.laws.laws, laws_rows(self.laws))] if self.laws else []
 
     def details(self) -> Sequence[str]:
         """Every claim with its judgement, and the cycles behind the maps."""
@@ -62,7 +72,7 @@ class ReproduceAnswer(Answer):
         """The page, the claims, the figures."""
         from friso.views.reproduce.page import reproduce_files
 
-        return reproduce_files(self.result)
+        return reproduce_files(self.result, self.laws)
 
 
 @question
@@ -71,6 +81,7 @@ def reproduce(
     points: int = POINTS,
     rtol: float | str = 1e-6,
     *,
+    laws: bool = False,
     progress: Progress = silent,
 ) -> ReproduceAnswer:
     """Every figure and claim of the thesis that computation decides, judged.
@@ -83,6 +94,8 @@ def reproduce(
         Values per axis of every map.
     rtol : float
         Relative tolerance of the solver.
+    laws : bool
+        Whether to judge the conclusions of the thesis under every friction law too.
     progress : Progress
         Called as studies are done.
 
@@ -101,6 +114,8 @@ def reproduce(
     >>> import friso
     >>> friso.reproduce(["isolator-crossover"], points=21)  # doctest: +SKIP
     """
+    from friso.studies.thesis.laws import conclusions_by_law
     from friso.studies.thesis.reproduce import reproduce as reproduced
 
-    return ReproduceAnswer(reproduced(names, points, tolerance_of(rtol), progress))
+    result = reproduced(names, points, tolerance_of(rtol), progress)
+    return ReproduceAnswer(result, conclusions_by_law(result, progress) if laws else None)

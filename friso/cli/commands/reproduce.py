@@ -19,6 +19,7 @@ def reproduce(
     ] = None,
     points: Annotated[int, typer.Option(metavar="NUMBER", help="Values per axis of every map.")] = 41,
     rtol: Tolerance = "1e-6",
+    laws: Annotated[bool, typer.Option("--laws", help="Judge the conclusions under every friction law too.")] = False,
     out: DefaultFolder = Path("reproduction"),
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -32,7 +33,7 @@ def reproduce(
     from friso.answers.reproduce import reproduce as question
 
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
-    ask("reproduce", question, names, points=points, rtol=rtol, **shown)
+    ask("reproduce", question, names, points=points, rtol=rtol, laws=laws, **shown)
 
 
 COMMAND = Command(reproduce, 130, WHY)

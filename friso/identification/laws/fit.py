@@ -59,7 +59,7 @@ class LawProblem:
         """The numbers as known beforehand, shape (parameters,)."""
         levels, before = self.before.levels, self.before
         speed = levels.static / levels.stribeck_velocity
-        known = {
+        beforehand = {
             "mass": self.mass,
             "coulomb": levels.coulomb,
             "gap": max(levels.static - levels.coulomb, LEAST * levels.static),
@@ -69,15 +69,15 @@ class LawProblem:
             "damping": max(before.damping, LEAST * np.sqrt(before.stiffness * self.mass)),
         }
         shape = [start for _, start, _ in friction_law(self.law).shape.values()]
-        return np.log([*(known[name] for name in FAR), *shape])
+        return np.log([*(beforehand[name] for name in FAR), *shape])
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Of the numbers, shape (parameters,) each."""
         far, shape = np.log(list(FAR.values())), friction_law(self.law).shape.values()
-        known = self.start[: len(far)]
+        centre = self.start[: len(far)]
         low, high = ([np.log(limits[end]) for limits in shape] for end in (0, 2))
-        return np.concatenate([known - far, low]), np.concatenate([known + far, high])
+        return np.concatenate([centre - far, low]), np.concatenate([centre + far, high])
 
     def keys(self, numbers: np.ndarray) -> dict[str, float]:
         """The keys of the law [SI] for some numbers, shape (parameters,)."""

@@ -91,8 +91,8 @@ def reproduce(
     variants = (*OPEN, *METHOD)
     tally = Tally(progress, 2 + len(variants) + (len(studies) if with_cycles else 0))
     tally.add(0, "maps")
-    responses = {name: _response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
-    maps = _maps(studies, points, rtol, VERIFIED)
+    responses = {name: response_of(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
+    maps = maps_of(studies, points, rtol, VERIFIED)
     baseline = Evidence(maps, responses, analysed(thesis_rig()), experiments_on(thesis_rig()))
     tally.add(1, "Fig. 14B at two tolerances")
     tolerances = {
@@ -156,8 +156,8 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     """The evidence with one variant; what it does not touch is the baseline's."""
     tolerance = variant.rtol or rtol
     touched = [study for study in studies if variant.touches(study)]
-    maps = {**plain.maps, **_maps(touched, points, tolerance, changes=variant.changes)}
-    responses = {name: _response(changes, variant.changes, tolerance) for name, changes in RESPONSES.items()}
+    maps = {**plain.maps, **maps_of(touched, points, tolerance, changes=variant.changes)}
+    responses = {name: response_of(changes, variant.changes, tolerance) for name, changes in RESPONSES.items()}
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(response.cell), response.trace) for name, response in responses.items()}
@@ -168,13 +168,14 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     return Evidence(maps, responses, linear, replace(plain.experiments, **other))
 
 
-def _maps(
+def maps_of(
     studies: Iterable[ThesisStudy],
     points: int,
     rtol: float,
     verify: float = 0.0,
     changes: Mapping[str, object] = NOTHING,
 ) -> dict[str, xr.Dataset]:
+    """The maps of some studies by name, `points` values per axis, `changes` being made to the rig before."""
     return {study.name: _map(study, changes, points, rtol, verify) for study in studies}
 
 
@@ -185,7 +186,7 @@ def _map(
     return counted(runs)
 
 
-def _response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
+def response_of(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
     """One run in time; a variant's changes come before the run's own, which distinguish it from the others."""
     stage = thesis_rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})

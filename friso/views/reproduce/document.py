@@ -9,10 +9,12 @@ from friso.studies.thesis import CONVENTIONS, thesis_rig
 from friso.version import VERSION
 from friso.views.documents import plain_json
 from friso.views.drawing.prefixes import listed
+from friso.views.reproduce.laws import laws_document
 
 if TYPE_CHECKING:
     from friso.studies.thesis import Reproduction, Verdict
     from friso.studies.thesis.claims import Judgement
+    from friso.studies.thesis.laws import ConclusionsByLaw
 
 
 def conclusion(reproduction: Reproduction) -> str:
@@ -35,8 +37,9 @@ _VERBS: tuple[tuple[Judgement, str, str], ...] = (
 """The judgements as said of one claim, and of several."""
 
 
-def reproduce_document(reproduction: Reproduction) -> dict[str, Any]:
-    """All claims with their judgements, ready for JSON; how they were judged stands before them."""
+def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Any]:
+    """All claims with their judgements, ready for JSON; how they were judged stands before them. With those under each
+    friction law, where they were asked."""
     tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed
     document = {
@@ -51,6 +54,7 @@ def reproduce_document(reproduction: Reproduction) -> dict[str, Any]:
         else None,
         "cycles": {name: vars(cycles.comparison) for name, cycles in reproduction.cycles.items()},
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
+        **({"friction_laws": laws_document(laws)} if laws else {}),
     }
     return plain_json(document)
 

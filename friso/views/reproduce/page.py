@@ -17,9 +17,11 @@ from friso.views.files import Content, pictures
 from friso.views.pages import Report, print_image
 from friso.views.reproduce.document import numbers, reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
+from friso.views.reproduce.laws import laws_rows, laws_sentences
 
 if TYPE_CHECKING:
     from friso.studies.thesis import Reproduction, Verdict
+    from friso.studies.thesis.laws import ConclusionsByLaw
 
 _COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not yet covered": GREY}
 
@@ -35,18 +37,18 @@ class FigureSection:
     verdicts: tuple[Verdict, ...]
 
 
-def reproduce_files(reproduction: Reproduction) -> dict[str, Content]:
+def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Content]:
     """The page, the claims, and every figure as PNG and SVG in a folder of its own."""
-    text = json.dumps(reproduce_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(reproduce_document(reproduction, laws), indent=2, ensure_ascii=False, allow_nan=False)
     figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
-        "reproduction.html": reproduce_html(reproduction),
+        "reproduction.html": reproduce_html(reproduction, laws),
         "claims.json": text + "\n",
         **{f"figures/{name}": content for name, content in figures.items()},
     }
 
 
-def reproduce_html(reproduction: Reproduction) -> str:
+def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> str:
     """The whole page: a table of all claims, then the figures with theirs. It opens offline."""
     parts = sections(reproduction_figures(reproduction), reproduction.verdicts)
     figures = [section.figure for section in parts if section.figure]
@@ -67,6 +69,9 @@ def reproduce_html(reproduction: Reproduction) -> str:
                 figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in figures
             },
             "conventions": CONVENTIONS,
+            "law_names": laws.laws if laws else (),
+            "law_rows": laws_rows(laws) if laws else [],
+            "law_sentences": laws_sentences(laws) if laws else [],
             "cycles": [(STUDIES[name], edges.comparison) for name, edges in reproduction.cycles.items()],
             "points": reproduction.points,
             "rtol": f"{reproduction.rtol:g}",

@@ -1,0 +1,119 @@
+"""The thesis's conclusions under each friction law: which of them survive, and which were those of LuGre.
+
+The friction of the rig is converted to every other law (`friso.studies.laws.conversion`), the maps are computed again,
+and the same judges judge them by the same criteria.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from friso.progress import Progress, silent
+from friso.stage import Stage
+from friso.studies.laws.conversion import LawConversion, compared, convert, convertible, measured
+from friso.studies.laws.verdicts import NEEDED
+from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
+from friso.studies.thesis.experiments import experiments_on
+from friso.studies.thesis.linear import analysed
+from friso.studies.thesis.reproduce import RESPONSES, Reproduction, maps_of, response_of
+from friso.studies.thesis.studies import STUDIES, thesis_rig
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+CONCLUSIONS = ("E1", *(f"F{figure}{panel}" for figure in (11, 12, 13, 14, 15, 16) for panel in ("", "A", "B")))
+"""The claims that are asked, as far as there are such."""
+
+
+@dataclass(frozen=True)
+class ConclusionByLaw:
+    """A claim, and how it is judged under each law by name, the thesis's own first."""
+
+    claim: Claim
+    findings: Mapping[str, Finding]
+
+    def judgement(self, law: str) -> Judgement:
+        """How it is judged under a law."""
+        return self.findings[law].judgement
+
+    def turned(self, law: str) -> tuple[str, ...]:
+        """The numbers of the parts that hold under a law where they do not under the thesis's own, or the reverse."""
+        first = next(iter(self.findings.values()))
+        pairs = zip(first.parts, self.findings[law].parts, strict=True)
+        return tuple(other.number for own, other in pairs if own.holds != other.holds)
+
+    def survives(self, law: str) -> bool:
+        """Whether the same parts hold under a law as under the thesis's own."""
+        return not self.turned(law)
+
+
+@dataclass(frozen=True)
+class ConclusionsByLaw:
+    """The conclusions, law by law, the thesis's own first; and what each of the others does not keep of what is
+    measured of it, and needs to."""
+
+    laws: tuple[str, ...]
+    lost: Mapping[str, tuple[str, ...]]
+    conclusions: tuple[ConclusionByLaw, ...]
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """The other laws that keep what is measured."""
+        return tuple(law for law in self.laws[1:] if not self.lost[law])
+
+    @property
+    def of_one_law(self) -> tuple[ConclusionByLaw, ...]:
+        """The conclusions that do not survive all laws that keep what is measured."""
+        return tuple(c for c in self.conclusions if not all(c.survives(law) for law in self.alike))
+
+
+def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:
+    """The conclusions of the thesis under each law, on the studies and the grid of a reproduction; those whose studies
+    it left out are left out."""
+    studies, rig = [STUDIES[name] for name in reproduction.maps], thesis_rig()
+    own = rig.flat()["friction.model"]
+    entries = {
+        claim.id: entry
+        for claim in claims()
+        if claim.id in CONCLUSIONS
+        and (entry := registered().get(claim.id))
+        and not {need for need in entry.needs if need in STUDIES} - reproduction.maps.keys()
+    }
+    evidences = {own: _evidence(reproduction.maps, reproduction.responses, rig)}
+    converted = [_converted(rig, law) for law in convertible() if law != own]
+    for number, conversion in enumerate(converted):
+        progress(number, len(converted), conversion.law)
+        changes = {"friction": conversion.stage.as_written()["friction"]}
+        maps = maps_of(studies, reproduction.points, reproduction.rtol, changes=changes)
+        responses = {name: response_of(of_run, changes, reproduction.rtol) for name, of_run in RESPONSES.items()}
+        evidences[conversion.law] = _evidence(maps, responses, rig.replace(changes))
+    progress(len(converted), len(converted), "laws")
+    findings = {
+        law: {name: entry.judge(evidence) for name, entry in entries.items()} for law, evidence in evidences.items()
+    }
+    return ConclusionsByLaw(
+        tuple(evidences),
+        {c.law: tuple(item.what for item in c.lost if item.what in NEEDED) for c in converted},
+        tuple(
+            ConclusionByLaw(claim, {law: by_claim[claim.id] for law, by_claim in findings.items()})
+            for claim in claims()
+            if claim.id in entries
+        ),
+    )
+
+
+def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response], stage: Stage) -> Evidence:
+    return Evidence(maps, responses, analysed(stage), experiments_on(stage))
+
+
+def _converted(rig: Stage, law: str) -> LawConversion:
+    """The rig under a law: as converted, or, where that is the rig's own law, with what is left open as far from it as
+    measurements allow."""
+    conversion = convert(rig, law)
+    same = all(change.off <= change.allowed / 10 for change in conversion.compared)
+    if not same:
+        return conversion
+    far = {key: high for key, (_, high) in conversion.open.items()}
+    return compared(rig, conversion.stage.with_numbers(far), measured(rig.flat()))

@@ -1,0 +1,49 @@
+"""What becomes of the thesis's conclusions under other friction laws: a sentence, a table, the JSON document."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from friso.studies.thesis.laws import ConclusionByLaw, ConclusionsByLaw
+
+TITLE = "Conclusions of the thesis under each friction law"
+
+
+def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
+    """How many conclusions survive, which do not, and which laws cannot say since they keep too little."""
+    count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.of_one_law]
+    others = ", ".join(laws.alike)
+    alike = f"{count - len(of_one)} of {count} conclusions are judged alike"
+    lines = [f"{alike} under every law that keeps what is measured ({others})."]
+    if of_one:
+        lines.append(f"Those of {laws.laws[0]} alone: {', '.join(of_one)}.")
+    lines += [f"{law} does not keep {', '.join(lost)}." for law, lost in laws.lost.items() if lost]
+    return lines
+
+
+def laws_rows(laws: ConclusionsByLaw) -> list[tuple[str, list[str]]]:
+    """For every claim, how it is judged under each law."""
+    return [(c.claim.id, [_judged(c, law) for law in laws.laws]) for c in laws.conclusions]
+
+
+def _judged(conclusion: ConclusionByLaw, law: str) -> str:
+    turned = conclusion.turned(law)
+    return f"{conclusion.judgement(law)}: {'; '.join(turned)}" if turned else str(conclusion.judgement(law))
+
+
+def laws_document(laws: ConclusionsByLaw) -> dict[str, Any]:
+    """For the JSON document."""
+    return {
+        "laws": list(laws.laws),
+        "not_kept": {law: list(lost) for law, lost in laws.lost.items()},
+        "conclusions": [
+            {
+                "id": conclusion.claim.id,
+                "claim": conclusion.claim.text,
+                "judgements": {law: conclusion.judgement(law) for law in laws.laws},
+                "turned": {law: list(turned) for law in laws.laws if (turned := conclusion.turned(law))},
+            }
+            for conclusion in laws.conclusions
+        ],
+    }
