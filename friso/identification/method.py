@@ -118,9 +118,9 @@ def with_laws(
         raise InputError(
             "--laws", "no stage", "the stage, for its masses and what lies before its guide", "--stage stage.toml"
         )
-    known = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
+    estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
-    laws = compare_laws(times, identification.stage or base, Prior(base, True, known), progress)
+    laws = compare_laws(times, identification.stage or base, Prior(base, True, estimates), progress)
     return replace(identification, laws=laws)
 
 
