@@ -81,6 +81,7 @@ def design(
     spec: Spec | str | os.PathLike[str] | None = None,
     *,
     set: Changes = None,
+    laws: bool = False,
     progress: Progress = silent,
 ) -> DesignAnswer:
     """From a specification to leaf springs, stroke and controller that do not hunt.
@@ -93,6 +94,8 @@ def design(
         The specification: bandwidth limit, friction, moves, load, space, sheets; default: one made from the stage.
     set : dict, optional
         Keys of the stage to override.
+    laws : bool
+        Whether edges of hunting are the worst over all friction laws that keep what is measured.
     progress : Progress
         Called as the steps of the method are done.
 
@@ -121,8 +124,10 @@ def design(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
         )
     from friso.design_method.method import design as designed
+    from friso.studies.laws.verdicts import frictions_that_keep
 
-    return DesignAnswer(designed(chosen, specification, progress))
+    others = frictions_that_keep(chosen) if laws else {}
+    return DesignAnswer(designed(chosen, specification, progress, others))
 
 
 def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:

@@ -7,7 +7,7 @@ Coarser than `friso.hunting.edges`, which tells how hunting ends and closes orbi
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -83,6 +83,18 @@ def edges_over(
         survey(between, (inside[between] + outside[between]) / 2)
     edges = np.where(np.isneginf(inside), 0.0, np.exp((inside + outside) / 2))
     return Corners(population, edges, (low, high), int(undecided.sum()))
+
+
+def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
+    """In each corner the highest of the edges under several laws, searched over the same corners and range."""
+    several = [*by_law.values()]
+    edges = np.max([corners.edges for corners in several], axis=0)
+    return replace(several[0], edges=edges, unknown=sum(corners.unknown for corners in several))
+
+
+def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str, Any]:
+    """The stage with the flat keys of another law's friction."""
+    return {**{key: value for key, value in flat.items() if not key.startswith("friction.")}, **friction}
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from friso.design_method.choice import ChosenLeaves, Confirmed, chosen, confirmed
 from friso.design_method.controller import DesignedController, comfortable, comfortable_below, controller, dampings
-from friso.design_method.edges import Corners, edges_over, rigid
+from friso.design_method.edges import Corners, edges_over, rigid, under_law, worst_edges
 from friso.design_method.front import Candidate, front
 from friso.design_method.hunting_map import HuntingMap, hunting_map
 from friso.design_method.modal import Modal
@@ -22,10 +24,11 @@ from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.errors import InputError
 from friso.frequency.crossover import Limits, limits
 from friso.progress import Progress, silent
 from friso.quantities import percent
-from friso.stage import Stage
+from friso.stage import Stage, violations
 
 STROKES = 4
 """Strokes that are tried where the specification leaves a range, the largest first."""
@@ -44,6 +47,12 @@ ROUNDS, LOWER = 12, 0.97
 
 ALIKE = 0.98
 """Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
+
+
+Frictions = Mapping[str, Mapping[str, Any]]
+
+OWN_LAW: Frictions = MappingProxyType({})
+"""No other friction law than the stage's own."""
 
 
 class NoDesign(Exception):
@@ -73,6 +82,7 @@ class Design:
     `candidates`: the Pareto front, some of it `confirmed` by beams; `fitted`: what was chosen. `controller`: margins.
     `map`: hunting over crossover and stroke. `verification`: the moves simulated. `stage`: the design as a stage.
     `damped`: the joint damping with which the crossover could be `faster` [Hz], where margins hold it down.
+    `by_law`: the edges without isolator and with it under each friction law; `without` and `edges` are the worst.
     """
 
     spec: Spec
@@ -87,6 +97,7 @@ class Design:
     verification: Verification
     damped: Relaxation | None
     faster: float
+    by_law: Mapping[str, tuple[Corners, Corners]]
 
     @property
     def stage(self) -> Stage:
@@ -115,14 +126,14 @@ class Design:
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
 
 
-def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
-    """Carry the method out. Raises InputError for input that cannot be used, NoDesign if nothing meets the
+def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = OWN_LAW) -> Design:
+    """Carry the method out; edges of hunting are the worst over the stage's own friction and other `laws`, flat keys of
+    friction by name. Raises InputError for input that cannot be used, NoDesign if nothing meets the
     specification."""
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
-    without = edges_over(
-        rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS, progress, "hunting without isolator"
-    )
+    over = partial(_by_law, laws={flat["friction.model"]: {}, **laws}, population=population, progress=progress)
+    without = over(rigid(flat), FIRST * limit, BEYOND * limit, "hunting without isolator")
     friction = float(np.min(least_breakaway(population.over(flat))))
     if friction <= 0:
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
@@ -133,9 +144,8 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
     progress(0, 1, "hunting with isolator")
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
     worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
-    edges = edges_over(
-        worst, population, FIRST * crossover, ABOVE * crossover, STEPS, progress, "hunting with isolator"
-    )
+    isolated = over(worst, FIRST * crossover, ABOVE * crossover, "hunting with isolator")
+    edges = worst_edges(isolated)
     _does_not_hunt(fit, edges)
     progress(0, 1, "margins")
     control = controller(fit.stage, fit.choice.beams, fit.limits, population)
@@ -144,8 +154,30 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
     by_beams = tuple(confirmed(fit.task, candidates))
     tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
     damped, faster = with_damping(fit)
-    results = (without, tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
-    return Design(spec, stage, *results)
+    results = (worst_edges(without), tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
+    return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without})
+
+
+def _by_law(
+    flat: Mapping[str, Any],
+    low: float,
+    high: float,
+    label: str,
+    laws: Frictions,
+    population: Population,
+    progress: Progress,
+) -> dict[str, Corners]:
+    """The edges of a stage over the corners under each law, between crossovers [Hz]. Raises InputError for a law that
+    does not allow what the specification does."""
+    edges = {}
+    for law, friction in laws.items():
+        there = under_law(flat, friction) if friction else flat
+        if friction and (broken := violations(population.over(there))):
+            raise InputError(
+                "--laws", f"{law}: {broken[0][1]}", "a specification that every law allows", "friso design"
+            )
+        edges[law] = edges_over(there, population, low, high, STEPS, progress, f"{label}, {law}" if friction else label)
+    return edges
 
 
 def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:

@@ -23,6 +23,9 @@ def design(
         typer.Argument(metavar="SPEC.toml", help="The specification; one from the stage file if left out."),
     ] = None,
     overrides: Overrides = None,
+    laws: Annotated[
+        bool, typer.Option("--laws", help="Take the worst edge over all friction laws that keep what is measured.")
+    ] = False,
     out: DefaultFolder = Path("design"),
     overwrite: Overwrite = False,
     as_json: AsJson = False,
@@ -38,7 +41,7 @@ def design(
 
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
     try:
-        ask("design", question, stage_file, spec_file, set=overrides, **shown, writes=STAGES)
+        ask("design", question, stage_file, spec_file, set=overrides, laws=laws, **shown, writes=STAGES)
     except NoDesign as failure:
         _refuse(failure, stage_file, spec_file, as_json)
 

@@ -151,8 +151,8 @@ def verdicts_by_law(
 ) -> VerdictsByLaw:
     """What becomes of a stage under each law that keeps what is measured of its own. Raises InputError for a law that
     does not declare what that is."""
-    conversions, left_out = _conversions(stage, elements)
-    planned = [(conversion, list(_drawn(conversion))) for conversion in conversions]
+    conversions, left_out = kept_laws(stage, elements)
+    planned = [(conversion, list(drawn(conversion))) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
     kernels(set[KernelRequest]().union(*(needed_kernels(conversion.stage) for conversion in conversions)))
     verdicts = []
@@ -168,7 +168,7 @@ def verdicts_by_law(
     return VerdictsByLaw(stage, tuple(verdicts), left_out)
 
 
-def _conversions(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[Shown, ...]]]:
+def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[Shown, ...]]]:
     """The stage as it is, and under the other laws that keep what is measured of it; and what the others lose."""
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measured(stage.flat()))]
@@ -185,7 +185,20 @@ def _conversions(stage: Stage, elements: int) -> tuple[list[LawConversion], dict
     return kept, left_out
 
 
-def _drawn(conversion: LawConversion) -> Iterator[dict[str, float]]:
+def frictions_that_keep(stage: Stage, elements: int = ELEMENTS) -> dict[str, dict[str, float]]:
+    """Flat keys of the friction under every other law that keeps what is measured of a stage, as converted and at both
+    ends of what that leaves open, by the name of the law and what was drawn. Raises InputError for a law that does not
+    declare what is measured of it."""
+    frictions = {}
+    for conversion in kept_laws(stage, elements)[0][1:]:
+        for changes in drawn(conversion):
+            flat = conversion.stage.with_numbers(changes).flat()
+            name = ", ".join([conversion.law, *(f"{key} {value:.3g}" for key, value in changes.items())])
+            frictions[name] = {key: value for key, value in flat.items() if key.startswith("friction.")}
+    return frictions
+
+
+def drawn(conversion: LawConversion) -> Iterator[dict[str, float]]:
     """What the measurements leave open: as the conversion has it, and at both ends of the ranges; as it is for the
     stage's own law."""
     yield {}

@@ -44,7 +44,18 @@ def headline(design: Design) -> list[tuple[str, str]]:
             f"{hertz(design.controller.crossover)}.",
         ),
         _verified(design),
+        *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
     ]
+
+
+def across_laws(design: Design) -> str:
+    """Between what the edges lie under all laws that were asked, and which law is the worst."""
+    ends = []
+    for place, name in enumerate(("without isolator", "with it")):
+        edges = {law: corners[place].highest for law, corners in design.by_law.items()}
+        least, worst = min(edges, key=edges.__getitem__), max(edges, key=edges.__getitem__)
+        ends.append(f"{name} {hertz(edges[least])} ({least}) to {hertz(edges[worst])} ({worst})")
+    return f"Edges of hunting are the worst of {len(design.by_law)} friction laws: {'; '.join(ends)}."
 
 
 def need(design: Design) -> str:
