@@ -36,6 +36,10 @@ def design_document(design: Design) -> dict[str, Any]:
         "front": _front(design),
         "controller": _controller(design),
         "verification": _verification(design),
+        "friction_laws": {
+            law: {"without_highest_edge_hz": without.highest, "joint_highest_edge_hz": isolated.highest}
+            for law, (without, isolated) in design.by_law.items()
+        },
     }
     return plain_json(document)
 
