@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.laws.conversion import LawConversion, compared, convert, convertible, measured
+from friso.studies.laws.conversion import LawConversion, Shown, compared, convert, convertible, measured
 from friso.studies.laws.verdicts import NEEDED
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
 from friso.studies.thesis.experiments import experiments_on
@@ -55,7 +55,7 @@ class ConclusionsByLaw:
     measured of it, and needs to."""
 
     laws: tuple[str, ...]
-    lost: Mapping[str, tuple[str, ...]]
+    lost: Mapping[str, tuple[Shown, ...]]
     conclusions: tuple[ConclusionByLaw, ...]
 
     @property
@@ -95,7 +95,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
     }
     return ConclusionsByLaw(
         tuple(evidences),
-        {c.law: tuple(item.what for item in c.lost if item.what in NEEDED) for c in converted},
+        {c.law: tuple(item.kind for item in c.lost if item.kind in NEEDED) for c in converted},
         tuple(
             ConclusionByLaw(claim, {law: by_claim[claim.id] for law, by_claim in findings.items()})
             for claim in claims()

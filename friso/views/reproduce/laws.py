@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from friso.views.convert.words import SHOWN
+from friso.views.drawing.prefixes import listed
+
 if TYPE_CHECKING:
     from friso.studies.thesis.laws import ConclusionByLaw, ConclusionsByLaw
 
@@ -18,7 +21,9 @@ def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
     lines = [f"{alike} under every law that keeps what is measured ({others})."]
     if of_one:
         lines.append(f"Those of {laws.laws[0]} alone: {', '.join(of_one)}.")
-    lines += [f"{law} does not keep {', '.join(lost)}." for law, lost in laws.lost.items() if lost]
+    lines += [
+        f"{law} does not keep {listed([SHOWN[k] for k in lost], 'and')}." for law, lost in laws.lost.items() if lost
+    ]
     return lines
 
 
@@ -36,7 +41,7 @@ def laws_document(laws: ConclusionsByLaw) -> dict[str, Any]:
     """For the JSON document."""
     return {
         "laws": list(laws.laws),
-        "not_kept": {law: list(lost) for law, lost in laws.lost.items()},
+        "not_kept": {law: [SHOWN[kind] for kind in lost] for law, lost in laws.lost.items()},
         "conclusions": [
             {
                 "id": conclusion.claim.id,
