@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from friso.quantities import percent
+
 if TYPE_CHECKING:
     from friso.identification.laws.comparison import LawComparison, LawPrediction
 
@@ -69,7 +71,7 @@ def laws_document(comparison: LawComparison) -> dict[str, Any]:
 
 
 def _share(prediction: LawPrediction) -> str:
-    return f"{100 * prediction.error:.2g} %"
+    return percent(prediction.error)
 
 
 def _listed(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
@@ -77,8 +79,8 @@ def _listed(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
 
 
 def _fact(prediction: LawPrediction) -> str:
-    low, high = 100 * prediction.errors.min(), 100 * prediction.errors.max()
-    return f"off by {_share(prediction)} ({low:.2g} to {high:.2g} %); {_keys(prediction.fit.keys)}"
+    low, high = percent(prediction.errors.min()), percent(prediction.errors.max())
+    return f"off by {_share(prediction)} ({low} to {high}); {_keys(prediction.fit.keys)}"
 
 
 def _keys(keys: Mapping[str, float]) -> str:
