@@ -28,7 +28,7 @@ from friso.cli.commands.design import design as command
 from friso.design_method import choice, controller, edges, front, hunting_map, method, population, verification
 from friso.design_method.edges import Corners
 from friso.design_method.geometry import Geometry, Sheet
-from friso.design_method.method import Design, NoDesign
+from friso.design_method.method import Design, Frictions, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.spec import Position, Spec, load_spec
 from friso.progress import Progress
@@ -92,7 +92,7 @@ def finished(designed: Design) -> Iterator[list[str]]:
     """The command finds this design; what it tells of its progress is kept."""
     labels: list[str] = []
 
-    def design(stage: Stage, spec: Spec, progress: Progress) -> Design:
+    def design(stage: Stage, spec: Spec, progress: Progress, laws: Frictions) -> Design:
         progress(0, 1, "leaf springs")
         labels.append(stage.name)
         return designed
@@ -128,7 +128,7 @@ def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
 def no_design(monkeypatch: pytest.MonkeyPatch) -> None:
     """No design, and what to relax."""
 
-    def fail(stage: Stage, spec: Spec, progress: Progress) -> Design:
+    def fail(stage: Stage, spec: Spec, progress: Progress, laws: Frictions) -> Design:
         raise NoDesign("no leaf springs meet the specification", RELAXED)
 
     monkeypatch.setattr(method, "design", fail)
@@ -536,7 +536,7 @@ def test_exit_status(
     tmp_path: Path,
     capsys: pytest.CaptureFixture,
 ) -> None:
-    def interrupt(stage: Stage, spec: Spec, progress: Progress) -> Design:
+    def interrupt(stage: Stage, spec: Spec, progress: Progress, laws: Frictions) -> Design:
         raise KeyboardInterrupt
 
     monkeypatch.setattr(method, "design", interrupt)
@@ -565,7 +565,7 @@ def test_a_specification_that_is_not_met_is_told(
     """What there is is written all the same; the status is 2, and the message says what would be met."""
     hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
     less = replace(designed, spec=designed.spec.model_copy(update={"position": hurried}))
-    monkeypatch.setattr(method, "design", lambda stage, spec, progress: less)
+    monkeypatch.setattr(method, "design", lambda stage, spec, progress, laws: less)
     with pytest.raises(typer.Exit) as left:
         command(RIG, spec, out=folder, as_json=True)
     assert left.value.exit_code == 2
