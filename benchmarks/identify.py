@@ -1,4 +1,4 @@
-"""Identification against known truth: `python -m benchmarks.identify [--machines 20] [--moves 10]`.
+"""Identification against known truth: `python -m benchmarks.identify [--machines 20] [--moves 10] [--kept FILE]`.
 
 Machines drawn at random (tests/machines.py) are simulated in closed loop, their logs get noise of force, position and
 time, and digits, and are identified again; moves with the machine's own controller known and not known. Per method and
@@ -7,17 +7,20 @@ truth, how wide they are, and of how many that are not shown the range that is l
 
 A motion shows a quantity if the best unbiased estimate of its noise, in closed loop, would be better than 30 %
 (Cramer-Rao bound). `--moves` is the number of machines whose moves are fitted (two fits each, about half a minute); the
-other experiments take a second.
+other experiments take a second (`--machines 0` leaves them out). With `--kept`, the answers on each machine are
+appended to that file as they come, and those it holds are not computed again: a long study runs in pieces, and
+`--first 100 --moves 100 --kept FILE` then prints the table of them all.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import time
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -58,8 +61,29 @@ VISIBLE = 0.3
 TIMING = 1e-6
 """Standard deviation [s] of the instants at which a log is sampled."""
 
-Answer = tuple[str, Estimate, float, bool]
-"""Method, what it found, the truth, and whether the motion shows it."""
+
+@dataclass(frozen=True)
+class Answer:
+    """What a method says of a quantity of a machine: the 95 % interval or, where it is not `reported`, the range left
+    possible; the truth, and whether the motion shows it (`visible`)."""
+
+    method: str
+    name: str
+    low: float
+    high: float
+    reported: bool
+    truth: float
+    visible: bool = True
+
+    @classmethod
+    def of(cls, method: str, estimate: Estimate, truth: float, visible: bool = True) -> Answer:
+        return cls(
+            method, estimate.name, float(estimate.low), float(estimate.high), estimate.determined, float(truth), visible
+        )
+
+    @property
+    def holds(self) -> bool:
+        return self.low <= self.truth <= self.high
 
 
 @dataclass
@@ -75,16 +99,20 @@ class Count:
     visible: int = 0
     seen: int = 0
 
-    def add(self, estimate: Estimate, truth: float, visible: bool) -> None:
-        self.visible += visible
-        self.seen += visible and estimate.determined
-        if not estimate.determined:
+    @property
+    def reported(self) -> int:
+        return self.held + self.missed
+
+    def add(self, answer: Answer) -> None:
+        self.visible += answer.visible
+        self.seen += answer.visible and answer.reported
+        if not answer.reported:
             self.unshown += 1
-            self.right += estimate.holds(truth)
+            self.right += answer.holds
             return
-        self.held += estimate.holds(truth)
-        self.missed += not estimate.holds(truth)
-        self.widths.append(estimate.half_width / abs(truth) if truth else estimate.half_width)
+        self.held += answer.holds
+        self.missed += not answer.holds
+        self.widths.append((answer.high - answer.low) / 2 / (abs(answer.truth) or 1.0))
 
 
 def mass_of(flat: dict) -> float:
@@ -95,33 +123,39 @@ def of_rigid(machine: Machine) -> Iterator[Answer]:
     """Break-away, constant speeds, and the frequency response of a machine without joint."""
     flat = machine.flat
     mass = mass_of(flat)
-    yield "break-away", static_from_ramps(break_aways(machine), mass).static, flat["friction.static"], True
+    yield Answer.of("break-away", static_from_ramps(break_aways(machine), mass).static, flat["friction.static"])
     both = friction_velocity(speeds(machine), mass).both
     for estimate in (both.coulomb, both.viscous, both.static):
-        yield "constant speed", estimate, flat[estimate.name], True
+        yield Answer.of("constant speed", estimate, flat[estimate.name])
     lines = analyse([shaken(machine)]).lines
     if lines:
         value = lines[0].value
-        yield "frequency", Estimate("masses.cart", "kg", value.value, value.low, value.high, value.method), mass, True
+        line = Estimate("masses.cart", "kg", value.value, value.low, value.high, value.method)
+        yield Answer.of("frequency", line, mass)
 
 
 def of_jointed(machine: Machine) -> Iterator[Answer]:
     """Steps with the cart held, and slow motion that sticks and slips, with the stiffness that these gave."""
     flat = machine.flat
     stiffness = stiffness_from_steps(steps(machine)).stiffness
-    yield "steps", stiffness, flat["joint.stiffness"], True
+    yield Answer.of("steps", stiffness, flat["joint.stiffness"])
     if stiffness.determined:
         slips = static_from_stick_slip(creeping(machine), stiffness, flat["masses.stage"], flat["joint.stroke"])
-        yield "stick-slip", slips.static, flat["friction.static"], True
+        yield Answer.of("stick-slip", slips.static, flat["friction.static"])
 
 
 def of_moves(machine: Machine) -> Iterator[Answer]:
-    """Moves, with and without the machine's own controller."""
+    """Moves, with and without the machine's own controller; of a log that is refused nothing is reported."""
     log = sampled_in_time(moves(machine), machine)
     flat, visible = machine.flat, shown_by(log, machine)
-    for controller_known, words in ((True, "moves, controller known"), (False, "moves, controller unknown")):
-        for estimate in identify_moves(log, machine.guess.flat(), controller_known).estimates:
-            yield words, estimate, flat.get(estimate.name, 0.0), estimate.name in visible
+    for controller_known, method in ((True, "moves, controller known"), (False, "moves, controller unknown")):
+        try:
+            estimates = identify_moves(log, machine.guess.flat(), controller_known).estimates
+        except InputError as error:
+            print(f"  {log.name}, {method}: refused: {' '.join(str(error).split())}")
+            estimates = tuple(Estimate.unknown(name, "", method, "refused") for name in sorted(visible))
+        for estimate in estimates:
+            yield Answer.of(method, estimate, flat.get(estimate.name, 0.0), estimate.name in visible)
 
 
 def sampled_in_time(log: Log, machine: Machine) -> Log:
@@ -152,24 +186,54 @@ def shown_by(log: Log, machine: Machine) -> set[str]:
     return {keys.get(name, name) for name, fine in zip(names, good, strict=True) if fine}
 
 
-def run(first: int, machines: int, fitted: int) -> dict[tuple[str, str], Count]:
+Task = tuple[str, int]
+"""A group of experiments, and the number of the machine."""
+
+TASKS: Mapping[str, Callable[[int], Iterable[Answer]]] = {
+    "rigid": lambda seed: of_rigid(drawn(seed, False)),
+    "jointed": lambda seed: of_jointed(drawn(seed, True)),
+    "moves": lambda seed: of_moves(drawn(seed, False)),
+}
+
+
+def run(tasks: Iterable[Task], kept: Path | None = None) -> list[Answer]:
+    """The answers on machines by task, computed unless the file `kept` holds them, and kept there."""
+    before = _read(kept) if kept else {}
+    every: list[Answer] = []
+    for task in tasks:
+        if task in before:
+            every += before[task]
+            continue
+        kind, seed = task
+        begin, answers = time.perf_counter(), []
+        try:
+            answers = list(TASKS[kind](seed))
+        except InputError as error:
+            print(f"  machine {seed}, {kind}: refused: {' '.join(str(error).split())}")
+        for answer in answers:
+            if not answer.holds:
+                span = f"{answer.low:.4g} to {answer.high:.4g}{'' if answer.reported else ' (not shown)'}"
+                print(f"  machine {seed}, {answer.method}: {answer.name} {span}, true {answer.truth:.4g}")
+        print(f"machine {seed}, {kind}: {time.perf_counter() - begin:.0f} s", flush=True)
+        if kept:
+            with kept.open("a", encoding="utf-8") as file:
+                file.write(json.dumps([kind, seed, [asdict(answer) for answer in answers]]) + "\n")
+        every += answers
+    return every
+
+
+def _read(kept: Path) -> dict[Task, list[Answer]]:
+    if not kept.exists():
+        return {}
+    lines = (json.loads(line) for line in kept.read_text(encoding="utf-8").splitlines())
+    return {(kind, seed): [Answer(**answer) for answer in answers] for kind, seed, answers in lines}
+
+
+def counted(answers: Iterable[Answer]) -> dict[tuple[str, str], Count]:
+    """By method and quantity."""
     counts: dict[tuple[str, str], Count] = defaultdict(Count)
-    for seed in range(first, first + machines):
-        begin = time.perf_counter()
-        tasks = [of_rigid(drawn(seed, False)), of_jointed(drawn(seed, True))]
-        if seed < first + fitted:
-            tasks.append(of_moves(drawn(seed, False)))
-        for task in tasks:
-            try:
-                for method, estimate, truth, visible in task:
-                    counts[method, estimate.name].add(estimate, truth, visible)
-                    if not estimate.holds(truth):
-                        remark = "" if estimate.determined else " (not shown)"
-                        span = f"{estimate.low:.4g} to {estimate.high:.4g}{remark}"
-                        print(f"  machine {seed}, {method}: {estimate.name} {span}, true {truth:.4g}")
-            except InputError as error:
-                print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
-        print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
+    for answer in answers:
+        counts[answer.method, answer.name].add(answer)
     return counts
 
 
@@ -177,7 +241,7 @@ def rows(counts: dict[tuple[str, str], Count]) -> list[list[str]]:
     table = []
     for (method, name), count in sorted(counts.items()):
         width = f"{np.median(count.widths):.2g}" if count.widths else "-"
-        seen, held = f"{count.seen} of {count.visible}", f"{count.held} of {count.held + count.missed}"
+        seen, held = f"{count.seen} of {count.visible}", f"{count.held} of {count.reported}"
         table.append([f"{method}: {name}", seen, held, width, f"{count.right} of {count.unshown}"])
     return table
 
@@ -186,10 +250,10 @@ def goals(counts: dict[tuple[str, str], Count]) -> list[Goal]:
     """Of each quantity that the goals are about, by each method that shows it."""
     reached = []
     for (method, name), count in sorted(counts.items(), key=lambda item: item[0][::-1]):
-        reported = count.held + count.missed
-        if name in GOALS and reported:
+        if name in GOALS and count.reported:
             about = f"{name} by {method}: 95 % intervals hold the truth"
-            reached.append(Goal(about, ">= 90 %", f"{count.held} of {reported}", count.held >= WANTED * reported))
+            enough = count.held >= WANTED * count.reported
+            reached.append(Goal(about, ">= 90 %", f"{count.held} of {count.reported}", enough))
         if name in SLOW and method.startswith("moves") and count.visible:
             about = f"{name} by {method}: reported where the motion shows it"
             enough = count.seen >= REPORTED * count.visible
@@ -202,8 +266,11 @@ def main() -> None:
     parser.add_argument("--machines", type=int, default=20)
     parser.add_argument("--moves", type=int, default=10, help="machines whose moves are fitted")
     parser.add_argument("--first", type=int, default=0, help="number of the first machine")
+    parser.add_argument("--kept", type=Path, help="file of answers, which a run in pieces adds to")
     arguments = parser.parse_args()
-    counts = run(arguments.first, arguments.machines, arguments.moves)
+    numbers = {"rigid": arguments.machines, "jointed": arguments.machines, "moves": arguments.moves}
+    tasks = [(kind, seed) for kind, n in numbers.items() for seed in range(arguments.first, arguments.first + n)]
+    counts = counted(run(tasks, arguments.kept))
     head = (
         "method: quantity",
         "reported of visible",

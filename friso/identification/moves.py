@@ -16,12 +16,14 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
 from friso.identification.logs.log import Log
 from friso.identification.model_error import all_with_model_error, not_described, of_inverse_model, with_causes
+from friso.identification.output_error.changes import changes_of, reaching, sentences
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
 from friso.identification.output_error.parameters import MASS, is_free, keys_of, parameters_of
 from friso.identification.output_error.problem import Problem, Simulated, closed_loop, tracking
 from friso.identification.output_error.profile import Profile
+from friso.identification.output_error.repeated import as_far_off_as_repeated
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, noise_of
 from friso.progress import Progress, silent
@@ -89,9 +91,14 @@ def identify_moves(
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
     noise = noise_of(log["force"][part])
     answer = fit_identifiable(follows, loop, covered, inverse.bandwidth, noise, progress)
-    estimates, correlation = estimates_of(answer, covered)
     fit = answer.fit
     quality = quality_of(log, inverse, fit, noise, share)
+    if not fit.problem.closed:
+        fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, progress)
+    if (changes := changes_of(fit, moved.velocity)) is not None:
+        fit = reaching(fit, changes)
+        quality = replace(quality, doubts=(*quality.doubts, *sentences(fit, changes, log.unit("force"))))
+    estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
     if quality.failed:
         estimates, correlation = not_described(estimates)
     elif quality.rejected:

@@ -9,7 +9,7 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import Identified, reason
+from friso.identification.output_error.identifiable import STRIBECK, Identified, reason
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, keys_of
 from friso.identification.output_error.profile import Profile
 from friso.identification.readings.common import LINEARITY
@@ -75,6 +75,9 @@ def _reasons(identified: Identified, covered: Coverage) -> dict[str, str]:
         most = MOST if parameter.logarithmic else (parameter.high - parameter.low) / 2
         if not COVERAGE * deviation < most:
             unknown.setdefault(parameter.name, "the log does not bound it")
+    for name, other in (STRIBECK, STRIBECK[::-1]):
+        if name in parameters and other in unknown:
+            unknown.setdefault(name, unknown[other])
     if SHARE in unknown:
         why = f"the log shows the sum of both masses, {fit.value(MASS):.4g} kg, not how it is split"
         unknown |= {"masses.cart": why, "masses.stage": why}

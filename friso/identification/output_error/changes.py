@@ -1,0 +1,108 @@
+"""Whether the constant force or friction of a record changes while it is taken, and how far that moves the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from friso.identification.output_error.fit import ALIKE, OutputErrorFit
+from friso.identification.spread import correlation_length
+from friso.intervals import COVERAGE
+
+CREEPING = 0.01
+"""Share of the highest speed up to which friction is not counted as that of one direction."""
+
+SMALL = 0.05
+"""Share of Coulomb friction by which the force is changed for its effect on the record."""
+
+SURE = 0.999
+"""Probability of a change that is taken for one."""
+
+WORTH_TELLING = 0.1
+"""Share of Coulomb friction by which something has to change to be named."""
+
+FRICTION, CONSTANT = "friction", "the constant force"
+
+
+@dataclass(frozen=True)
+class Changes:
+    """How far the fitted numbers would move, shape (free,), if constant force and friction were free to change along
+    the record, and the change of either over it [N]."""
+
+    moved: np.ndarray
+    friction: float
+    constant: float
+
+
+def changes_of(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
+    """What changes during a record, of the smooth `velocity` [m/s], shape (n,); None where nothing clearly does.
+
+    Constant force and friction may follow a line each over either half of the record. They are fitted together with
+    the parameters, about the fit.
+    """
+    problem = fit.problem
+    names = [parameter.name for parameter in problem.parameters]
+    if "friction.coulomb" not in names:
+        return None
+    free = np.isin(np.arange(len(names)), fit.free)
+    ((rest, slopes),) = problem.jacobians(fit.inner[None], free[None])
+    way = np.clip(velocity / (CREEPING * np.abs(velocity).max()), -1.0, 1.0)
+    unit = SMALL * fit.value("friction.coulomb")
+    bends = _bends(problem.counted)
+    forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
+    columns = [_effect(fit, rest, unit * force) / unit for force in forces]
+    every = np.column_stack([slopes, *columns])
+    size = np.linalg.norm(every, axis=0)
+    if not (np.isfinite(every).all() and (size > 0).all()):
+        return None
+    solution = np.linalg.lstsq(every / size, -rest, rcond=ALIKE)[0] / size
+    left = rest + every @ solution
+    independent = max(float(problem.counted.sum()), 1.0) / correlation_length(left)
+    if rest @ rest <= left @ left * (1 + chi2.ppf(SURE, len(forces)) / independent):
+        return None
+    count = len(fit.free)
+    friction, constant = (
+        float(np.ptp([0.0, *solution[first : first + len(bends)]])) for first in (count, count + len(bends))
+    )
+    return Changes(solution[:count], friction, constant)
+
+
+def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
+    """The fit with deviations that reach as far as what changes would move it, and over the change itself."""
+    free = [fit.problem.parameters[i] for i in fit.free]
+    further = np.abs(changes.moved)
+    for i, parameter in enumerate(free):
+        if parameter.name == "friction.coulomb":
+            further[i] += changes.friction / 2 / fit.value(parameter.name)
+        elif parameter.name.startswith("bias."):
+            further[i] += changes.constant / 2
+    deviation = np.sqrt(np.diag(fit.covariance))
+    usable = np.isfinite(deviation) & (deviation > 0)
+    wider = np.divide(further, COVERAGE * deviation, out=np.zeros_like(further), where=usable) + 1
+    return replace(fit, covariance=fit.covariance * np.outer(wider, wider))
+
+
+def sentences(fit: OutputErrorFit, changes: Changes, unit: str) -> list[str]:
+    """What changes, where that is worth telling; `unit` is that of the force."""
+    least = WORTH_TELLING * fit.value("friction.coulomb")
+    return [
+        f"{name[0].upper()}{name[1:]} changes by {size:.2g} {unit} during the record (warming up, a drift): intervals "
+        "reach from its least to its largest"
+        for name, size in ((FRICTION, changes.friction), (CONSTANT, changes.constant))
+        if size > least
+    ]
+
+
+def _bends(counted: np.ndarray) -> list[np.ndarray]:
+    """What is 1 in the middle of a record, and what is 1 at its end, lines in between, less their means, (n,)."""
+    share = np.linspace(0.0, 1.0, len(counted))
+    shapes = 1 - np.abs(2 * share - 1), np.maximum(2 * share - 1, 0.0)
+    return [shape - np.average(shape, weights=counted) for shape in shapes]
+
+
+def _effect(fit: OutputErrorFit, rest: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """What a further force [N] on the stage, shape (n,), changes of the residual of a fit."""
+    inputs = fit.problem.inputs
+    return replace(fit.problem, inputs=replace(inputs, force=inputs.force + force)).residuals(fit.inner[None])[0] - rest

@@ -1,0 +1,64 @@
+"""How far off a fit that follows a log comes out: repeated on simulated logs of the machine it made, whose truth is
+known."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from friso.identification.logs.log import Log
+from friso.identification.output_error.fit import OutputErrorFit, fit
+from friso.identification.output_error.problem import Problem, tracking
+from friso.identification.readings.common import robust
+from friso.identification.spread import CONFIDENCE
+from friso.intervals import COVERAGE
+from friso.progress import Progress
+
+TIMES = 4
+"""Simulated logs that the fit is repeated on: Student's t of so many is 1.4 times that of a known spread."""
+
+SEED = 11
+
+
+def as_far_off_as_repeated(
+    once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
+) -> OutputErrorFit:
+    """The fit of a stage that followed `part` of a log, with deviations no smaller than what fits to simulated logs
+    are off by.
+
+    Noise of the position blurs where a stage breaks away, and noise of the force breaks it away early or late: what the
+    stage that follows makes of that is no error about the fitted values that a Jacobian could tell, but one to one side
+    (parametric bootstrap: Efron, Tibshirani 1993, chapter 6). `noise` [N] is that of the log's force.
+    """
+    again = [
+        fit(problem, once.free, once.inner[None])
+        for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
+    ]
+    free = list(once.free)
+    off = np.sqrt(np.mean([(one.inner[free] - once.inner[free]) ** 2 for one in again], axis=0))
+    off = off * float(student.ppf(CONFIDENCE, TIMES)) / COVERAGE
+    deviation = np.sqrt(np.diag(once.covariance))
+    known = np.isfinite(deviation) & (deviation > 0)
+    wider = np.divide(np.maximum(off, deviation), deviation, out=np.ones_like(off), where=known)
+    return replace(once, covariance=once.covariance * np.outer(wider, wider))
+
+
+def _simulated_logs(
+    once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
+) -> Iterator[Problem]:
+    """Problems like that of a fit, of logs that the stage it made leaves when it does as it did there: the force is
+    that of the log and of the controller that held it, the position is its own, and either has the log's noise."""
+    problem = once.problem
+    record, rng = problem.record(once.inner), np.random.default_rng(SEED)
+    measured = log["position"][part]
+    blur = robust(measured - problem.inputs.reference)
+    for number in range(TIMES):
+        progress(number, TIMES, "moves: the same fit of simulated logs")
+        signals = {role: values.copy() for role, values in log.signals.items()}
+        signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
+        force = problem.inputs.force + record.force
+        signals["force"][part] = force + noise * rng.standard_normal(len(measured))
+        yield tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
