@@ -14,9 +14,6 @@ from friso.identification.output_error.identifiable import explains
 from friso.identification.quality import Quality, halves, whole_error
 from friso.quantities import percent
 
-NOISY = 10.0
-"""A fit that leaves so many times the noise of the record lacks something, and says so."""
-
 POOR = 0.3
 """Relative error of the force from which on a model does not describe the record."""
 
@@ -44,9 +41,9 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
     if explains(fit, noise):
         return plain
     doubts, poor = [], inverse.error > POOR
-    reasons = causes(log, inverse, cart_share) if plain.ratio > NOISY or poor else []
+    reasons = causes(log, inverse, cart_share) if plain.lacks_something or poor else []
     worse = plain.whole_error > max(CONTRADICTS * inverse.error, FINE)
-    rejected = worse and plain.ratio > NOISY and not poor
+    rejected = worse and plain.lacks_something and not poor
     if rejected:
         doubts.append(
             f"The whole model contradicts the record: on the moves it leaves {percent(plain.whole_error, 3)} of the "
@@ -55,8 +52,13 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         )
     if poor:
         why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN
+<<<<<<< HEAD
         doubts.append(f"A mass with friction leaves {percent(inverse.error, 3)} of the force unexplained: {why}")
     elif not rejected and plain.ratio > NOISY:
+=======
+        doubts.append(f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained: {why}")
+    elif not rejected and plain.lacks_something:
+>>>>>>> 6364c60 (Identify: intervals hold both halves where they differ, and are wider for slow friction where something is lacking)
         doubts.append(
             f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "
             f"lacks something, for which the intervals allow{''.join(f'; {cause.sentence}' for cause in reasons)}"
@@ -66,18 +68,21 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
             f"Coulomb friction comes out as {inverse.value('coulomb'):.2g} {unit}, next to nothing: no friction in "
             "this force, a wrong --scale, or friction that a drive compensates"
         )
-    for name, first, second in halves(inverse) if plain.ratio > NOISY else ():
-        of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == name)
-        doubts.append(f"The halves of the record differ in {WORDS[name]}: {first:.4g} and {second:.4g} {of_it}")
+    differing = tuple(halves(inverse)) if plain.lacks_something else ()
+    for one in differing:
+        unit_of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == one.name)
+        values = f"{one.first:.4g} and {one.second:.4g} {unit_of_it}"
+        doubts.append(f"The halves of the record differ in {WORDS[one.name]}: {values}; its interval holds both")
     without = tuple(cause.without for cause in reasons if cause.without)
     force = float(np.sqrt(np.mean(log["force"][log.longest] ** 2)))
     best = min([inverse.error, *(model.error for model in without)])
-    unsettled = plain.ratio > NOISY and min(left / force, best) > UNSETTLED
+    unsettled = plain.lacks_something and min(left / force, best) > UNSETTLED
     return replace(
         plain,
         doubts=tuple(doubts),
         rejected=rejected,
         failed=poor and plain.whole_error > POOR,
+        halves=differing,
         without=without,
         spoilt=unsettled or any(cause.spoils for cause in reasons),
         unsettled=unsettled,

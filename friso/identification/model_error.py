@@ -33,7 +33,8 @@ def all_with_model_error(
 ) -> tuple[Estimate, ...]:
     """The estimates of a rigid stage with intervals that allow for what the model lacks. Of moves in one direction the
     model leaves out the constant force, which the stage turns against where it overshoots: none is narrower than that
-    of the inverse model."""
+    of the inverse model. What the inverse model does not know has intervals twice as wide where the fit lacks
+    something."""
     if is_free(flat):
         return tuple(estimates)
     sources, plain = _of_inverse(flat), {estimate.name: estimate for estimate in inverse.estimates}
@@ -42,9 +43,14 @@ def all_with_model_error(
     return tuple(
         with_model_error(estimate, plain[sources[estimate.name][0]], sources[estimate.name][1], quality.lacking, alike)
         if estimate.name in sources
-        else estimate
+        else _wider(estimate, TWICE if quality.lacks_something else 1.0)
         for estimate in estimates
     )
+
+
+def _wider(estimate: Estimate, times: float) -> Estimate:
+    more = (times - 1) * estimate.half_width
+    return replace(estimate, low=estimate.low - more, high=estimate.high + more) if estimate.determined else estimate
 
 
 def with_causes(
@@ -66,9 +72,7 @@ def with_causes(
             answer = Estimate.unknown(estimate.name, estimate.unit, estimate.method, SPOILT)
         for model in quality.without if name else ():
             answer = spanning(answer, *_rid_of(model, inverse, name), scale)
-        if quality.unsettled and answer.determined:
-            more = (TWICE - 1) * answer.half_width
-            answer = replace(answer, low=answer.low - more, high=answer.high + more)
+        answer = _wider(answer, TWICE if quality.unsettled else 1.0)
         kept += [answer.determined] if estimate.determined else []
         answers.append(answer)
     return tuple(answers), correlation[np.ix_(kept, kept)]
@@ -89,6 +93,20 @@ def spanning(estimate: Estimate, other: Estimate, further: float, scale: float) 
         return estimate
     low, high = sorted((scale * (other.low + min(further, 0.0)), scale * (other.high + max(further, 0.0))))
     return replace(estimate, low=min(estimate.low, low), high=max(estimate.high, high))
+
+
+def with_halves(estimates: Sequence[Estimate], flat: Mapping[str, Any], quality: Quality) -> tuple[Estimate, ...]:
+    """The estimates of a rigid stage, with intervals that hold what either half of the record says where the halves
+    differ: a load that changes, friction that rises."""
+    differing = {} if is_free(flat) else {one.name: one for one in quality.halves}
+    answers = []
+    for estimate in estimates:
+        name, scale = _of_inverse(flat).get(estimate.name, ("", 1.0))
+        if estimate.determined and name in differing:
+            ends = sorted((scale * differing[name].low, scale * differing[name].high))
+            estimate = replace(estimate, low=min(estimate.low, ends[0]), high=max(estimate.high, ends[1]))
+        answers.append(estimate)
+    return tuple(answers)
 
 
 def not_described(estimates: Sequence[Estimate]) -> tuple[tuple[Estimate, ...], np.ndarray]:
@@ -121,9 +139,10 @@ NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the 
 """Why nothing at all is taken from a fit."""
 
 TWICE = 2.0
-"""How many times as wide intervals are where much is left that nothing explains: of records of known machines with a
-filtered position or velocity, a reference in its place and the like, intervals of the mass missed it without, by up to
-1.8 half-widths."""
+"""How many times as wide intervals are where much is left that nothing explains, and those of slow friction where
+anything is: of records of known machines with a filtered position or velocity, a reference in its place, a resampled
+force and the like, intervals of the mass and of the Stribeck velocity missed the truth without, by up to 1.8
+half-widths."""
 
 SPOILT = "what is wrong with the record would pass for it"
 """Why nothing but what the inverse model shows is taken from a record with a delay, a filter and the like."""

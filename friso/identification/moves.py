@@ -15,8 +15,14 @@ from friso.identification.errors import Residual, SimulationErrors, errors_of, r
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion, unit_of
 from friso.identification.logs.log import Log
-from friso.identification.model_error import all_with_model_error, not_described, of_inverse_model, with_causes
-from friso.identification.output_error.changes import changes_of, reaching, sentences
+from friso.identification.model_error import (
+    all_with_model_error,
+    not_described,
+    of_inverse_model,
+    with_causes,
+    with_halves,
+)
+from friso.identification.output_error.changes import changes_beside, changes_of, inverse_reaching, reaching, sentences
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
@@ -95,9 +101,7 @@ def identify_moves(
     quality = quality_of(log, inverse, fit, noise, share)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, progress)
-    if (changes := changes_of(fit, moved.velocity)) is not None:
-        fit = reaching(fit, changes)
-        quality = replace(quality, doubts=(*quality.doubts, *sentences(fit, changes, log.unit("force"))))
+    fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
     estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
     if quality.failed:
         estimates, correlation = not_described(estimates)
@@ -106,12 +110,29 @@ def identify_moves(
     else:
         estimates = all_with_model_error(estimates, inverse, flat, quality)
     estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
+    estimates = with_halves(estimates, flat, quality)
     simulated = (loop or follows).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
         errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
         residual_of(fit.residual, moved, log.sample_time), loop, quality,
     )  # fmt: skip
+
+
+def _with_changes(
+    fit: OutputErrorFit, inverse: InverseModel, quality: Quality, velocity: np.ndarray, unit: str
+) -> tuple[OutputErrorFit, InverseModel, Quality]:
+    """The model that estimates are taken from with intervals that allow for what changes during the record, and the
+    quality that says so; `velocity` [m/s] is smooth, `unit` that of the force."""
+    changes = changes_beside(inverse) if quality.rejected else changes_of(fit, velocity)
+    if changes is None:
+        return fit, inverse, quality
+    if quality.rejected:
+        inverse = inverse_reaching(inverse, changes)
+    else:
+        fit = reaching(fit, changes)
+    sentences = changes.sentences(inverse.value("coulomb"), unit)
+    return fit, inverse, replace(quality, doubts=(*quality.doubts, *sentences))
 
 
 @dataclass(frozen=True)

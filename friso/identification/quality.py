@@ -12,9 +12,25 @@ import numpy as np
 from friso.identification.inverse_model import InverseModel
 from friso.identification.readings.common import NORMAL_MAD
 from friso.identification.spread import spread_of
+from friso.intervals import COVERAGE
+
+NOISY = 10.0
+"""A fit that leaves so many times the noise of the record lacks something, and says so."""
 
 APART = 3.29
 """Standard deviations by which the halves of a record differ by chance once in a thousand times."""
+
+
+@dataclass(frozen=True)
+class Halves:
+    """A quantity of the inverse model, `name`, that differs between both halves of a record: its values there, and the
+    interval that holds those of either."""
+
+    name: str
+    first: float
+    second: float
+    low: float
+    high: float
 
 
 @dataclass(frozen=True)
@@ -22,9 +38,9 @@ class Quality:
     """`noise` [N] of the record's force; `left` [N], RMS of what the fit leaves of it where it counts, and what `noise`
     alone would leave there; relative errors of the force by the inverse model, and on its samples by the steady
     friction and mass of the whole model; sentences that say what is wrong (`doubts`); whether the whole model was
-    `rejected`, and whether nothing holds (`failed`); the inverse models `without` a cause, of a log rid of what may be
-    wrong with it; whether the record is `spoilt`, so that what is wrong with it passes for slow friction, and whether
-    much is left that is `unsettled`: for which no cause was found."""
+    `rejected`, and whether nothing holds (`failed`); the quantities whose `halves` differ; the inverse models `without`
+    a cause, of a log rid of what may be wrong with it; whether the record is `spoilt`, so that what is wrong with it
+    passes for slow friction, and whether much is left that is `unsettled`: for which no cause was found."""
 
     noise: float
     left: float
@@ -34,6 +50,7 @@ class Quality:
     doubts: tuple[str, ...] = ()
     rejected: bool = False
     failed: bool = False
+    halves: tuple[Halves, ...] = ()
     without: tuple[InverseModel, ...] = ()
     spoilt: bool = False
     unsettled: bool = False
@@ -42,6 +59,10 @@ class Quality:
     def ratio(self) -> float:
         """What is left over what noise alone would leave."""
         return self.left / self.noise_left if self.noise_left > 0 else np.inf
+
+    @property
+    def lacks_something(self) -> bool:
+        return self.ratio > NOISY
 
     @property
     def lacking(self) -> float:
@@ -85,9 +106,8 @@ def _by_direction(flat: Mapping[str, Any], speed: np.ndarray, sign: np.ndarray) 
     return forward * (1 + sign) / 2 - backward * (1 - sign) / 2 - constant
 
 
-def halves(inverse: InverseModel) -> list[tuple[str, float, float]]:
-    """Name and the values of mass, viscous and Coulomb friction in both halves of a record, where these differ by more
-    than their spreads."""
+def halves(inverse: InverseModel) -> list[Halves]:
+    """Mass, viscous and Coulomb friction, where they differ by more than their spreads."""
     names = ("mass", "viscous", "coulomb")
     parts = np.array_split(np.arange(len(inverse.measured)), 2)
     fits = []
@@ -95,10 +115,11 @@ def halves(inverse: InverseModel) -> list[tuple[str, float, float]]:
         columns, force = inverse.columns[part], inverse.measured[part]
         solution = np.linalg.lstsq(columns, force, rcond=None)[0]
         fits.append((solution, np.sqrt(np.diag(spread_of(columns, force - columns @ solution)))))
-    (first, off), (second, off_too) = fits
-    apart = np.abs(first - second) > APART * np.hypot(off, off_too)
+    values, off = (np.array(rows) for rows in zip(*fits, strict=True))
+    apart = np.abs(values[0] - values[1]) > APART * np.hypot(*off)
+    low, high = (values - COVERAGE * off).min(axis=0), (values + COVERAGE * off).max(axis=0)
     return [
-        (name, float(first[i]), float(second[i]))
+        Halves(name, *(float(number) for number in (*values[:, i], low[i], high[i])))
         for i, name in enumerate(names)
-        if apart[i] and np.isfinite([off[i], off_too[i]]).all()
+        if apart[i] and np.isfinite(off[:, i]).all()
     ]

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
+from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.fit import ALIKE, OutputErrorFit
 from friso.identification.spread import correlation_length
 from friso.intervals import COVERAGE
@@ -23,8 +24,6 @@ SURE = 0.999
 WORTH_TELLING = 0.1
 """Share of Coulomb friction by which something has to change to be named."""
 
-FRICTION, CONSTANT = "friction", "the constant force"
-
 
 @dataclass(frozen=True)
 class Changes:
@@ -34,6 +33,18 @@ class Changes:
     moved: np.ndarray
     friction: float
     constant: float
+
+    def sentences(self, coulomb: float, unit: str) -> list[str]:
+        """What changes, where that is much beside Coulomb friction [N]; `unit` is that of the force."""
+        return [
+            f"{what} changes by {size:.2g} {unit} during the record ({cause}): intervals reach from its least to its "
+            "largest"
+            for what, size, cause in (
+                ("Friction", self.friction, "warming up?"),
+                ("The constant force", self.constant, "a drift of the force?"),
+            )
+            if size > WORTH_TELLING * coulomb
+        ]
 
 
 def changes_of(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
@@ -50,23 +61,36 @@ def changes_of(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
     ((rest, slopes),) = problem.jacobians(fit.inner[None], free[None])
     way = np.clip(velocity / (CREEPING * np.abs(velocity).max()), -1.0, 1.0)
     unit = SMALL * fit.value("friction.coulomb")
-    bends = _bends(problem.counted)
+    bends = _bends(np.linspace(0.0, 1.0, len(rest)), problem.counted)
     forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
-    columns = [_effect(fit, rest, unit * force) / unit for force in forces]
-    every = np.column_stack([slopes, *columns])
+    effects = [_effect(fit, rest, unit * force) / unit for force in forces]
+    return _fitted(slopes, rest, effects, problem.counted)
+
+
+def changes_beside(inverse: InverseModel) -> Changes | None:
+    """The same for an inverse model of one friction for both directions."""
+    share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
+    counted = np.ones(len(share))
+    sign, ones = inverse.columns[:, 2], counted
+    effects = [-base * bend for base in (sign, ones) for bend in _bends(share, counted)]
+    return _fitted(-inverse.columns, inverse.measured - inverse.fitted, effects, counted)
+
+
+def _fitted(slopes: np.ndarray, rest: np.ndarray, effects: list[np.ndarray], counted: np.ndarray) -> Changes | None:
+    """Least squares of a residual, shape (n,), on its derivatives to fitted numbers, shape (n, numbers), and to changes
+    of friction and constant force, as many of the one as of the other, each of shape (n,)."""
+    every = np.column_stack([slopes, *effects])
     size = np.linalg.norm(every, axis=0)
     if not (np.isfinite(every).all() and (size > 0).all()):
         return None
     solution = np.linalg.lstsq(every / size, -rest, rcond=ALIKE)[0] / size
     left = rest + every @ solution
-    independent = max(float(problem.counted.sum()), 1.0) / correlation_length(left)
-    if rest @ rest <= left @ left * (1 + chi2.ppf(SURE, len(forces)) / independent):
+    independent = max(float(counted.sum()), 1.0) / correlation_length(left)
+    if rest @ rest <= left @ left * (1 + chi2.ppf(SURE, len(effects)) / independent):
         return None
-    count = len(fit.free)
-    friction, constant = (
-        float(np.ptp([0.0, *solution[first : first + len(bends)]])) for first in (count, count + len(bends))
-    )
-    return Changes(solution[:count], friction, constant)
+    moved, levels = np.split(solution, [slopes.shape[1]])
+    friction, constant = (float(np.ptp([0.0, *part])) for part in np.split(levels, 2))
+    return Changes(moved, friction, constant)
 
 
 def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
@@ -84,20 +108,19 @@ def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
     return replace(fit, covariance=fit.covariance * np.outer(wider, wider))
 
 
-def sentences(fit: OutputErrorFit, changes: Changes, unit: str) -> list[str]:
-    """What changes, where that is worth telling; `unit` is that of the force."""
-    least = WORTH_TELLING * fit.value("friction.coulomb")
-    return [
-        f"{name[0].upper()}{name[1:]} changes by {size:.2g} {unit} during the record (warming up, a drift): intervals "
-        "reach from its least to its largest"
-        for name, size in ((FRICTION, changes.friction), (CONSTANT, changes.constant))
-        if size > least
-    ]
+def inverse_reaching(inverse: InverseModel, changes: Changes) -> InverseModel:
+    """The inverse model with intervals that reach as far."""
+    over = {"coulomb": changes.friction / 2, "offset": changes.constant / 2}
+    answers = []
+    for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):
+        further = moved + over.get(estimate.name, 0.0) if estimate.determined else 0.0
+        answers.append(replace(estimate, low=estimate.low - further, high=estimate.high + further))
+    return replace(inverse, estimates=tuple(answers))
 
 
-def _bends(counted: np.ndarray) -> list[np.ndarray]:
-    """What is 1 in the middle of a record, and what is 1 at its end, lines in between, less their means, (n,)."""
-    share = np.linspace(0.0, 1.0, len(counted))
+def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
+    """What is 1 in the middle of a record, and what is 1 at its end, lines in between, less their means, at shares of
+    its time, shape (n,)."""
     shapes = 1 - np.abs(2 * share - 1), np.maximum(2 * share - 1, 0.0)
     return [shape - np.average(shape, weights=counted) for shape in shapes]
 
