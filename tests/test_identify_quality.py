@@ -17,13 +17,23 @@ from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
-from friso.identification.model_error import all_with_model_error, of_inverse_model, with_causes, with_model_error
+from friso.identification.model_error import (
+    all_with_model_error,
+    of_inverse_model,
+    with_causes,
+    with_halves,
+    with_model_error,
+)
+from friso.identification.output_error.changes import changes_beside, inverse_reaching
+from friso.identification.output_error.fit import OutputErrorFit, first_values
 from friso.identification.output_error.parameters import FitParameter, parameters_of
 from friso.identification.output_error.problem import tracking
+from friso.identification.output_error.repeated import as_far_off_as_repeated
 from friso.identification.quality import Quality, halves, noise_of, whole_error
 from friso.identification.readings.common import record
 from friso.identification.spread import groups_of, spread_of
 from friso.identification.stage_file import NOT_IDENTIFIED, identified, made_up, origins, with_origins, written
+from friso.progress import silent
 from friso.views.identify.numbers import interval_text, value_text
 
 DT = 1e-3
@@ -141,9 +151,41 @@ def test_halves_that_differ_are_named() -> None:
     count = len(log.time) // 2
     force = np.concatenate([log["force"][:count], other["force"][count:]])
     assert not halves(inverse_model(log, 5.0))
-    apart = {name: (one, two) for name, one, two in halves(inverse_model(replace(log, signals={
-        **log.signals, "force": force}), 5.0))}  # fmt: skip
-    assert apart["coulomb"] == pytest.approx((COULOMB, 2 * COULOMB), rel=0.1)
+    differing = tuple(halves(inverse_model(replace(log, signals={**log.signals, "force": force}), 5.0)))
+    (apart,) = (one for one in differing if one.name == "coulomb")
+    assert (apart.first, apart.second) == pytest.approx((COULOMB, 2 * COULOMB), rel=0.1)
+    sure = Estimate.normal("friction.coulomb", "N", 1.5 * COULOMB, 0.01, "output error")
+    quality = Quality(0.05, 5.0, 0.05, 0.1, 0.1, halves=differing)
+    (fair,) = with_halves([sure], {"masses.cart": MASS}, quality)
+    assert fair.holds(COULOMB)
+    assert fair.holds(2 * COULOMB)
+    assert fair.value == sure.value
+
+
+def test_a_log_that_changes_while_it_is_taken_says_so_and_its_intervals_hold_it_all() -> None:
+    log = axis()
+    assert changes_beside(inverse_model(log, 5.0)) is None
+    warmer = np.sign(np.gradient(log["position"])) * np.where(log.time > 3, 3.0, 0.0)
+    inverse = inverse_model(replace(log, signals={**log.signals, "force": log["force"] + warmer + 0.5 * log.time}), 5.0)
+    changes = changes_beside(inverse)
+    assert changes is not None
+    assert changes.friction == pytest.approx(3.0, rel=0.4)
+    assert changes.constant == pytest.approx(0.5 * 8, rel=0.2)
+    answers = {one.name: one for one in inverse_reaching(inverse, changes).estimates}
+    for name, levels in {"coulomb": (COULOMB, COULOMB + 3), "offset": (OFFSET, OFFSET + 4)}.items():
+        assert all(answers[name].holds(level) for level in levels)
+    assert answers["mass"].holds(MASS)
+    assert answers["viscous"].holds(VISCOUS)
+
+
+def test_slow_friction_of_a_fit_that_lacks_something_is_less_certain() -> None:
+    log = axis()
+    inverse, flat = inverse_model(log, 5.0), made_up(log, inverse_model(log, 5.0)).flat()
+    stribeck = Estimate.normal("friction.stribeck_velocity", "m/s", 2e-3, 1e-4, "output error")
+    good = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+    assert all_with_model_error([stribeck], inverse, flat, good) == (stribeck,)
+    (wide,) = all_with_model_error([stribeck], inverse, flat, replace(good, left=1.0))
+    assert wide.half_width == pytest.approx(2 * stribeck.half_width)
 
 
 def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_rest() -> None:
@@ -330,6 +372,22 @@ def test_rests_do_not_count_for_a_stage_that_follows_the_log() -> None:
     assert problem.counted[1000:7000].mean() > 0.99
     assert problem.counted[8200:].max() == 0
     assert 0 < problem.passes < 1
+
+
+def test_a_fit_is_no_surer_than_fits_of_simulated_logs_are_off() -> None:
+    log = axis(seconds=4.0)
+    flat = made_up(log, inverse_model(log, 5.0)).flat()
+    problem = tracking(flat, log, log.segments[0], [one for one in _parameters(flat) if one.core], 5.0)
+    free = tuple(range(len(problem.parameters)))
+    sure = OutputErrorFit(problem, first_values(problem.parameters), free, 1e-8 * np.eye(len(free)), np.zeros(1))
+    quiet, noisy = (
+        np.sqrt(np.diag(as_far_off_as_repeated(sure, log, log.segments[0], 5.0, noise, silent).covariance))
+        for noise in (0.0, 30.0)
+    )
+    assert (quiet >= 1e-4).all()
+    coulomb = [parameter.name for parameter in problem.parameters].index("friction.coulomb")
+    assert noisy[coulomb] > 2 * quiet[coulomb]
+    assert noisy[coulomb] > 0.5 * 30.0 / math.sqrt(len(log.time)) / COULOMB
 
 
 def _parameters(flat: dict[str, Any]) -> list[FitParameter]:

@@ -13,7 +13,7 @@ from scipy.io import savemat
 from friso.errors import InputError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
-from friso.identification.logs.checks import clipped_share, held, unwrapped
+from friso.identification.logs.checks import clipped_share, held, interpolated, unwrapped
 from friso.identification.logs.delays import fitted_lag, in_blocks, lag
 from friso.identification.logs.excerpt import excerpt
 from friso.identification.logs.gaps import GapsError
@@ -327,6 +327,16 @@ def test_values_held(tmp_path: Path, wording: Wording) -> None:
     assert held(M["position"]) == 1
     log = log_of(tmp_path, NAMES, [*columns()[:3], np.repeat(M["force"][::5], 5)])
     wording("\n".join(log.warnings))
+
+
+def test_a_signal_that_was_interpolated_is_told(tmp_path: Path) -> None:
+    instants = np.arange(len(M["force"]))
+    slower = np.interp(instants, instants[::4], M["force"][::4])
+    assert interpolated(slower) == 4
+    assert interpolated(M["force"]) == 1
+    assert interpolated(np.repeat(M["force"][::4], 4)) == 1
+    log = log_of(tmp_path, NAMES, [*columns()[:3], slower])
+    assert told(log.warnings, "straight lines of 4 samples")
 
 
 @pytest.mark.parametrize(

@@ -136,10 +136,14 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
-    n = checks.held(values)
-    if n > 1:
+    if (n := checks.held(values)) > 1:
         notes.warnings.append(
             f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
+        )
+    elif role not in ("reference", "disturbance") and (n := checks.interpolated(values)) > 1:
+        notes.warnings.append(
+            f"{role}: {choice.channel.name} runs in straight lines of {n} samples: it is sampled {n} times slower and "
+            "interpolated"
         )
     return channel_track
 

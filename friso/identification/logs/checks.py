@@ -10,6 +10,10 @@ CLIPPED, REPEATED = 1e-3, 0.01
 """Share of the samples in flat tops above which a signal is reported as clipped, and of those that repeat the one
 before up to which it hardly ever repeats a value."""
 
+SLOWEST, ALL = 20, 0.999
+"""Times slower than the log at most that a signal may have been sampled, and share of its bends that count as all: the
+rest is rounding."""
+
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """A channel without samples that repeat the one before, stamp [s] and value; and how many there were.
@@ -91,7 +95,20 @@ def held(values: np.ndarray) -> int:
         return 1
     gaps = np.diff(changes)
     n = int(np.gcd.reduce(gaps))
-    return n if 1 < n <= 20 else 1
+    return n if 1 < n <= SLOWEST else 1
+
+
+def interpolated(values: np.ndarray) -> int:
+    """Over how many samples a signal runs in straight lines, 1 where it does not: its bends all fall on every n-th
+    sample, n up to 20, as those of a slower signal that was resampled."""
+    bends = np.abs(np.diff(values, 2))
+    if bends.size < 50 * SLOWEST or not bends.any():
+        return 1
+    for n in range(SLOWEST, 1, -1):
+        whole = bends[: bends.size // n * n].reshape(-1, n)
+        if whole.sum(axis=0).max() > ALL * whole.sum() and np.count_nonzero(whole.max(axis=1)) >= 50:
+            return n
+    return 1
 
 
 def velocity_factor(
