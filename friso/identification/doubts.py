@@ -52,13 +52,8 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         )
     if poor:
         why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN
-<<<<<<< HEAD
         doubts.append(f"A mass with friction leaves {percent(inverse.error, 3)} of the force unexplained: {why}")
-    elif not rejected and plain.ratio > NOISY:
-=======
-        doubts.append(f"A mass with friction leaves {100 * inverse.error:.3g} % of the force unexplained: {why}")
     elif not rejected and plain.lacks_something:
->>>>>>> 6364c60 (Identify: intervals hold both halves where they differ, and are wider for slow friction where something is lacking)
         doubts.append(
             f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "
             f"lacks something, for which the intervals allow{''.join(f'; {cause.sentence}' for cause in reasons)}"

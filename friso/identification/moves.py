@@ -22,7 +22,7 @@ from friso.identification.model_error import (
     with_causes,
     with_halves,
 )
-from friso.identification.output_error.changes import changes_beside, changes_of, inverse_reaching, reaching, sentences
+from friso.identification.output_error.changes import changes_beside, changes_of, inverse_reaching, reaching
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
