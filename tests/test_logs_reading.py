@@ -336,7 +336,7 @@ def test_a_signal_that_was_interpolated_is_told(tmp_path: Path) -> None:
     assert interpolated(M["force"]) == 1
     assert interpolated(np.repeat(M["force"][::4], 4)) == 1
     log = log_of(tmp_path, NAMES, [*columns()[:3], slower])
-    assert told(log.warnings, "straight lines of 4 samples")
+    assert recognised(log.warnings, "straight lines of 4 samples")
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,8 @@ def as_far_off_as_repeated(
     off = np.sqrt(np.mean([(inner - once.inner)[free] ** 2 for inner in again], axis=0))
     off = off * float(student.ppf(CONFIDENCE, TIMES)) / COVERAGE
     deviation = np.sqrt(np.diag(once.covariance))
-    known = np.isfinite(deviation) & (deviation > 0)
-    wider = np.divide(np.maximum(off, deviation), deviation, out=np.ones_like(off), where=known)
+    finite = np.isfinite(deviation) & (deviation > 0)
+    wider = np.divide(np.maximum(off, deviation), deviation, out=np.ones_like(off), where=finite)
     return replace(once, covariance=once.covariance * np.outer(wider, wider))
 
 
