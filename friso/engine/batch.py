@@ -13,6 +13,7 @@ from friso.engine.allowance import current_allowance
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, new_queue
 from friso.engine.kernel import Kernel, empty_results
 from friso.engine.layout import LANES
+from friso.engine.overtaken import current_flag, go_on
 from friso.equations import motion
 from friso.equations.roles import Steady
 from friso.system import usable_cores
@@ -199,16 +200,19 @@ def options_of(options: RunOptions) -> Settings:
         outer=float(options.bands[1]),
         record_from=float(options.record_from),
         interval=float(options.interval or np.inf),
-        cancel=np.zeros(1, np.int64) if options.cancel is None else options.cancel,
+        cancel=current_flag() if options.cancel is None else options.cancel,
     )
 
 
 def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
-    """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock."""
+    """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock. Raises
+    Overtaken where nobody waits for them any more."""
+    go_on()
     workers = min(threads or usable_cores(), -(-len(batch.starts) // LANES))
     arguments = (new_queue(), batch, settings, results)
     if workers == 1:
         kernel.run(*arguments)
+        go_on()
         return
     with ThreadPoolExecutor(workers) as pool:
         try:
@@ -217,3 +221,4 @@ def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results
         except BaseException:
             settings.cancel[0] = 1
             raise
+    go_on()

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 
 from friso.views.drawing.colours import ColourScale, painted, scale
 from friso.views.drawing.drawable import cell_edges, colour_key, line_key
@@ -62,13 +61,14 @@ def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, An
     if isinstance(field, Map):
         x, y = _cells(field.x, panel.x), _cells(field.y, panel.y)
         numbers_shown = None if values is field.codes else field.z
-        return go.Heatmap(x=x, y=y, z=values, customdata=numbers_shown, **colouring, **text, **place)
+        cells = {"type": "heatmap", "x": x, "y": y, "z": values, "customdata": numbers_shown}
+        return {**cells, **colouring, **text, **place}
     numbers_shown = np.isfinite(values)
     names = {"zmin": "cmin", "zmax": "cmax"}
     marker = {names.get(name, name): value for name, value in colouring.items()}
     marker |= {"color": values[numbers_shown], "size": 6, "line": {"color": GREY, "width": 0.4}}
     numbers = {"x": field.x[numbers_shown], "y": field.y[numbers_shown], "customdata": field.z[numbers_shown]}
-    return go.Scatter(mode="markers", marker=marker, **numbers, **text, **place)
+    return {"type": "scatter", "mode": "markers", "marker": marker, **numbers, **text, **place}
 
 
 def _cells(centres: Array, axis: Axis) -> Array:
@@ -98,7 +98,7 @@ def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str
     return colouring | {"colorbar": {"title": title, "thickness": 14, "outlinewidth": 0, **ticks, **bar}}
 
 
-def key_traces(figure: Figure, legend: str) -> list[go.Scatter]:
+def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
     """Traces without points that fill the common legend of all maps and clouds."""
     kinds, markers = colour_key(figure)
     square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
@@ -108,7 +108,8 @@ def key_traces(figure: Figure, legend: str) -> list[go.Scatter]:
     for line in line_key(figure):
         style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash]}
         styles.append((line.label, {"mode": "lines", "line": style}))
-    return [go.Scatter(x=[None], y=[None], name=html.escape(label), legend=legend, **style) for label, style in styles]
+    unseen = {"type": "scatter", "x": [None], "y": [None], "legend": legend}
+    return [{**unseen, "name": html.escape(label), **style} for label, style in styles]
 
 
 def footer(figure: Figure, legend: str) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:

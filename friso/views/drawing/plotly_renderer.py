@@ -73,6 +73,13 @@ def _single(part: Any) -> Any:
 
 def render(figure: Figure) -> go.Figure:
     """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
+    plain = parts(figure)
+    return go.Figure(plain["data"], {"template": "none", **plain["layout"]})
+
+
+def parts(figure: Figure) -> dict[str, Any]:
+    """What plotly draws, traces and layout, as plain dictionaries that hold NumPy arrays; not checked by plotly, which
+    takes ten times as long as to make them."""
     prepared = drawable(figure)
     plot = _plot_height(prepared)
     row = HEADER + plot + FOOTER
@@ -80,7 +87,6 @@ def render(figure: Figure) -> go.Figure:
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
     below, legend, note = footer(prepared, key)
     layout: dict[str, Any] = {
-        "template": "none",
         "height": height + TOP + below,
         "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
@@ -103,7 +109,7 @@ def render(figure: Figure) -> go.Figure:
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, HEADER / height, links)
         traces += _traces(panel, number, bar)
-    return go.Figure(data=traces + key_traces(prepared, key), layout=layout)
+    return {"data": traces + key_traces(prepared, key), "layout": layout}
 
 
 def _plot_height(figure: Figure) -> int:
@@ -202,22 +208,22 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     ]
 
 
-def _area(band: Band, place: dict[str, Any]) -> go.Scatter:
+def _area(band: Band, place: dict[str, Any]) -> dict[str, Any]:
     x, y = band.outline
     style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
-    return go.Scatter(x=x, y=y, name=html.escape(band.label), **style, **place)
+    return {"type": "scatter", "x": x, "y": y, "name": html.escape(band.label), **style, **place}
 
 
-def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
+def _line(line: Series, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
     style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
-    return go.Scatter(
-        x=line.x, y=line.y, mode="lines", line=style, connectgaps=False, **_text(line.label, panel), **place
-    )
+    drawn = {"type": "scatter", "x": line.x, "y": line.y, "mode": "lines", "line": style, "connectgaps": False}
+    return {**drawn, **_text(line.label, panel), **place}
 
 
-def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> go.Scatter:
+def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> dict[str, Any]:
     style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
-    return go.Scatter(x=marker.x, y=marker.y, mode="markers", marker=style, **_text(marker.label, panel), **place)
+    drawn = {"type": "scatter", "x": marker.x, "y": marker.y, "mode": "markers", "marker": style}
+    return {**drawn, **_text(marker.label, panel), **place}
 
 
 def _text(label: str, panel: Panel) -> dict[str, Any]:

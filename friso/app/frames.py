@@ -1,0 +1,50 @@
+"""What travels to the page: frames of a JSON text and of the numbers that it refers to, in binary.
+
+A frame is two whole numbers of four bytes, least significant first, the lengths of the text and of the numbers, and
+then both. In the text, an array is an object: {"array": place of its first byte, "shape": [...]}, of float32.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import struct
+from typing import Any
+
+import numpy as np
+
+from friso.views.drawing import plotly_renderer
+from friso.views.drawing.figure import Figure
+
+
+def frame(value: Any) -> bytes:
+    """A value of dictionaries, lists, texts, numbers and NumPy arrays, as a frame. What is not finite is null; in
+    arrays, NaN."""
+    arrays: list[bytes] = []
+    text = json.dumps(_plain(value, arrays), separators=(",", ":"), allow_nan=False).encode()
+    numbers = b"".join(arrays)
+    return struct.pack("<II", len(text), len(numbers)) + text + numbers
+
+
+def drawn(figure: Figure) -> dict[str, Any]:
+    """A figure as a page draws it: name, title, caption, and what plotly takes."""
+    return {
+        "name": figure.name,
+        "title": figure.title,
+        "caption": figure.caption,
+        **plotly_renderer.parts(figure),
+    }
+
+
+def _plain(value: Any, arrays: list[bytes]) -> Any:
+    if isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.size:
+        place = sum(map(len, arrays))
+        arrays.append(np.ascontiguousarray(value, "<f4").tobytes())
+        return {"array": place, "shape": [*value.shape]}
+    if isinstance(value, dict):
+        return {str(name): _plain(item, arrays) for name, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [_plain(item, arrays) for item in (value.tolist() if isinstance(value, np.ndarray) else value)]
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    return value.item() if isinstance(value, np.generic) else value

@@ -1,0 +1,109 @@
+"""Who is let in: the browser that was opened with the token, at the address that was printed, and nobody else."""
+
+from __future__ import annotations
+
+import secrets
+from dataclasses import dataclass, field
+from http.cookies import CookieError, SimpleCookie
+from urllib.parse import parse_qs
+
+from starlette.datastructures import Headers, MutableHeaders
+from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+POLICY = (
+    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; "
+    "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+)
+"""What a page may load: all from this server, scripts from their files alone. plotly.js makes style elements itself."""
+
+HEADERS = {
+    "Content-Security-Policy": POLICY,
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-store",
+}
+"""What goes with every response."""
+
+REFUSED = "friso app answers only the browser that was opened with the address it printed: open that address.\n"
+
+
+@dataclass(frozen=True)
+class Access:
+    """The names by which the server may be addressed, with the port, and the secrets of its token and its cookie."""
+
+    hosts: frozenset[str]
+    cookie: str
+    token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
+    session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
+
+    @classmethod
+    def at(cls, host: str, port: int) -> Access:
+        """The access to a server at this host and port; one on all addresses of the machine has any name."""
+        named = f"[{host}]" if ":" in host else host
+        names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
+        return cls(frozenset(f"{name}:{port}" for name in names), f"friso-{port}")
+
+    def is_host(self, host: str) -> bool:
+        """Whether the server goes by this name: another one was made to lead here."""
+        return host in self.hosts
+
+    def is_origin(self, origin: str | None) -> bool:
+        """Whether a request comes from a page of this server, or from no page at all."""
+        return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
+
+    def has_token(self, query: bytes) -> bool:
+        """Whether an address has the token."""
+        tokens = parse_qs(query.decode("latin-1")).get("token", [])
+        return len(tokens) == 1 and _same(tokens[0], self.token)
+
+    def has_cookie(self, header: str) -> bool:
+        """Whether a request has the cookie."""
+        try:
+            cookies = SimpleCookie(header)
+        except CookieError:
+            return False
+        return self.cookie in cookies and _same(cookies[self.cookie].value, self.session)
+
+
+LOOPBACK = ("127.0.0.1", "localhost", "::1")
+"""The names of this machine that no other machine can reach."""
+
+
+class Gate:
+    """Lets requests through to an application that have an access, and refuses all others with 403."""
+
+    def __init__(self, application: ASGIApp, access: Access) -> None:
+        self.application, self.access = application, access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request: let it in, hand it a cookie for its token, or refuse it."""
+        if scope["type"] == "lifespan":
+            await self.application(scope, receive, send)
+            return
+
+        async def guarded(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                MutableHeaders(scope=message).update(HEADERS)
+            await send(message)
+
+        refusal = self._refusal(scope) if scope["type"] == "http" else PlainTextResponse(REFUSED, 403)
+        await (refusal or self.application)(scope, receive, guarded)
+
+    def _refusal(self, scope: Scope) -> Response | None:
+        headers, access = Headers(scope=scope), self.access
+        if not access.is_host(headers.get("host", "")) or not access.is_origin(headers.get("origin")):
+            return PlainTextResponse(REFUSED, 403)
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and scope["path"] != "/":
+            return PlainTextResponse(REFUSED, 403)
+        if scope["path"] == "/" and access.has_token(scope["query_string"]):
+            response = RedirectResponse("/", 303)
+            response.set_cookie(access.cookie, access.session, httponly=True, samesite="strict", path="/")
+            return response
+        return None if access.has_cookie(headers.get("cookie", "")) else PlainTextResponse(REFUSED, 403)
+
+
+def _same(one: str, other: str) -> bool:
+    return secrets.compare_digest(one.encode(), other.encode())

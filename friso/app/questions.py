@@ -1,0 +1,205 @@
+"""The questions that a page asks: each is answered by the function of friso of that name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any
+
+import friso
+from friso.app import machine as machines
+from friso.app.frames import drawn
+from friso.app.ghosts import ghosts_of, with_places
+from friso.app.lines import command_line, python_line
+from friso.app.machine import Machine
+from friso.axis import speaking_of
+from friso.errors import InputError
+from friso.stage import Stage
+from friso.stage.stage import numeric_keys
+from friso.views.drawing.figure import Figure
+
+if TYPE_CHECKING:
+    from friso.answers.answer import Answer
+    from friso.app.work import Work
+
+Part = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a page asks about: the machine shown, the one that is `pinned` beside it or None, and the options."""
+
+    machine: Machine
+    pinned: Machine | None
+    options: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, data: Mapping[str, Any]) -> Asked:
+        """What a request holds. Raises InputError."""
+        options = data.get("options") or {}
+        if not isinstance(options, Mapping):
+            raise InputError("options", type(options).__name__, "options by name")
+        pinned = data.get("pinned")
+        return cls(Machine.of(data.get("machine")), None if pinned is None else Machine.of(pinned), options)
+
+    def chosen(self, *names: str) -> dict[str, Any]:
+        """The options of these names that are given: texts, numbers, true or false. Raises InputError for others."""
+        for name, value in self.options.items():
+            if name not in names or not isinstance(value, str | int | float | bool | None):
+                raise InputError("options", name, f"one of {', '.join(names) or 'none'}, a text or a number")
+        return {name: value for name, value in self.options.items() if value not in (None, "")}
+
+
+def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any) -> Part:
+    """An answer as a page shows it, each figure with what is shown `beside`."""
+    with speaking_of(answer.axis_kind):
+        figures = [drawn(beside(figure)) for figure in answer.figures()]
+        return {
+            "kind": "answer",
+            "sentences": [*answer.sentences()],
+            "tables": [{"title": item.title, "columns": item.columns, "rows": item.rows} for item in answer.tables()],
+            "details": [*answer.details()],
+            "failure": answer.failure,
+            "figures": figures,
+            **more,
+        }
+
+
+def machine(asked: Asked, work: Work) -> Iterator[Part]:
+    """The keys of the machine."""
+    yield {"kind": "answer", **machines.shown(asked.machine)}
+
+
+def run(asked: Asked, work: Work) -> Iterator[Part]:
+    """What the run does."""
+    pinned = None if asked.pinned is None else _run(asked.pinned)
+    yield parts_of(_run(asked.machine), ghosts_of(pinned), **_lines("simulate", asked))
+
+
+def verdict(asked: Asked, work: Work) -> Iterator[Part]:
+    """The verdict by the cycles that attract, in a word for each case: a map of a single cell, or one over the joint
+    locked and free."""
+    stage = asked.machine.stage
+    key, cases = _cases(stage)
+    runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
+    words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
+    yield {"kind": "answer", "verdicts": words, "given": _given(stage)}
+
+
+def check(asked: Asked, work: Work) -> Iterator[Part]:
+    """Does it hunt: every case, with its margin."""
+    options = asked.chosen("draws")
+    answer = friso.check(asked.machine.stage, **options, progress=work.progress)
+    pinned = None if asked.pinned is None else _check(asked.pinned)
+    cases = {name: case.verdict for name, case in answer.result.items()}
+    more = {"verdicts": cases, "given": _given(asked.machine.stage), **_lines("check", asked, options)}
+    yield parts_of(answer, ghosts_of(pinned), **more)
+
+
+def bode(asked: Asked, work: Work) -> Iterator[Part]:
+    """The loop in the limit cases."""
+    pinned = None if asked.pinned is None else friso.bode(asked.pinned.stage)
+    answer = friso.bode(asked.machine.stage, progress=work.progress)
+    yield parts_of(answer, ghosts_of(pinned), **_lines("bode", asked))
+
+
+def flexure(asked: Asked, work: Work) -> Iterator[Part]:
+    """The leaf springs."""
+    pinned = asked.pinned and asked.pinned.stage
+    ghost = friso.flexure(pinned) if pinned and pinned.flexure else None
+    answer = friso.flexure(asked.machine.stage, progress=work.progress)
+    drawing = answer.files()["flexure_drawing.svg"]
+    yield parts_of(answer, ghosts_of(ghost), drawing=drawing, **_lines("flexure", asked))
+
+
+COARSE_TO_FINE = (6, 21, 41)
+"""Points along each axis of a map, one picture after the other."""
+
+
+def map_study(asked: Asked, work: Work) -> Iterator[Part]:
+    """A map over two keys, coarse to fine; where the machine stands in it, and the pinned one."""
+    options = asked.chosen("x", "y", "metric")
+    axes = {name: options.get(name, "") for name in ("x", "y")}
+    keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
+    metric = options.get("metric", "outcome")
+    stands = [("this machine", asked.machine.stage)]
+    stands += [("pinned", asked.pinned.stage)] if asked.pinned else []
+    for count in COARSE_TO_FINE:
+        ranges = {name: f"{text}:{count}" for name, text in axes.items()}
+        answer = friso.sweep(asked.machine.stage, **ranges, metric=metric, progress=work.progress)
+        places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
+        more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, "metric": metric}, "sweep")}
+        part = parts_of(answer, partial(with_places, stands=stands, keys=[*keys.values()]), **more)
+        yield part if count == COARSE_TO_FINE[-1] else {**part, "kind": "partly"}
+
+
+def boundary(asked: Asked, work: Work) -> Iterator[Part]:
+    """Where hunting ends, over one key or in the plane of two."""
+    options = asked.chosen("x", "y")
+    answer = friso.boundary(asked.machine.stage, **options, progress=work.progress)
+    yield parts_of(answer, **_lines("boundary", asked, options))
+
+
+def tune(asked: Asked, work: Work) -> Iterator[Part]:
+    """What stops it: the ways, and the stage of each that works."""
+    options = asked.chosen("within", "settle", "force_limit", "bandwidth_limit", "only", "keep")
+    answer = friso.tune(asked.machine.stage, **options, progress=work.progress)
+    ways = [{"name": cure.name, "toml": cure.stage.to_toml()} for cure in answer.working]
+    yield parts_of(answer, ways=ways, **_lines("tune", asked, options))
+
+
+def design(asked: Asked, work: Work) -> Iterator[Part]:
+    """What stops it: an isolator with its leaf springs."""
+    answer = friso.design(asked.machine.stage, progress=work.progress)
+    ways = [{"name": "design", "toml": answer.stage.to_toml()}]
+    yield parts_of(answer, ways=ways, **_lines("design", asked))
+
+
+QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[Part]]] = {
+    "machine": machine,
+    "run": run,
+    "verdict": verdict,
+    "check": check,
+    "bode": bode,
+    "flexure": flexure,
+    "map": map_study,
+    "boundary": boundary,
+    "tune": tune,
+    "design": design,
+}
+"""The questions by name."""
+
+ANSWERS: Mapping[str, str] = {"run": "simulate", "map": "sweep"}
+"""The functions of friso for questions of another name, whose files the page hands out."""
+
+
+def _lines(command: str, asked: Asked, options: Mapping[str, Any] | None = None, function: str = "") -> Part:
+    given = options or {}
+    line = python_line(function or command, asked.machine, given)
+    return {"command": command_line(command, asked.machine, given), "python": line}
+
+
+@lru_cache(8)
+def _run(which: Machine) -> Any:
+    return friso.simulate(which.stage)
+
+
+@lru_cache(2)
+def _check(which: Machine) -> Any:
+    return friso.check(which.stage)
+
+
+def _given(stage: Stage) -> str:
+    """Which of the cases is the stage as it is given."""
+    return "given" if stage.joint is None else "locked" if stage.joint.locked else "free"
+
+
+def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
+    """A key, and the value of it in each case."""
+    if stage.joint is not None:
+        values = {"locked": True, "free": False}
+        cases = {name: values[name] for name in stage.variants() if name in values}
+        return "joint.locked", cases
+    key, flat = "masses.stage" if stage.masses.stage is not None else "masses.cart", stage.flat()
+    return key, {"given": f"{flat[key]!r} {numeric_keys(flat)[key].unit}"}

@@ -1,0 +1,58 @@
+"""Starts the server and opens the browser."""
+
+from __future__ import annotations
+
+import socket
+import webbrowser
+from pathlib import Path
+
+import uvicorn
+
+from friso.app.gate import LOOPBACK, Access
+from friso.app.server import application
+from friso.errors import InputError
+from friso.stage.files import load, text_of
+
+PORT = 8741
+"""The port unless another one is asked for: browsers keep what a page holds by its port."""
+
+TRIES = 20
+"""Ports that are tried beyond it, where it is taken."""
+
+
+def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:
+    """Serve the page until it is interrupted, and print its address. Raises InputError for a stage file that cannot be
+    read, a host that others can reach without `insecure`, and where no port is free."""
+    begin = None
+    if stage is not None:
+        load(stage)
+        begin = {"name": stage.name, "text": text_of(stage, "a stage file")}
+    if host not in LOOPBACK and not insecure:
+        expected = "127.0.0.1, or --insecure: whoever reads the network sees all, and uses this machine"
+        raise InputError("--host", host, expected, "--host 127.0.0.1")
+    listener = _listener(host, port)
+    own = listener.getsockname()[1]
+    access = Access.at(host, own)
+    named = f"[{host}]" if ":" in host else host
+    address = f"http://{named}:{own}/?token={access.token}"
+    print(f"friso app: {address}\nCtrl-C ends it.", flush=True)
+    if browser:
+        webbrowser.open(address)
+    config = uvicorn.Config(application(access, begin), log_level="warning", ws="none", lifespan="on")
+    uvicorn.Server(config).run([listener])
+
+
+def _listener(host: str, port: int | None) -> socket.socket:
+    """A socket at a port that is free: the one asked for, or the next from the usual one on. Raises InputError."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    wanted = [port] if port is not None else [*range(PORT, PORT + TRIES)]
+    problem = ""
+    for number in wanted:
+        listener = socket.socket(family)
+        try:
+            listener.bind((host, number))
+            return listener
+        except OSError as error:
+            problem = str(error.strerror or error).lower()
+            listener.close()
+    raise InputError("--port", f"{wanted[0]} on {host}: {problem}", "a port that is free", f"--port {PORT + TRIES}")

@@ -1,0 +1,101 @@
+"""The server of the page: its files, its questions, its uploads, and what it hands out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from importlib.resources import files
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response, StreamingResponse
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from friso.app.gate import Access, Gate
+from friso.app.questions import QUESTIONS, Asked
+from friso.app.work import Workshop
+from friso.errors import InputError
+
+MOST_BYTES = 8_000_000
+"""Size of a question at most: a stage file is of 4 MB at most, and another one may be pinned."""
+
+KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
+
+BINARY = "application/octet-stream"
+
+
+def application(access: Access, begin: dict[str, str] | None = None) -> ASGIApp:
+    """The server for those who have an access; `begin`: name and text of the stage file that it is started with."""
+    workshop = Workshop()
+
+    async def ask(request: Request) -> Response:
+        name = request.path_params["question"]
+        if name not in QUESTIONS:
+            return _refused(f"there is no question {name[:40]!r}", 404)
+        try:
+            data = await _json(request)
+            asked = Asked.of(data)
+        except InputError as error:
+            return _refused(str(error), 422)
+        page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
+        return StreamingResponse(
+            workshop.answer(page, lane, lambda work: QUESTIONS[name](asked, work)), media_type=BINARY
+        )
+
+    async def started_with(request: Request) -> Response:
+        return JSONResponse(begin or {})
+
+    @asynccontextmanager
+    async def lifespan(_: Starlette) -> AsyncIterator[None]:
+        with workshop.listening():
+            yield
+        workshop.close()
+
+    routes = [
+        Route("/ask/{question}", ask, methods=["POST"]),
+        Route("/begin", started_with),
+        Route("/plotly.js", _plotly),
+        Route("/", _page),
+        Route("/{file}", _page),
+    ]
+    return Gate(Starlette(routes=routes, lifespan=lifespan), access)
+
+
+async def _page(request: Request) -> Response:
+    """A file of the page, by its plain name."""
+    name = request.path_params.get("file", "index.html")
+    held = {item.name: item for item in files("friso.app").joinpath("page").iterdir() if item.is_file()}
+    suffix = name[name.rfind(".") :]
+    if name not in held or suffix not in KINDS:
+        return _refused("there is no such page", 404)
+    return Response(held[name].read_bytes(), media_type=KINDS[suffix])
+
+
+async def _plotly(request: Request) -> Response:
+    """plotly.js as the package plotly has it; browsers may keep it, for it is another one with another version."""
+    return Response(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes(), media_type=KINDS[".js"])
+
+
+async def _json(request: Request) -> dict[str, Any]:
+    """The JSON object in the body of a request. Raises InputError."""
+    if request.headers.get("content-type", "").partition(";")[0] != "application/json":
+        raise InputError("Content-Type", request.headers.get("content-type", "nothing")[:60], "application/json")
+    body = b""
+    async for chunk in request.stream():
+        body += chunk
+        if len(body) > MOST_BYTES:
+            raise InputError("", f"more than {MOST_BYTES / 1e6:g} MB", "a stage file, which is shorter")
+    try:
+        data = json.loads(body)
+    except (ValueError, RecursionError):
+        raise InputError("", "no JSON", "a question") from None
+    if not isinstance(data, dict):
+        raise InputError("", "no JSON object", "a question")
+    return data
+
+
+def _refused(text: str, status: int) -> Response:
+    return JSONResponse({"text": text}, status)

@@ -1,0 +1,131 @@
+"""A question at work: in a thread of its own, with progress and messages, until it is answered or overtaken."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from contextvars import ContextVar, copy_context
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from friso.app.frames import frame
+from friso.engine.overtaken import Overtaken, ended_by, go_on
+from friso.errors import InputError
+
+Job = Callable[["Work"], Iterator[dict[str, Any]]]
+"""What answers a question: gives the parts of its answer one after the other."""
+
+OFTEN = 0.1
+"""Seconds between two reports of progress."""
+
+THREADS = 4
+"""Questions at work at the same time."""
+
+
+@dataclass(eq=False)
+class Work:
+    """A question at work. `flag` ends it: another thread sets it."""
+
+    put: Callable[[dict[str, Any] | None], object]
+    flag: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
+    last: float = 0.0
+
+    def overtake(self) -> None:
+        """End it, from another thread."""
+        self.flag[0] = 1
+
+    def progress(self, done: int, total: int, label: str, /) -> None:
+        """Report progress. Raises Overtaken once nobody waits any more."""
+        go_on()
+        now = time.monotonic()
+        if now - self.last > OFTEN:
+            self.last = now
+            self.put({"kind": "progress", "done": done, "total": total, "label": label})
+
+    def run(self, job: Job) -> None:
+        """Do the job, in this thread, and put what comes of it; None is put last."""
+        token = _AT_WORK.set(self)
+        try:
+            with ended_by(self.flag):
+                for part in job(self):
+                    self.put(part)
+        except Overtaken:
+            self.put({"kind": "overtaken"})
+        except InputError as error:
+            self.put({"kind": "refused", "key": error.key, "text": str(error)})
+        except (RuntimeError, OSError, MemoryError, ArithmeticError, ValueError) as error:
+            _LOGGER.debug("a question failed", exc_info=True)
+            self.put({"kind": "failed", "text": f"the computation could not be completed: {error}"})
+        finally:
+            _AT_WORK.reset(token)
+            self.put(None)
+
+
+_LOGGER = logging.getLogger("friso.app")
+_AT_WORK: ContextVar[Work | None] = ContextVar("work", default=None)
+
+
+class Messages(logging.Handler):
+    """Hands what friso logs to the question that is at work; what its helpers say in threads of theirs (a kernel that
+    is compiled) to all questions."""
+
+    def __init__(self, works: Workshop) -> None:
+        super().__init__(logging.INFO)
+        self.works = works
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Hand a message on."""
+        work = _AT_WORK.get()
+        for listener in [work] if work is not None else [*self.works.lanes.values()]:
+            listener.put({"kind": "message", "text": record.getMessage()})
+
+
+class Workshop:
+    """The questions at work, one on every lane of a page: a newer one overtakes the one before it."""
+
+    def __init__(self) -> None:
+        self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app")
+        self.lanes: dict[tuple[str, str], Work] = {}
+
+    async def answer(self, page: str, lane: str, job: Job) -> AsyncIterator[bytes]:
+        """The frames of an answer, as they come. Whoever stops reading ends the work."""
+        loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
+
+        def put(part: dict[str, Any] | None) -> None:
+            if not loop.is_closed():
+                loop.call_soon_threadsafe(parts.put_nowait, part)
+
+        work, place = Work(put), (page, lane)
+        if place in self.lanes:
+            self.lanes[place].overtake()
+        self.lanes[place] = work
+        try:
+            loop.run_in_executor(self.pool, copy_context().run, work.run, job)
+            while (part := await parts.get()) is not None:
+                yield frame(part)
+        finally:
+            work.overtake()
+            if self.lanes.get(place) is work:
+                del self.lanes[place]
+
+    @contextmanager
+    def listening(self) -> Iterator[None]:
+        """Hand what friso logs to the questions that it is about."""
+        log, messages = logging.getLogger("friso"), Messages(self)
+        log.addHandler(messages)
+        try:
+            yield
+        finally:
+            log.removeHandler(messages)
+
+    def close(self) -> None:
+        """End everything."""
+        for work in [*self.lanes.values()]:
+            work.overtake()
+        self.pool.shutdown(wait=False, cancel_futures=True)

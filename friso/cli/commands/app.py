@@ -1,0 +1,40 @@
+"""`friso app`: all of it live in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from friso.cli.command import HUNTS, Command
+
+Begin = Annotated[Path | None, typer.Argument(metavar="[STAGE.toml]", help="The stage file to begin with.")]
+Host = Annotated[str, typer.Option("--host", metavar="NAME", help="Address to listen at; others need --insecure.")]
+Port = Annotated[
+    int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="Port to listen at; default: 8741 or later.")
+]
+Insecure = Annotated[
+    bool,
+    typer.Option("--insecure", help="Let other machines connect, unencrypted: who reads the network can use this one."),
+]
+Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]
+
+
+def app(
+    stage_file: Begin = None,
+    host: Host = "127.0.0.1",
+    port: Port = None,
+    insecure: Insecure = False,
+    browser: Browser = True,
+) -> None:
+    """All of it live in the browser, on this machine alone: drag a key, and see whether it hunts.
+
+    Example: friso app examples/thesis_rig.toml
+    """
+    from friso.app.serve import serve
+
+    serve(stage_file, host, port, insecure, browser)
+
+
+COMMAND = Command(app, 22, HUNTS)
