@@ -42,6 +42,7 @@ MISTAKES = {
     "doctor": ("--full-path",),
     "example": ("thesis",),
     "schema": ("--of", "design"),
+    "app": ("--host", "0.0.0.0", "--insecure", "--no-browser"),
 }
 
 RUNS = {

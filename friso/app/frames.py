@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import struct
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -26,8 +27,11 @@ def frame(value: Any) -> bytes:
     return struct.pack("<II", len(text), len(numbers)) + text + numbers
 
 
-def drawn(figure: Figure) -> dict[str, Any]:
-    """A figure as a page draws it: name, title, caption, and what plotly takes."""
+def drawn(figure: Figure, narrow: bool = False) -> dict[str, Any]:
+    """A figure as a page draws it: name, title, caption, and what plotly takes; on a narrow page, panels one below the
+    other."""
+    if narrow and not any(panel.coloured for panel in figure.panels):
+        figure = replace(figure, columns=1)
     return {
         "name": figure.name,
         "title": figure.title,

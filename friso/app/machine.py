@@ -52,7 +52,15 @@ _VALUES = (str, bool, int, float, type(None))
 @lru_cache(256)
 def _stage(machine: Machine) -> Stage:
     base = loads(machine.text, machine.name)
-    return base.replace(machine.changes) if machine.changes else base
+    written = base.as_written()
+    changes = {key: value for key, value in machine.changes.items() if value is not None or _has(written, key)}
+    return base.replace(changes) if changes else base
+
+
+def _has(tables: Mapping[str, Any], key: str) -> bool:
+    """Whether a dotted key of nested tables is there: one that was added on the page and taken away again is not."""
+    table, _, name = key.partition(".")
+    return name in tables[table] if table in tables and name else table in tables
 
 
 def shown(machine: Machine) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import friso
 from friso.app import machine as machines
+from friso.app.archive import archive
 from friso.app.frames import drawn
 from friso.app.ghosts import ghosts_of, with_places
 from friso.app.lines import command_line, python_line
@@ -17,6 +19,7 @@ from friso.axis import speaking_of
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
+from friso.views.check.cases import case_labels
 from friso.views.drawing.figure import Figure
 
 if TYPE_CHECKING:
@@ -28,11 +31,13 @@ Part = dict[str, Any]
 
 @dataclass(frozen=True)
 class Asked:
-    """What a page asks about: the machine shown, the one that is `pinned` beside it or None, and the options."""
+    """What a page asks about: the machine shown, the one that is `pinned` beside it or None, the options, and whether
+    figures are for a `narrow` page."""
 
     machine: Machine
     pinned: Machine | None
     options: Mapping[str, Any]
+    narrow: bool = False
 
     @classmethod
     def of(cls, data: Mapping[str, Any]) -> Asked:
@@ -41,7 +46,8 @@ class Asked:
         if not isinstance(options, Mapping):
             raise InputError("options", type(options).__name__, "options by name")
         pinned = data.get("pinned")
-        return cls(Machine.of(data.get("machine")), None if pinned is None else Machine.of(pinned), options)
+        both = Machine.of(data.get("machine")), None if pinned is None else Machine.of(pinned)
+        return cls(*both, options, bool(data.get("narrow")))
 
     def chosen(self, *names: str) -> dict[str, Any]:
         """The options of these names that are given: texts, numbers, true or false. Raises InputError for others."""
@@ -51,10 +57,12 @@ class Asked:
         return {name: value for name, value in self.options.items() if value not in (None, "")}
 
 
-def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any) -> Part:
+def parts_of(
+    asked: Asked, answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any
+) -> Part:
     """An answer as a page shows it, each figure with what is shown `beside`."""
     with speaking_of(answer.axis_kind):
-        figures = [drawn(beside(figure)) for figure in answer.figures()]
+        figures = [drawn(beside(figure), asked.narrow) for figure in answer.figures()]
         return {
             "kind": "answer",
             "sentences": [*answer.sentences()],
@@ -68,13 +76,15 @@ def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure:
 
 def machine(asked: Asked, work: Work) -> Iterator[Part]:
     """The keys of the machine."""
+    asked.chosen()
     yield {"kind": "answer", **machines.shown(asked.machine)}
 
 
 def run(asked: Asked, work: Work) -> Iterator[Part]:
     """What the run does."""
+    asked.chosen()
     pinned = None if asked.pinned is None else _run(asked.pinned)
-    yield parts_of(_run(asked.machine), ghosts_of(pinned), **_lines("simulate", asked))
+    yield parts_of(asked, _run(asked.machine), ghosts_of(pinned), **_lines("simulate", asked))
 
 
 def verdict(asked: Asked, work: Work) -> Iterator[Part]:
@@ -84,7 +94,7 @@ def verdict(asked: Asked, work: Work) -> Iterator[Part]:
     key, cases = _cases(stage)
     runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
     words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
-    yield {"kind": "answer", "verdicts": words, "given": _given(stage)}
+    yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)]}
 
 
 def check(asked: Asked, work: Work) -> Iterator[Part]:
@@ -93,24 +103,26 @@ def check(asked: Asked, work: Work) -> Iterator[Part]:
     answer = friso.check(asked.machine.stage, **options, progress=work.progress)
     pinned = None if asked.pinned is None else _check(asked.pinned)
     cases = {name: case.verdict for name, case in answer.result.items()}
-    more = {"verdicts": cases, "given": _given(asked.machine.stage), **_lines("check", asked, options)}
-    yield parts_of(answer, ghosts_of(pinned), **more)
+    more = {"cases": _labelled(asked.machine.stage, cases), **_lines("check", asked, options)}
+    yield parts_of(asked, answer, ghosts_of(pinned), **more)
 
 
 def bode(asked: Asked, work: Work) -> Iterator[Part]:
     """The loop in the limit cases."""
+    asked.chosen()
     pinned = None if asked.pinned is None else friso.bode(asked.pinned.stage)
     answer = friso.bode(asked.machine.stage, progress=work.progress)
-    yield parts_of(answer, ghosts_of(pinned), **_lines("bode", asked))
+    yield parts_of(asked, answer, ghosts_of(pinned), **_lines("bode", asked))
 
 
 def flexure(asked: Asked, work: Work) -> Iterator[Part]:
     """The leaf springs."""
+    asked.chosen()
     pinned = asked.pinned and asked.pinned.stage
     ghost = friso.flexure(pinned) if pinned and pinned.flexure else None
     answer = friso.flexure(asked.machine.stage, progress=work.progress)
     drawing = answer.files()["flexure_drawing.svg"]
-    yield parts_of(answer, ghosts_of(ghost), drawing=drawing, **_lines("flexure", asked))
+    yield parts_of(asked, answer, ghosts_of(ghost), drawing=drawing, **_lines("flexure", asked))
 
 
 COARSE_TO_FINE = (6, 21, 41)
@@ -130,7 +142,7 @@ def map_study(asked: Asked, work: Work) -> Iterator[Part]:
         answer = friso.sweep(asked.machine.stage, **ranges, metric=metric, progress=work.progress)
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, "metric": metric}, "sweep")}
-        part = parts_of(answer, partial(with_places, stands=stands, keys=[*keys.values()]), **more)
+        part = parts_of(asked, answer, partial(with_places, stands=stands, keys=[*keys.values()]), **more)
         yield part if count == COARSE_TO_FINE[-1] else {**part, "kind": "partly"}
 
 
@@ -138,7 +150,7 @@ def boundary(asked: Asked, work: Work) -> Iterator[Part]:
     """Where hunting ends, over one key or in the plane of two."""
     options = asked.chosen("x", "y")
     answer = friso.boundary(asked.machine.stage, **options, progress=work.progress)
-    yield parts_of(answer, **_lines("boundary", asked, options))
+    yield parts_of(asked, answer, **_lines("boundary", asked, options))
 
 
 def tune(asked: Asked, work: Work) -> Iterator[Part]:
@@ -146,14 +158,15 @@ def tune(asked: Asked, work: Work) -> Iterator[Part]:
     options = asked.chosen("within", "settle", "force_limit", "bandwidth_limit", "only", "keep")
     answer = friso.tune(asked.machine.stage, **options, progress=work.progress)
     ways = [{"name": cure.name, "toml": cure.stage.to_toml()} for cure in answer.working]
-    yield parts_of(answer, ways=ways, **_lines("tune", asked, options))
+    yield parts_of(asked, answer, ways=ways, **_lines("tune", asked, options))
 
 
 def design(asked: Asked, work: Work) -> Iterator[Part]:
     """What stops it: an isolator with its leaf springs."""
+    asked.chosen()
     answer = friso.design(asked.machine.stage, progress=work.progress)
     ways = [{"name": "design", "toml": answer.stage.to_toml()}]
-    yield parts_of(answer, ways=ways, **_lines("design", asked))
+    yield parts_of(asked, answer, ways=ways, **_lines("design", asked))
 
 
 QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[Part]]] = {
@@ -170,8 +183,26 @@ QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[Part]]] = {
 }
 """The questions by name."""
 
-ANSWERS: Mapping[str, str] = {"run": "simulate", "map": "sweep"}
-"""The functions of friso for questions of another name, whose files the page hands out."""
+REPORTS: Mapping[str, Callable[..., Answer]] = {
+    "check.zip": friso.check,
+    "bode.zip": friso.bode,
+    "flexure.zip": friso.flexure,
+    "boundary.zip": friso.boundary,
+    "map.zip": friso.sweep,
+}
+"""The answers whose files are handed out: all that the command writes, and its document, in one archive."""
+
+
+def report(function: Callable[..., Answer], asked: Asked, work: Work) -> Iterator[Part]:
+    """The files of an answer."""
+    options = asked.chosen("x", "y", "metric")
+    if function is friso.sweep:
+        options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
+    answer = function(asked.machine.stage, **options, progress=work.progress)
+    work.progress(0, 0, "drawing the figures")
+    stem = asked.machine.name.removesuffix(".toml")
+    held = archive(answer, asked.machine.stage, stem)
+    yield {"kind": "files", "name": f"{stem}_{answer.command}.zip", "base64": base64.b64encode(held).decode("ascii")}
 
 
 def _lines(command: str, asked: Asked, options: Mapping[str, Any] | None = None, function: str = "") -> Part:
@@ -193,6 +224,11 @@ def _check(which: Machine) -> Any:
 def _given(stage: Stage) -> str:
     """Which of the cases is the stage as it is given."""
     return "given" if stage.joint is None else "locked" if stage.joint.locked else "free"
+
+
+def _labelled(stage: Stage, verdicts: Mapping[str, str]) -> list[dict[str, str]]:
+    """The cases that differ, by their labels in sentences, with the verdicts."""
+    return [{"label": label, "verdict": verdicts[name]} for name, label in case_labels(stage).items()]
 
 
 def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:

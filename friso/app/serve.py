@@ -8,6 +8,7 @@ from pathlib import Path
 
 import uvicorn
 
+from friso.answers.starting import example
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.errors import InputError
@@ -23,13 +24,14 @@ TRIES = 20
 def serve(stage: Path | None, host: str, port: int | None, insecure: bool, browser: bool) -> None:
     """Serve the page until it is interrupted, and print its address. Raises InputError for a stage file that cannot be
     read, a host that others can reach without `insecure`, and where no port is free."""
-    begin = None
-    if stage is not None:
-        load(stage)
-        begin = {"name": stage.name, "text": text_of(stage, "a stage file")}
+    file = example("thesis_rig") if stage is None else stage
+    load(file)
+    begin = {"name": file.name, "text": text_of(file, "a stage file"), "asked": stage is not None}
     if host not in LOOPBACK and not insecure:
         expected = "127.0.0.1, or --insecure: whoever reads the network sees all, and uses this machine"
         raise InputError("--host", host, expected, "--host 127.0.0.1")
+    if host in ("0.0.0.0", "::"):
+        raise InputError("--host", host, "the name or address by which others reach this machine", "--host rig.local")
     listener = _listener(host, port)
     own = listener.getsockname()[1]
     access = Access.at(host, own)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib.resources import files
 from typing import Any
 
@@ -15,7 +16,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import QUESTIONS, Asked
+from friso.app.questions import QUESTIONS, REPORTS, Asked, report
 from friso.app.work import Workshop
 from friso.errors import InputError
 
@@ -27,13 +28,15 @@ KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".s
 BINARY = "application/octet-stream"
 
 
-def application(access: Access, begin: dict[str, str] | None = None) -> ASGIApp:
-    """The server for those who have an access; `begin`: name and text of the stage file that it is started with."""
+def application(access: Access, begin: dict[str, Any]) -> ASGIApp:
+    """The server for those who have an access; `begin`: name and text of the stage file that it starts with, and
+    whether it was `asked` for."""
     workshop = Workshop()
 
     async def ask(request: Request) -> Response:
         name = request.path_params["question"]
-        if name not in QUESTIONS:
+        job = partial(report, REPORTS[name]) if name in REPORTS else QUESTIONS.get(name)
+        if job is None:
             return _refused(f"there is no question {name[:40]!r}", 404)
         try:
             data = await _json(request)
@@ -41,12 +44,10 @@ def application(access: Access, begin: dict[str, str] | None = None) -> ASGIApp:
         except InputError as error:
             return _refused(str(error), 422)
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
-        return StreamingResponse(
-            workshop.answer(page, lane, lambda work: QUESTIONS[name](asked, work)), media_type=BINARY
-        )
+        return StreamingResponse(workshop.answer(page, lane, partial(job, asked)), media_type=BINARY)
 
     async def started_with(request: Request) -> Response:
-        return JSONResponse(begin or {})
+        return JSONResponse(begin)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:

@@ -67,7 +67,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
         if name in trace:
             values = samples(trace, name)
             line = Series(time, values, title.lower(), BLUE)
-            view = common_range([values[end]]) if name == "error" else None
+            view = common_range([values[end]], least=2 * min(BANDS)) if name == "error" else None
             panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"]), view), (line,)))
     caption = (
         "The whole run; the error is the reference minus the position, at the scale of what follows the move: the move "

@@ -1,0 +1,106 @@
+// The keys of a part: value, unit, slider, meaning, uncertainty; and the stage file as text.
+import { dialog, el, words } from "./dom.js";
+import { PARTS } from "./drawing.js";
+
+const QUANTITY = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(\S.*)?$/i;
+const STEPS = 1000;
+const ranges = new Map();
+
+/** Where sliders go is settled when a machine is opened: they do not move under the hand. */
+export const forgetRanges = () => ranges.clear();
+
+export function keys(place, machine, part, changed, wrong, tell) {
+  const about = PARTS.find((item) => item.id === part);
+  const held = document.activeElement?.closest?.("#keys [data-path]")?.dataset.path;
+  const opened = new Set([...place.querySelectorAll("details[open]")].map((item) => item.dataset.table));
+  const focus = document.activeElement?.type;
+  const tables = about.tables.map((name) => machine.tables.find((table) => table.name === name));
+  const text = el("button", { type: "button", class: "plain", onclick: () => tell.edit() }, "Edit as text");
+  place.replaceChildren(el("h2", {}, about.label));
+  for (const table of tables) {
+    if (!table.present) {
+      if (tables.filter((item) => item.present).length === 0 || table === tables[0]) {
+        place.append(el("p", { class: "about" }, `[${table.name}] is not in the stage file. ${table.description}`));
+      }
+      continue;
+    }
+    place.append(el("p", { class: "about" }, `[${table.name}] ${table.description}`));
+    const rows = table.keys.map((key) => [key, row(key, machine, changed, wrong, tell)]);
+    place.append(...rows.filter(([key]) => key.value !== undefined && key.value !== null).map(([, item]) => item));
+    const more = rows.filter(([key]) => key.value === undefined || key.value === null).map(([, item]) => item);
+    if (more.length) {
+      const summary = el("summary", {}, `${more.length} more keys of [${table.name}]`);
+      place.append(el("details", { class: "more", "data-table": table.name, open: opened.has(table.name) }, summary, ...more));
+    }
+  }
+  place.append(text);
+  if (held) {
+    const again = [...place.querySelectorAll(`[data-path="${held}"] input, [data-path="${held}"] select`)];
+    (again.find((item) => item.type === focus) ?? again[0])?.focus();
+  }
+}
+
+function row(key, machine, changed, wrong, tell) {
+  const id = `key-${key.path.replaceAll(".", "-")}`;
+  const label = el("label", { for: id, title: key.description }, words(key.path));
+  const classes = `key${key.path in changed ? " changed" : ""}`;
+  const item = el("div", { class: classes, "data-path": key.path }, label);
+  if (key.kind === "switch") {
+    item.append(el("input", { id, type: "checkbox", checked: key.value === true, onchange: (event) => tell.set(key.path, event.target.checked) }));
+  } else if (key.kind === "word") {
+    const options = key.options.map((word) => el("option", { value: word, selected: word === key.value }, word));
+    if (key.value === undefined || key.value === null) options.unshift(el("option", { value: "", selected: true }, "–"));
+    item.append(el("select", { id, onchange: (event) => event.target.value && tell.set(key.path, event.target.value) }, ...options));
+  } else if (key.kind === "array") {
+    item.append(el("button", { id, type: "button", onclick: () => tell.edit() }, "In the text"));
+  } else {
+    item.append(...field(key, id, tell));
+  }
+  if (machine.uncertain.includes(key.path)) item.append(el("span", { class: "uncertain" }, "uncertain: its centre is used"));
+  item.append(el("span", { class: "help", id: `${id}-help` }, key.description));
+  if (wrong?.keys.includes(key.path)) item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
+  return item;
+}
+
+function field(key, id, tell) {
+  const bare = typeof key.value === "number";
+  const value = key.value === undefined || key.value === null ? "" : String(key.value);
+  const read = (text) => (text.trim() === "" ? null : !key.unit && Number.isFinite(Number(text)) ? Number(text) : text.trim());
+  const input = el("input", { id, type: "text", value, placeholder: `e.g. ${key.example}`, autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-help` });
+  input.addEventListener("change", () => tell.set(key.path, read(input.value)));
+  const parts = QUANTITY.exec(value);
+  if (!parts || !key.range || (!bare && !parts[2])) return [input];
+  if (!ranges.has(key.path) || !inside(ranges.get(key.path), key.si)) ranges.set(key.path, key.range);
+  const range = ranges.get(key.path);
+  const number = Number(parts[1]);
+  const factor = number === 0 ? 1 : key.si / number;
+  const unit = number === 0 && key.unit ? key.unit : parts[2];
+  const slider = el("input", { type: "range", min: 0, max: STEPS, value: place(range, key.si), "aria-label": `${words(key.path)}, slider` });
+  const now = () => {
+    const rounded = Number((at(range, slider.value) / factor).toPrecision(4));
+    return bare ? rounded : `${rounded} ${unit}`;
+  };
+  slider.addEventListener("input", () => {
+    input.value = now();
+    tell.set(key.path, now(), true);
+  });
+  slider.addEventListener("change", () => tell.set(key.path, now()));
+  return [input, slider];
+}
+
+const inside = (range, si) => si >= range.low && si <= range.high;
+const place = ({ low, high, log }, si) => Math.round(STEPS * (log ? Math.log(si / low) / Math.log(high / low) : (si - low) / (high - low || 1)));
+const at = ({ low, high, log }, step) => (log ? low * (high / low) ** (step / STEPS) : low + ((high - low) * step) / STEPS);
+
+/** The stage file as text; `take` is called with what it became. */
+export function edit(toml, take) {
+  const area = el("textarea", { rows: 24, cols: 80, spellcheck: "false", "aria-label": "Stage file" });
+  area.value = toml;
+  area.style.cssText = "width: 100%; font: 13px/1.4 ui-monospace, monospace; background: var(--panel); color: inherit; border: 1px solid var(--line)";
+  const use = el("button", { type: "button" }, "Use this text");
+  const box = dialog("The stage file", area, el("div", { class: "row" }, use));
+  use.addEventListener("click", () => {
+    box.close();
+    take(area.value);
+  });
+}

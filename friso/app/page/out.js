@@ -1,0 +1,30 @@
+// What leaves the page, when it is asked for: stage file, link, report with its figures, command and Python lines.
+import { dialog, el } from "./dom.js";
+
+export function save(name, content, type) {
+  const address = URL.createObjectURL(new Blob([content], { type }));
+  el("a", { href: address, download: name }).click();
+  setTimeout(() => URL.revokeObjectURL(address), 10000);
+}
+
+/** The dialog; `machine` with its TOML, `answer` what is shown, `link` makes a link, `files` asks for a report. */
+export function out({ machine, answer, link, files }) {
+  const name = machine.name.replace(/\.toml$/, "");
+  const copy = (text) => el("button", { type: "button", onclick: () => navigator.clipboard.writeText(text) }, "Copy");
+  const stage = el("button", { type: "button", onclick: () => save(`${name}.toml`, machine.toml, "application/toml") }, "Stage file");
+  const share = el("button", { type: "button" }, "Link that holds the machine");
+  const status = el("p", { class: "status" });
+  share.addEventListener("click", async () => {
+    const text = await link();
+    await navigator.clipboard.writeText(text).catch(() => {});
+    status.textContent = `Copied: ${text}`;
+  });
+  const report = el("button", { type: "button" }, "Report, figures and data (ZIP)");
+  report.addEventListener("click", async () => {
+    status.textContent = "The report is being made …";
+    const made = await files((part) => (status.textContent = part.label ?? part.text ?? ""));
+    status.textContent = made ?? "";
+  });
+  const lines = answer?.command ? [el("h3", {}, "The same on the command line"), el("pre", {}, answer.command), copy(answer.command), el("h3", {}, "and in Python"), el("pre", {}, answer.python), copy(answer.python)] : [];
+  dialog("Out", el("div", { class: "row" }, stage, share, report), status, ...lines);
+}

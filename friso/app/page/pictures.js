@@ -1,0 +1,173 @@
+// The pictures of the answer, in tabs: each asks its own question.
+import { $, el, words } from "./dom.js";
+import { clear, draw, stale } from "./plot.js";
+import { ask, Live } from "./wire.js";
+import { paragraphs, table } from "./tables.js";
+
+const AT_REST = 250;
+const NARROW = 640;
+
+export class Pictures {
+  /** `sent` gives what is asked about, `tell` what is done with answers. */
+  constructor(sent, tell) {
+    Object.assign(this, { sent, tell, shown: "run", machine: null, answer: null, timer: 0, kept: new Map() });
+    this.live = new Live("run", "picture", 400, (answer) => this.arrived(answer));
+    this.tabs = [
+      { id: "run", label: "Run" },
+      { id: "check", label: "Hunting" },
+      { id: "bode", label: "Loops" },
+      { id: "map", label: "Map" },
+      { id: "boundary", label: "Boundary" },
+      { id: "flexure", label: "Leaf springs", when: () => this.has("flexure") },
+    ];
+    window.addEventListener("resize", () => {
+      if (this.narrow !== this.was) this.ask();
+    });
+  }
+
+  has(name) {
+    return this.machine?.tables.some((item) => item.name === name && item.present);
+  }
+
+  get narrow() {
+    return $("picture").clientWidth < NARROW;
+  }
+
+  body(options = {}) {
+    this.was = this.narrow;
+    return { ...this.sent(), options, narrow: this.narrow };
+  }
+
+  bar() {
+    const tabs = this.tabs.filter((tab) => !tab.when || tab.when());
+    if (!tabs.some((tab) => tab.id === this.shown)) this.show("run");
+    $("pictures-bar").replaceChildren(
+      ...tabs.map(({ id, label }) =>
+        el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),
+      ),
+    );
+    $("picture").setAttribute("aria-labelledby", `tab-${this.shown}`);
+  }
+
+  show(id) {
+    if (id === this.shown) return;
+    this.shown = id;
+    this.live.stop();
+    const place = $("picture");
+    clear(place);
+    place.replaceChildren();
+    this.bar();
+    this.begin(place);
+    this.ask();
+  }
+
+  /** What stands above the plots of a tab. */
+  begin(place) {
+    this.form = null;
+    if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
+    this.plots = el("div", { class: "plots" });
+    this.below = el("div", {});
+    place.append(this.plots, this.below);
+  }
+
+  /** The machine has changed; `dragged`: not yet for good. */
+  changed(machine, dragged) {
+    if (machine) this.machine = machine;
+    if (!this.plots) this.begin($("picture"));
+    this.bar();
+    if (this.shown === "run") this.live.ask(this.body());
+    else {
+      stale($("picture"));
+      clearTimeout(this.timer);
+      if (!dragged) this.timer = setTimeout(() => this.ask(), AT_REST);
+    }
+  }
+
+  async ask() {
+    const { shown } = this;
+    if (!this.machine) return;
+    if (shown === "run") return this.live.ask(this.body());
+    if (shown === "check") return this.tell.check();
+    const options = this.form ? this.form() : {};
+    if (options === null) return;
+    const part = (answer) => this.shown === shown && (answer.kind === "partly" ? this.arrived(answer) : this.tell.progress(answer));
+    const answer = await ask(shown, this.body(options), "picture", part);
+    if (answer && this.shown === shown) this.arrived(answer);
+  }
+
+  /** The check is there, whose figures are one of the pictures. */
+  checked(answer) {
+    if (this.shown === "check") this.arrived(answer);
+  }
+
+  arrived(answer) {
+    if (answer.kind === "message" || answer.kind === "progress") return this.tell.progress(answer);
+    if (answer.kind === "refused" || answer.kind === "failed") {
+      this.below.replaceChildren(...paragraphs([answer.text]));
+      if (!this.plots.children.length) return;
+      return stale($("picture"));
+    }
+    if (answer.kind !== "partly") this.tell.progress(null);
+    this.answer = answer;
+    draw(this.plots, answer.figures, (what, name, point) => this.pointed(what, name, point));
+    const words = this.shown === "check" ? [] : answer.sentences;
+    const drawn = answer.drawing ? [this.drawn(answer.drawing)] : [];
+    this.below.replaceChildren(...paragraphs(words), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
+    this.tell.shown(answer);
+  }
+
+  drawn(markup) {
+    const address = URL.createObjectURL(new Blob([markup], { type: "image/svg+xml" }));
+    return el("div", { class: "drawn" }, el("img", { src: address, alt: "The leaf springs, to scale" }));
+  }
+
+  // ---------------------------------------------------------------- maps
+
+  /** The two keys of a map, with their ranges; gives the options of the question. */
+  axes(place) {
+    const numeric = this.machine.tables.filter((item) => item.present).flatMap((item) => item.keys.filter((key) => key.range && typeof key.value === "string"));
+    const wanted = this.kept.get("axes") ?? ["controller.crossover", this.has("joint") ? "joint.stroke" : "friction.static"];
+    const chosen = wanted.map((path, k) => numeric.find((key) => key.path === path) ?? numeric[k]);
+    const fields = chosen.map((key, k) => this.axis(numeric, key, "xy"[k]));
+    const start = () => {
+      clearTimeout(this.timer);
+      this.timer = setTimeout(() => this.ask(), AT_REST);
+    };
+    const metric = el("select", { id: "metric" }, ...["outcome", "verdict", "peak_to_peak", "settling_time", "largest_force"].map((name) => el("option", { value: name }, words(name))));
+    const metrics = this.shown === "map" ? [el("label", {}, "Shown", metric)] : [];
+    const form = el("div", { class: "form" }, ...fields.flatMap((item) => item.elements), ...metrics);
+    form.addEventListener("change", start);
+    place.append(form);
+    return () => {
+      this.kept.set("axes", fields.map((item) => item.key.value));
+      const options = Object.fromEntries(fields.map((item, k) => ["xy"[k], `${item.key.value}=${item.low.value}..${item.high.value}`]));
+      return this.shown === "map" ? { ...options, metric: metric.value } : options;
+    };
+  }
+
+  axis(numeric, chosen, name) {
+    const key = el("select", { id: `${name}-key` }, ...numeric.map((item) => el("option", { value: item.path, selected: item === chosen }, `${words(item.path)} (${item.path.split(".")[0]})`)));
+    const [low, high] = ["from", "to"].map((end) => el("input", { id: `${name}-${end}`, type: "text" }));
+    const fill = () => {
+      const item = numeric.find((one) => one.path === key.value);
+      const [, number, unit] = /^\s*(\S+)\s+(.*)$/.exec(item.value) ?? [];
+      const value = Number(number);
+      if (Number.isFinite(value)) {
+        low.value = `${Number((value / 4).toPrecision(3))} ${unit}`;
+        high.value = `${Number((value * 4).toPrecision(3))} ${unit}`;
+      }
+    };
+    key.addEventListener("change", fill);
+    fill();
+    const label = name === "x" ? "To the right" : "Upwards";
+    return { key, low, high, elements: [el("label", {}, label, key), el("label", {}, "from", low), el("label", {}, "to", high)] };
+  }
+
+  /** A cell was clicked: the machine is set there. */
+  pointed(what, name, point) {
+    if (what !== "click" || this.shown !== "map" || !this.answer?.places || !point.data.z) return;
+    const [row, column] = point.pointIndex;
+    const { axes, places } = this.answer;
+    this.tell.set({ [axes.x]: places.x[column], [axes.y]: places.y[row] });
+  }
+}

@@ -1,0 +1,64 @@
+// Figures as the server gives them, drawn by plotly in the colours of the page.
+import { el } from "./dom.js";
+
+const dark = matchMedia("(prefers-color-scheme: dark)");
+/** Colours of the figures that a dark page shows otherwise. */
+const DARK = { "#222222": "#e6e7e9", "#e3e3e3": "#2f3338", "#767676": "#9aa0a6", "#0072B2": "#56B4E9", "#c9c9c9": "#5a5f66", "#a9a9a9": "#777d84" };
+const CONFIG = { displaylogo: false, responsive: true, modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]], showSendToCloud: false, plotlyServerURL: "" };
+
+function themed(value) {
+  if (typeof value === "string") return DARK[value] ?? value;
+  if (value === null || typeof value !== "object" || ArrayBuffer.isView(value)) return value;
+  if (Array.isArray(value)) return value.length && ArrayBuffer.isView(value[0]) ? value : value.map(themed);
+  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, themed(item)]));
+}
+
+/** Draw figures into a place, keeping the plots that are there: those of the same name are updated. */
+export function draw(place, figures, tell = () => {}) {
+  const there = new Map([...place.children].filter((child) => child.dataset.name).map((child) => [child.dataset.name, child]));
+  for (const [name, child] of there) if (!figures.some((figure) => figure.name === name)) remove(child);
+  for (const figure of figures) {
+    let box = there.get(figure.name);
+    if (!box) {
+      const heading = el("h3", {}, figure.title);
+      const caption = el("p", { class: "caption" }, figure.caption);
+      box = el("section", { class: "figure", "data-name": figure.name }, heading, caption, el("div", { class: "plot" }));
+    } else {
+      box.children[0].textContent = figure.title;
+      box.children[1].textContent = figure.caption;
+    }
+    box.classList.remove("stale");
+    place.append(box);
+    plot(box.querySelector(".plot"), figure, tell);
+  }
+}
+
+function plot(place, figure, tell) {
+  const layout = { ...figure.layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", uirevision: figure.name, autosize: true };
+  const fresh = !place.data;
+  place.figure = figure;
+  place.style.height = `${layout.height}px`;
+  const [data, shown] = dark.matches ? [themed(figure.data), themed(layout)] : [figure.data, layout];
+  Plotly.react(place, data, shown, CONFIG);
+  if (fresh) {
+    place.on("plotly_click", (event) => tell("click", figure.name, event.points[0]));
+    place.on("plotly_hover", (event) => tell("hover", figure.name, event.points[0]));
+  }
+}
+
+function remove(child) {
+  const place = child.querySelector(".plot");
+  if (place) Plotly.purge(place);
+  child.remove();
+}
+
+export function clear(place) {
+  [...place.children].forEach(remove);
+}
+
+/** What is shown is of an earlier machine. */
+export const stale = (place) => place.querySelectorAll(".figure").forEach((box) => box.classList.add("stale"));
+
+dark.addEventListener("change", () => {
+  for (const place of document.querySelectorAll(".plot")) if (place.figure) plot(place, place.figure, () => {});
+});

@@ -1,0 +1,138 @@
+// Questions to the server. A newer question on a lane overtakes the one before it; answers come in frames, see frames.py.
+const page = crypto.randomUUID();
+const lanes = new Map();
+
+/** Ask a question; `part` is called with every part of the answer. Resolves to the last part, or null if overtaken. */
+export async function ask(question, body, lane = question, part = () => {}) {
+  lanes.get(lane)?.abort();
+  const abort = new AbortController();
+  lanes.set(lane, abort);
+  try {
+    const response = await fetch(`ask/${question}`, {
+      method: "POST",
+      headers: { "Content-Type": "application/json" },
+      body: JSON.stringify({ ...body, page, lane }),
+      signal: abort.signal,
+    });
+    if (!response.ok) return refusal(response);
+    let last = null;
+    for await (const value of frames(response.body.getReader())) {
+      if (abort.signal.aborted) return null;
+      last = value;
+      part(value);
+    }
+    reached(true);
+    return last?.kind === "overtaken" ? null : last;
+  } catch (error) {
+    if (abort.signal.aborted) return null;
+    reached(false);
+    return null;
+  } finally {
+    if (lanes.get(lane) === abort) lanes.delete(lane);
+  }
+}
+
+/** End what is asked on a lane. */
+export const end = (lane) => lanes.get(lane)?.abort();
+
+async function refusal(response) {
+  if (response.status === 403) {
+    reached(false, "The server was started anew: open the address that it printed. What is on this page is kept.");
+    return null;
+  }
+  const { text } = await response.json();
+  return { kind: "refused", key: "", text };
+}
+
+async function* frames(reader) {
+  let held = new Uint8Array(0);
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return;
+    const joined = new Uint8Array(held.length + value.length);
+    joined.set(held);
+    joined.set(value, held.length);
+    held = joined;
+    while (held.length >= 8) {
+      const sizes = new DataView(held.buffer, held.byteOffset, 8);
+      const [text, numbers] = [sizes.getUint32(0, true), sizes.getUint32(4, true)];
+      if (held.length < 8 + text + numbers) break;
+      const begin = 8 + text;
+      const json = JSON.parse(new TextDecoder().decode(held.subarray(8, begin)));
+      yield unpacked(json, held.slice(begin, begin + numbers).buffer);
+      held = held.slice(begin + numbers);
+    }
+  }
+}
+
+function unpacked(value, numbers) {
+  if (Array.isArray(value)) return value.map((item) => unpacked(item, numbers));
+  if (value === null || typeof value !== "object") return value;
+  if (value.shape) {
+    const [rows, columns] = value.shape;
+    if (columns === undefined) return new Float32Array(numbers, value.array, rows);
+    return Array.from({ length: rows }, (_, row) => new Float32Array(numbers, value.array + 4 * row * columns, columns));
+  }
+  return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, unpacked(item, numbers)]));
+}
+
+// ---------------------------------------------------------------- whether the server is there
+
+const listeners = [];
+let there = true;
+let looking = null;
+
+/** Be told when the server goes and comes back: with whether it is there, and a text. */
+export const onReach = (listener) => listeners.push(listener);
+
+function reached(now, text = "The server does not answer. What is on this page is kept; it goes on when the server is back.") {
+  if (now === there && now) return;
+  there = now;
+  listeners.forEach((listener) => listener(now, text));
+  if (!now && looking === null) looking = setInterval(look, 2000);
+}
+
+async function look() {
+  try {
+    const response = await fetch("begin");
+    if (!response.ok) return;
+    clearInterval(looking);
+    looking = null;
+    reached(true);
+  } catch {
+    // still gone
+  }
+}
+
+/**
+ * What asks again and again while something is dragged: one question on its way, and the newest one waiting; one that
+ * takes longer than `patience` [ms] is overtaken.
+ */
+export class Live {
+  constructor(question, lane, patience, done) {
+    Object.assign(this, { question, lane, patience, done, busy: false, next: null, begun: 0 });
+  }
+
+  ask(body, tag) {
+    this.next = { body, tag };
+    if (this.busy && performance.now() - this.begun < this.patience) return;
+    this.go();
+  }
+
+  async go() {
+    const { body, tag } = this.next;
+    this.next = null;
+    this.busy = true;
+    const begun = (this.begun = performance.now());
+    const answer = await ask(this.question, body, this.lane, (part) => part.kind === "message" && this.done(part, tag));
+    if (begun !== this.begun) return;
+    this.busy = false;
+    if (answer) this.done(answer, tag);
+    if (this.next) this.go();
+  }
+
+  stop() {
+    this.next = null;
+    end(this.lane);
+  }
+}

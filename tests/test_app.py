@@ -1,0 +1,252 @@
+"""The server of `friso app`: whom it lets in, what it takes, and that its answers are those of friso."""
+
+from __future__ import annotations
+
+import http.client
+import json
+import struct
+import threading
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import uvicorn
+
+import friso
+from friso.app.gate import Access
+from friso.app.machine import Machine, shown
+from friso.app.server import application
+from friso.engine.overtaken import Overtaken, ended_by, go_on
+
+RIG = Path(friso.example("thesis_rig"))
+STICK_SLIP = Path(friso.example("lugre_stick_slip"))
+
+
+@dataclass
+class Served:
+    """A server at a port of this machine."""
+
+    port: int
+    access: Access
+    headers: dict[str, str] = field(default_factory=dict)
+
+    def request(self, method: str, path: str, body: bytes = b"", **headers: str | None) -> tuple[int, Any, bytes]:
+        """Status, headers and body; headers that are None are left out."""
+        host, usual = f"127.0.0.1:{self.port}", {"Cookie": f"{self.access.cookie}={self.access.session}"}
+        sent = {"Host": host, "Content-Type": "application/json", **usual}
+        sent |= {name.replace("_", "-"): value for name, value in headers.items()}
+        connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
+        connection.putrequest(method, path, skip_host=True)
+        for name, value in {**sent, "Content-Length": str(len(body))}.items():
+            if value is not None:
+                connection.putheader(name, value)
+        connection.endheaders(body)
+        response = connection.getresponse()
+        content = response.read()
+        connection.close()
+        return response.status, response.headers, content
+
+    def ask(self, question: str, stage: Path, changes: dict[str, Any] | None = None, **options: Any) -> list[Any]:
+        """The parts of an answer."""
+        machine = {"name": stage.name, "text": stage.read_text(encoding="utf-8"), "changes": changes or {}}
+        body = {"machine": machine, "options": options, "page": "test", "lane": question}
+        status, _, content = self.request("POST", f"/ask/{question}", json.dumps(body).encode())
+        assert status == 200, content
+        return [*parts(content)]
+
+
+def parts(content: bytes) -> Iterator[Any]:
+    """The values of frames; arrays as NumPy has them."""
+    while content:
+        text, numbers = struct.unpack("<II", content[:8])
+        array = content[8 + text : 8 + text + numbers]
+        yield unpacked(json.loads(content[8 : 8 + text]), array)
+        content = content[8 + text + numbers :]
+
+
+def unpacked(value: Any, numbers: bytes) -> Any:
+    if isinstance(value, list):
+        return [unpacked(item, numbers) for item in value]
+    if isinstance(value, dict) and "shape" in value:
+        count = int(np.prod(value["shape"]))
+        return np.frombuffer(numbers, "<f4", count, value["array"]).reshape(value["shape"])
+    return {key: unpacked(item, numbers) for key, item in value.items()} if isinstance(value, dict) else value
+
+
+@pytest.fixture(scope="module")
+def served() -> Iterator[Served]:
+    config = uvicorn.Config(lambda scope: None, log_level="warning", ws="none", port=0)
+    listener = config.bind_socket()
+    access = Access.at("127.0.0.1", listener.getsockname()[1])
+    begin = {"name": RIG.name, "text": RIG.read_text(encoding="utf-8"), "asked": True}
+    server = uvicorn.Server(uvicorn.Config(application(access, begin), log_level="warning", ws="none"))
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    while not server.started:
+        time.sleep(0.01)
+    yield Served(listener.getsockname()[1], access)
+    server.should_exit = True
+    thread.join()
+    listener.close()
+
+
+# ---------------------------------------------------------------- who is let in
+
+
+def test_the_token_is_exchanged_for_a_cookie_that_scripts_and_other_sites_never_see(served: Served) -> None:
+    status, headers, _ = served.request("GET", f"/?token={served.access.token}", Cookie=None)
+    assert (status, headers["Location"]) == (303, "/")
+    cookie = headers["Set-Cookie"]
+    assert served.access.session in cookie
+    assert {"HttpOnly", "SameSite=strict", "Path=/"} <= set(cookie.split("; "))
+
+
+@pytest.mark.parametrize("path", ["/", "/begin", "/plotly.js", "/main.js", "/?token=", "/?token=wrong", "/nothing"])
+def test_without_token_or_cookie_nothing_is_answered(served: Served, path: str) -> None:
+    assert served.request("GET", path, Cookie=None)[0] == 403
+    assert served.request("GET", path, Cookie=f"{served.access.cookie}=wrong")[0] == 403
+
+
+@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "", None])
+def test_a_rebound_name_is_refused(served: Served, host: str | None) -> None:
+    """Cookie and token are right, the name is not: 403, or 400 where there is none, which HTTP does not allow."""
+    for path in ("/", f"/?token={served.access.token}"):
+        assert served.request("GET", path, Host=host)[0] in (403, 400)
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
+def test_a_foreign_page_is_refused(served: Served, origin: str) -> None:
+    assert served.request("POST", "/ask/machine", b"{}", Origin=origin)[0] == 403
+    assert served.request("GET", "/begin", Sec_Fetch_Site="cross-site")[0] == 403
+
+
+def test_a_page_of_its_own_is_let_in(served: Served) -> None:
+    for origin in (f"http://127.0.0.1:{served.port}", f"http://localhost:{served.port}"):
+        assert served.request("GET", "/begin", Origin=origin)[0] == 200
+
+
+@pytest.mark.parametrize("cookie", [None, ""])
+def test_every_response_says_what_a_page_may_load(served: Served, cookie: str | None) -> None:
+    headers = served.request("GET", "/", **({} if cookie is None else {"Cookie": cookie}))[1]
+    rules = dict(rule.split(" ", 1) for rule in headers["Content-Security-Policy"].split("; "))
+    assert (rules["default-src"], rules["script-src"], rules["connect-src"]) == ("'none'", "'self'", "'self'")
+    assert headers["X-Content-Type-Options"] == "nosniff"
+
+
+def test_the_page_has_no_script_in_it_and_names_no_other_place(served: Served) -> None:
+    for name in ("", "main.js", "style.css", "plot.js", "wire.js"):
+        status, _, content = served.request("GET", f"/{name}")
+        assert status == 200
+        assert b"https://" not in content
+    page = served.request("GET", "/")[2].decode()
+    assert page.count("<script ") == page.count("></script>") == 2
+    assert " on" not in page.replace(" on the page", "").replace(" one minute", "").partition("<body>")[2]
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["/../server.py", "/%2e%2e/server.py", "/..%2fserver.py", "/page/main.js", "//etc/passwd", "/server.py", "/page"],
+)
+def test_no_other_file_is_handed_out(served: Served, path: str) -> None:
+    status, _, content = served.request("GET", path)
+    assert status == 404
+    assert b"import" not in content
+
+
+# ---------------------------------------------------------------- what is taken
+
+
+def test_questions_that_are_none_are_refused(served: Served) -> None:
+    machine = {"name": "x", "text": RIG.read_text(encoding="utf-8")}
+    whole = json.dumps({"machine": machine}).encode()
+    assert served.request("POST", "/ask/nothing", whole)[0] == 404
+    assert served.request("GET", "/ask/machine")[0] == 405
+    assert served.request("POST", "/ask/machine", whole, Content_Type="text/plain")[0] == 422
+    for body in (b"", b"[]", b"{", b'{"machine": 3}', b'{"machine": {"text": 1}}', b"[" * 100000):
+        assert served.request("POST", "/ask/machine", body)[0] == 422
+    assert served.request("POST", "/ask/machine", b'"' + 9_000_000 * b"a")[0] == 422
+
+
+def test_a_wrong_value_is_answered_in_words(served: Served) -> None:
+    (part,) = served.ask("machine", RIG, {"masses.cart": "3 N"})
+    assert (part["kind"], part["key"]) == ("refused", "masses.cart")
+    assert "kg" in part["text"]
+    (part,) = served.ask("run", RIG, {}, out="/tmp/x")
+    assert part["kind"] == "refused"
+
+
+def test_options_name_no_file(served: Served) -> None:
+    for question in ("check", "map", "boundary", "tune", "design", "run"):
+        for options in ({"out": "/tmp/x"}, {"spec": "/etc/passwd"}, {"export": ["/tmp/x.csv"]}):
+            assert served.ask(question, RIG, {}, **options)[-1]["kind"] == "refused"
+
+
+# ---------------------------------------------------------------- what is answered
+
+
+def test_a_machine_has_the_keys_of_its_file_with_what_they_take(served: Served) -> None:
+    (part,) = served.ask("machine", RIG, {"masses.cart": "1.5 kg"})
+    keys = {key["path"]: key for table in part["tables"] for key in table["keys"]}
+    assert (keys["masses.cart"]["value"], keys["masses.cart"]["si"], keys["masses.cart"]["unit"]) == (
+        "1.5 kg",
+        1.5,
+        "kg",
+    )
+    assert keys["joint.locked"]["kind"] == "switch"
+    assert keys["friction.model"]["options"] == ["lugre"]
+    assert keys["controller.crossover"]["range"] == {"low": 0.8, "high": 80.0, "log": True}
+    assert 0 < keys["controller.alpha"]["range"]["low"] < keys["controller.alpha"]["range"]["high"] < 1
+    assert friso.loads(part["toml"]) == friso.load(RIG).replace({"masses.cart": "1.5 kg"})
+
+
+@pytest.mark.parametrize("name", [name for name in friso.answers.starting.example_names() if "/" not in name])
+def test_every_example_is_shown(name: str) -> None:
+    path = Path(friso.example(name))
+    part = shown(Machine(path.read_text(encoding="utf-8"), path.name))
+    written = friso.load(path).as_written()
+    tables = {table["name"]: table for table in part["tables"] if table["present"]}
+    assert {name for name, value in written.items() if isinstance(value, dict)} == set(tables)
+    for table in tables.values():
+        values = {key["path"].split(".")[1]: key["value"] for key in table["keys"] if key["value"] is not None}
+        assert values == written[table["name"]]
+
+
+def test_a_key_added_on_the_page_can_be_taken_away_again() -> None:
+    text = RIG.read_text(encoding="utf-8")
+    machine = Machine.of({"text": text, "changes": {"controller.force_limit": None}})
+    assert machine.stage == friso.loads(text)
+
+
+def test_a_run_is_that_of_friso(served: Served) -> None:
+    (part,) = served.ask("run", STICK_SLIP)
+    answer = friso.simulate(STICK_SLIP)
+    assert part["sentences"] == [*answer.sentences()]
+    assert part["command"] == "friso simulate lugre_stick_slip.toml"
+    lines = [trace for trace in part["figures"][0]["data"] if trace["name"] == "position"]
+    assert lines[0]["y"].dtype == np.float32
+    assert lines[0]["y"][-1] == pytest.approx(1e3 * float(answer["position"][-1]), rel=1e-6)
+
+
+def test_changes_become_the_command_that_gives_the_same(served: Served) -> None:
+    (part,) = served.ask("run", STICK_SLIP, {"masses.stage": "1.1 kg"})
+    assert part["command"] == "friso simulate lugre_stick_slip.toml --set 'masses.stage=1.1 kg'"
+    assert part["python"] == "friso.simulate('lugre_stick_slip.toml', set={'masses.stage': '1.1 kg'})"
+
+
+# ---------------------------------------------------------------- overtaken
+
+
+def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> None:
+    flag = np.zeros(1, np.int64)
+    with ended_by(flag):
+        before = friso.simulate(STICK_SLIP)["position"].values
+        flag[0] = 1
+        with pytest.raises(Overtaken):
+            friso.simulate(STICK_SLIP)
+        with pytest.raises(Overtaken):
+            go_on()
+    assert np.array_equal(friso.simulate(STICK_SLIP)["position"].values, before)
