@@ -27,8 +27,8 @@ const pictures = new Pictures(sent, {
   check,
 });
 
-const form = new Live("machine", "machine", 2000, (part, dragged) => described(part, dragged));
-const verdict = new Live("verdict", "verdict", 1500, (part, tag) => {
+const form = new Live("machine", "machine", 2000, described);
+const verdict = new Live("verdict", "verdict", 5000, (part, tag) => {
   if (part.kind === "message") return answers.progress(part);
   if (part.kind !== "answer") return;
   answers.quick(part);
@@ -49,23 +49,40 @@ function withUnits(values) {
 
 function changed(dragged) {
   bar();
-  if (!machines.current()) return;
-  form.ask({ machine: machines.sent() }, dragged);
+  const machine = machines.current();
+  if (!machine) return;
+  clearTimeout(timer);
+  end("check");
+  answers.progress(null);
+  if (shown && held === machine.text && !wrong) {
+    follow(dragged);
+    if (dragged) return;
+  }
+  form.ask({ machine: machines.sent() });
+}
+
+/** Verdict and picture follow the machine. */
+function follow(dragged) {
+  const given = machines.changes();
+  const label = Object.entries(given).at(-1)?.join(" ") ?? "as opened";
+  verdict.ask({ machine: machines.sent() }, { changes: given, label });
+  pictures.changed(dragged);
 }
 
 /** The server has read the machine, or refused it. */
-function described(part, dragged) {
+function described(part) {
   if (part.kind === "refused" || part.kind === "failed") {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
     answers.progress(null);
     if (!shown) return answers.refused(part.text);
     const known = shown.tables.flatMap((table) => table.keys).some((key) => wrong.keys.includes(key.path));
-    if (!dragged) left();
+    left();
     if (!known) answers.refused(part.text);
     return;
   }
   if (part.kind !== "answer") return;
+  const first = wrong !== null || held !== machines.current().text;
   wrong = null;
   shown = part;
   if (held !== machines.current().text) {
@@ -73,15 +90,12 @@ function described(part, dragged) {
     forgetRanges();
   }
   document.title = `${part.title || machines.current().name}: friso`;
-  if (dragged) redraw();
-  else left();
-  const given = machines.changes();
-  const label = Object.entries(given).at(-1)?.join(" ") ?? "as opened";
-  verdict.ask({ machine: machines.sent() }, { changes: given, label });
-  pictures.changed(part, dragged);
+  left();
+  pictures.machine = part;
+  pictures.bar();
+  if (first) follow(false);
   clearTimeout(timer);
-  end("check");
-  if (!dragged) timer = setTimeout(check, CHECKED_AFTER);
+  timer = setTimeout(check, CHECKED_AFTER);
 }
 
 async function check() {

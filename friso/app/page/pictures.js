@@ -11,7 +11,7 @@ export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
   constructor(sent, tell) {
     Object.assign(this, { sent, tell, shown: "run", machine: null, answer: null, timer: 0, kept: new Map() });
-    this.live = new Live("run", "picture", 400, (answer) => this.arrived(answer));
+    this.live = new Live("run", "picture", 3000, (answer) => this.arrived(answer));
     this.tabs = [
       { id: "run", label: "Run" },
       { id: "check", label: "Hunting" },
@@ -71,8 +71,7 @@ export class Pictures {
   }
 
   /** The machine has changed; `dragged`: not yet for good. */
-  changed(machine, dragged) {
-    if (machine) this.machine = machine;
+  changed(dragged) {
     if (!this.plots) this.begin($("picture"));
     this.bar();
     if (this.shown === "run") this.live.ask(this.body());
