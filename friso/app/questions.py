@@ -206,9 +206,9 @@ def report(function: Callable[..., Answer], asked: Asked, work: Work) -> Iterato
 
 
 def _lines(command: str, asked: Asked, options: Mapping[str, Any] | None = None, function: str = "") -> Part:
-    given = options or {}
-    line = python_line(function or command, asked.machine, given)
-    return {"command": command_line(command, asked.machine, given), "python": line}
+    chosen = options or {}
+    line = python_line(function or command, asked.machine, chosen)
+    return {"command": command_line(command, asked.machine, chosen), "python": line}
 
 
 @lru_cache(8)
