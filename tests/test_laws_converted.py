@@ -1,18 +1,26 @@
 """From one friction law to another: what is kept, and what is said not to be."""
 
 import json
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
+import sympy as sp
 from inside import friso_inside
 from scipy.integrate import solve_ivp
-from variants import DAHL, VARIANTS, elasto_plastic, gms, rolling, step, stribeck, van_dijk
+from variants import DAHL, VARIANTS, elasto_plastic, gms, lugre, rolling, step, stribeck, van_dijk
 from variants import stage as stage_with
 
 import friso
+from friso.equations.component import Switch, state
+from friso.equations.friction.common import direction
 from friso.errors import InputError
+from friso.frequency.friction import steady_force
+from friso.identification.readings.common import stribeck_curve
 from friso.stage import Stage
+from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert, convertible, measured
 from friso.views.drawing import matplotlib_renderer
 
@@ -24,24 +32,61 @@ def under(friction: str) -> Stage:
     return stage_with(step(), friction=friction, controller=van_dijk())
 
 
-@pytest.mark.parametrize("friction", [elasto_plastic(), elasto_plastic(deflection="2 um"), rolling(), rolling(3.0)])
-def test_virgin_curves_against_scipy(friction: str) -> None:
-    """dF/dx of the law moving slowly, by SciPy."""
+SLOW = 1e-12
+"""Speed [m/s] at which no force depends on it."""
+
+STICKING = [lugre(2), DAHL, elasto_plastic(), elasto_plastic(deflection="2 um"), rolling(), rolling(3.0), gms()]
+
+
+def slopes(flat: Mapping[str, Any]) -> tuple[Callable[..., Any], Callable[..., Any], int]:
+    """Of the law as it is declared, pulled slowly forward: how its states change with the displacement, its force, both
+    as functions of the states, and how many these are. An element that slips is where it began to."""
+    law, velocity = friction_law(flat["friction.model"]), state("velocity")
+    friction = law.declare(velocity, law.variant(flat))
+    states = [item.symbol for item in friction.component.states]
+    switches = [kink for kink in friction.component.kinks if isinstance(kink, Switch)]
+    sticking = {item.beyond: sp.Piecewise((0, item.enter < 0), (1, True)) for item in switches}
+    rates = []
+    for item in friction.component.states:
+        sticks = sp.prod([1 - side for mode, side in sticking.items() if item.derivative.has(mode)])
+        rates.append(item.derivative.subs(dict.fromkeys(sticking, 0)) * sticks / velocity)
+    sides = friction.sides({x: x for x in states}) | {direction(velocity).beyond: 1} | dict.fromkeys(sticking, 0)
+    values = {velocity: SLOW} | {symbol: flat[str(symbol)] for symbol in _keys(friction, rates) if str(symbol) in flat}
+    modules: list[Any] = [{"sine": lambda turns: np.sin(2 * np.pi * turns)}, "numpy"]
+    rate, force = (
+        sp.lambdify([states], [part.subs(sides).subs(values) for part in parts], modules)
+        for parts in (rates, [friction.force])
+    )
+    return rate, force, len(states)
+
+
+def _keys(friction: Any, rates: list[Any]) -> set[Any]:
+    expressions = [*rates, friction.force, *(kink.surface for kink in friction.component.kinks)]
+    return set().union(*(expression.free_symbols for expression in expressions))
+
+
+@pytest.mark.parametrize("friction", STICKING)
+def test_virgin_curves_are_those_of_the_declared_equations(friction: str) -> None:
+    """The force over displacement from rest that a law says is measured of it, against its declaration by SciPy."""
     flat = under(friction).flat()
-    curve, static, stiffness = measured(flat), flat["friction.static"], flat["friction.bristle_stiffness"]
-
-    def slope(_: float, state: np.ndarray) -> list[float]:
-        z, most = float(state[0]), static / stiffness
-        if flat["friction.model"] == "rolling":
-            return [(1 - z / most) ** flat["friction.rolling_exponent"]]
-        begins = flat["friction.breakaway_deflection"]
-        rising = 0.5 + 0.5 * np.sin(np.pi * (z - (most + begins) / 2) / (most - begins))
-        return [1 - (0.0 if z < begins else rising) * z / most]
-
+    curve = measured(flat)
+    rate, force, count = slopes(flat)
+    static = curve.levels.static
     few = curve.displacement[::20][:60]
-    run = solve_ivp(slope, (0, few[-1]), [0.0], "DOP853", few, rtol=1e-11, atol=1e-18, max_step=static / stiffness / 50)
+    step = static / curve.stiffness / 50
+    run = solve_ivp(
+        lambda _, z: rate(z), (0, few[-1]), np.zeros(count), "DOP853", few, rtol=1e-10, atol=1e-18, max_step=step
+    )
     ours = np.interp(few, curve.displacement, curve.force)
-    assert ours == pytest.approx(stiffness * run.y[0], abs=1e-6 * static)
+    exact = [force(z)[0] for z in run.y.T]
+    assert ours == pytest.approx(np.array(exact), abs=1e-5 * static)
+
+
+def test_the_curve_of_readings_is_that_of_the_laws() -> None:
+    flat, speeds = LUGRE.flat(), np.geomspace(1e-5, 1.0, 30)
+    levels = [flat[f"friction.{name}"] for name in ("coulomb", "static", "stribeck_velocity", "stribeck_exponent")]
+    dry = steady_force(flat, speeds, True) - flat["friction.viscous"] * speeds
+    assert stribeck_curve(speeds, *levels) == pytest.approx(dry, rel=1e-12)
 
 
 @pytest.mark.parametrize("law", ["gms", "elasto_plastic", "rolling"])

@@ -15,7 +15,6 @@ from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import clipped_share, held, interpolated, unwrapped
 from friso.identification.logs.delays import fitted_lag, in_blocks, lag
-from friso.identification.logs.excerpt import excerpt
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, from_options
@@ -595,9 +594,9 @@ def test_of_a_long_log_the_part_that_moves_most_is_taken() -> None:
     time = np.arange(10_000) * 1e-3
     position = np.where((time > 4.0) & (time < 5.0), np.sin(20 * time), 0.0)
     log = Log("long", time, 1e-3, {"position": position, "force": time}, (slice(0, 10_000),))
-    part = excerpt(log, 1500)
+    part = log.excerpt(1500)
     assert part.segments == (slice(0, 1500),)
     assert part.time[0] <= 4.0
     assert part.time[-1] >= 5.0
     assert np.array_equal(part["force"], part.time)
-    assert excerpt(log, 10_000) is log
+    assert log.excerpt(10_000) is log

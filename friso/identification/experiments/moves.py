@@ -11,7 +11,6 @@ from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
-from friso.identification.logs.excerpt import excerpt
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_roles, identify_moves, simulated_log
 from friso.identification.output_error.problem import why_continuous
@@ -56,7 +55,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     assert isinstance(whole, Log)
     if prior.from_user:
         check_roles(whole, ("force",))
-    log = excerpt(whole, MOST)
+    log = whole.excerpt(MOST)
     flat = prior.flat(log) if _in_newtons(log) else made_up(log, inverse_model(log, settings.bandwidth)).flat()
     start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
     return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth, settings.progress)
@@ -68,7 +67,7 @@ def _in_newtons(log: Log) -> bool:
 
 def _around(log: Log) -> Stage | None:
     """A stage around a log whose force is in newtons."""
-    part = excerpt(log, MOST)
+    part = log.excerpt(MOST)
     return made_up(part, inverse_model(part)) if _in_newtons(log) else None
 
 

@@ -61,6 +61,18 @@ class Log:
         """The longest stretch without gaps."""
         return max(self.segments, key=lambda part: part.stop - part.start)
 
+    def excerpt(self, count: int) -> Log:
+        """At most so many samples of the longest stretch without gaps: those in which the position goes the longest
+        way. The whole log where that stretch is no longer."""
+        part = self.longest
+        if part.stop - part.start <= count:
+            return self
+        travel = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(self["position"][part])))])
+        first = part.start + int(np.argmax(travel[count - 1 :] - travel[: len(travel) - count + 1]))
+        chosen = slice(first, first + count)
+        signals = {role: values[chosen] for role, values in self.signals.items()}
+        return replace(self, time=self.time[chosen], signals=signals, segments=(slice(0, count),))
+
     def unit(self, role: str) -> str:
         """The unit in which a role stands, that of a linear axis where it is the role's."""
         return self.units.get(role, ROLES[role])
