@@ -59,7 +59,7 @@ def test_check_json_has_the_cycle_and_what_starts_it(checked: dict[str, Any]) ->
     assert locked["kick"]["velocity_m_per_s"][0][0] == pytest.approx(0.0231, rel=0.02)
     assert locked["moves"] == {"drawn": 128, "hunting": pytest.approx(111, abs=2)}
     assert (free["cycle"], free["cycles"], free["kick"], free["moves"]) == (None, 0, None, None)
-    assert free["reason"] == "from no distance does the stage swing back as far as it came from"
+    assert free["reason"] == NO_RETURN
     assert free["settled_after_s"] == free["settling_time_10um_s"]
 
 

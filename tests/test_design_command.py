@@ -434,20 +434,14 @@ def test_settling_ends_where_moves_do_not_rest(designed: Design) -> None:
 # ---------------------------------------------------------------- what is refused
 
 
-def test_no_design_says_what_to_relax(no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_no_design_says_what_to_relax(
+    no_design: None, tmp_path: Path, capsys: pytest.CaptureFixture, wording: Wording
+) -> None:
     with pytest.raises(typer.Exit) as left:
         command(RIG, SPEC, out=tmp_path / "out")
     shown = capsys.readouterr()
     assert (left.value.exit_code, shown.out) == (2, "")
-    assert shown.err.splitlines() == [
-        "friso: no design: no leaf springs meet the specification",
-        "  relax safety.parasitic from 10 to 8.12 (first interfering frequency): then 2 leaves of 70 x 20 x 0.3 mm, 45 "
-        "mm apart, of stainless 1.4310 do",
-        "  relax leaves.length from 70 mm to 74.3 mm (length of the leaves, at most): then 2 leaves of 70 x 20 x 0.3 "
-        "mm, 45 mm apart, of stainless 1.4310 do",
-        "  relax joint.damping from 0.5 N·s/m to 3.2 N·s/m (crossover above the edge of hunting)",
-        "  (each one alone; this concerns the leaf springs only, the later steps were not tried)",
-    ]
+    wording(shown.err)
     assert not (tmp_path / "out").exists()
 
 
@@ -460,20 +454,15 @@ def test_no_design_as_a_document(
     document = _strict(shown.out)
     assert document.keys() == {"conclusion", "stage", "spec", "feasible", "reason", "relax", "files", "plug_ins"}
     assert document["feasible"] is False
-    assert document["relax"][1] == {
-        "key": "leaves.length",
-        "requirement": "length of the leaves, at most",
-        "from": 0.07,
-        "to": 0.07421,
-        "unit": "m",
+    length = document["relax"][1]
+    assert {name: length[name] for name in ("key", "from", "to", "unit")} == {
+        **{"key": "leaves.length", "from": 0.07, "to": 0.07421, "unit": "m"},
     }
     wording(shown.err)
 
 
-def test_no_single_relaxation() -> None:
-    assert refusal(NoDesign("too tight")) == (
-        "too tight\n  no single requirement was found whose relaxation alone is enough: relax several"
-    )
+def test_no_single_relaxation(wording: Wording) -> None:
+    wording(refusal(NoDesign("too tight")))
     many = refusal(NoDesign("too tight", RELAXED * 3))
     assert len(many.splitlines()) == 7
     assert refused_document("rig", "spec", NoDesign("too tight"))["relax"] == []

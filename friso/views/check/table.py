@@ -11,7 +11,14 @@ from friso.hunting.verdict import BANDWIDTHS, STARTS
 from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase
 from friso.views.check.words import at_the_end, edge_text
-from friso.views.drawing.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
+from friso.views.drawing.prefixes import (
+    NOTHING,
+    percent_range,
+    plus_minus,
+    range_with_unit,
+    window_with_unit,
+    with_unit,
+)
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Kick
@@ -102,7 +109,7 @@ def _moves(case: Case) -> str:
     if moves is None:
         return UNKNOWN if STARTS in case.judgement.given_up else NOTHING
     low, high = moves.interval
-    return f"{percent(moves.fraction)} ({percent(low)} to {percent(high)}) of {moves.count} moves"
+    return f"{percent(moves.fraction)} ({percent_range(low, high)}) of {moves.count} moves"
 
 
 def _peaks(case: Case) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.axis import unit_shown
-from friso.quantities import NOTHING
+from friso.quantities import NOTHING, percent
 from friso.views.drawing.figure import Array
 
 if TYPE_CHECKING:
@@ -104,6 +104,11 @@ def share_with_interval(share: Share) -> str:
     """A share and its interval in percent; what is not 0 or 100 % does not look like that."""
     middle = f"{percentage(share.probability)} %" if math.isfinite(share.probability) else "unknown"
     return f"{middle} ({percentage(share.low)} to {percentage(share.high)} %)"
+
+
+def percent_range(low: float, high: float) -> str:
+    """Two shares in percent, with one sign."""
+    return f"{percent(low).removesuffix(' %')} to {percent(high)}"
 
 
 def percentage(part: float) -> str:
