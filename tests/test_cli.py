@@ -13,6 +13,7 @@ from inside import friso_inside
 from refusals import Refused
 
 import friso
+from friso.hunting.cycle.find import NO_RETURN
 
 ROOT = Path(__file__).parent.parent
 RIG, STICK_SLIP = ROOT / "examples" / "thesis_rig.toml", ROOT / "examples" / "lugre_stick_slip.toml"
