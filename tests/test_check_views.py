@@ -352,14 +352,14 @@ def tabled(judgement: Judgement, **changes: Any) -> dict[str, str | None]:
     return {name: texts[0] for name, texts in rows((item,))}
 
 
-def told(before: dict[str, str | None], after: dict[str, str | None]) -> str:
+def changed_rows(before: dict[str, str | None], after: dict[str, str | None]) -> str:
     """The rows in which a case differs from another."""
     differing = [name for name in after if after[name] != before.get(name)]
     return "\n".join(f"{name}: {after[name]}" for name in differing)
 
 
 def test_rows_of_a_stage_that_hunts(wording: Wording) -> None:
-    wording(told(tabled(cannot_hunt()), tabled(hunts())))
+    wording(changed_rows(tabled(cannot_hunt()), tabled(hunts())))
 
 
 def test_rows_of_other_cycles(wording: Wording) -> None:
@@ -373,19 +373,19 @@ def test_rows_of_other_cycles(wording: Wording) -> None:
         hunts(margin=Margin(1.22, None, True, 1.227)),
     )
     for other in others:
-        wording(told(tabled(hunts()), tabled(other)))
+        wording(changed_rows(tabled(hunts()), tabled(other)))
 
 
 def test_windows_of_kicks(wording: Wording) -> None:
     many = tuple((i * 1e-3, i * 1e-3 + 5e-4) for i in range(1, 8))
     for windows in ((), ((1e-5, 0.1),), ((1e-5, 2e-3), (3e-3, 4e-3)), many):
-        wording(told(tabled(hunts()), tabled(hunts(displacement=Kick(windows, (1e-5, 0.1))))))
+        wording(changed_rows(tabled(hunts()), tabled(hunts(displacement=Kick(windows, (1e-5, 0.1))))))
 
 
 def test_kicks_that_were_given_up_are_told(wording: Wording) -> None:
     lost = Kick((), (1e-5, 0.1), unknown=3)
     for kick in (lost, replace(lost, windows=((1e-3, 2e-3),))):
-        wording(told(tabled(hunts()), tabled(hunts(displacement=kick))))
+        wording(changed_rows(tabled(hunts()), tabled(hunts(displacement=kick))))
 
 
 def test_kicks_that_start_hunting_are_told_where_others_were_given_up() -> None:
@@ -399,7 +399,7 @@ def test_kicks_that_start_hunting_are_told_where_others_were_given_up() -> None:
 def test_a_peak_count_that_contradicts_the_verdict_is_explained(wording: Wording) -> None:
     cases = ((hunts(), 0), (hunts(verdict="bistable"), 0), (settles(verdict="transient"), 8), (settles(), 0))
     for judgement, peaks in cases:
-        wording(told(tabled(judgement, peaks=6), tabled(judgement, peaks=peaks)))
+        wording(changed_rows(tabled(judgement, peaks=6), tabled(judgement, peaks=peaks)))
 
 
 def test_conclusion_names_what_the_joint_does(snapshots):
@@ -437,7 +437,7 @@ def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it(word
     for edge in (sure, unsure):
         assert "to 11.8 Hz" in sentence(hunts(margin=edge))
     wording(sentence(hunts(margin=unsure)))
-    wording(told(tabled(hunts(margin=sure)), tabled(hunts(margin=unsure))))
+    wording(changed_rows(tabled(hunts(margin=sure)), tabled(hunts(margin=unsure))))
     below = sentence(settles(margin=replace(unsure, factor=0.91234, crossover=7.29872, quiet=0.92)))
     assert "7.298 Hz" in below
     assert "7.360 Hz" in below
@@ -463,7 +463,7 @@ def test_an_edge_is_told_with_the_digits_that_hold() -> None:
     rough = Margin(0.6998, 5.598, True, 0.7068, 0.0028)
     edge = "5.60 Hz (± 0.3 %)"
     assert edge in sentence(settles(margin=rough))
-    assert edge in told(tabled(settles()), tabled(settles(margin=rough)))
+    assert edge in changed_rows(tabled(settles()), tabled(settles(margin=rough)))
 
 
 def test_a_motion_that_does_not_move_the_stage_says_so() -> None:

@@ -14,15 +14,13 @@ from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, beside, read_correlations
 from friso.stage.plausible import doubts
+from friso.stage.rig import AS_BUILT
 
 StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
 """A stage, the path of a stage file, or its tables as a dictionary."""
 
 Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
 """Keys to be overridden: a dictionary, or texts KEY=VALUE."""
-
-AS_BUILT = ("drive", "rail", "cable", "floor")
-"""The tables of the machine as built, which the analyses of the ideal one leave out."""
 
 _NAMED = 3
 """Uncertain keys that are named, at most, where there are more."""

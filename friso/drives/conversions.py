@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from math import isfinite, pi
 from typing import Any
 
-from friso.axis import LINEAR, AxisKind, axis_of
+from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.drives.questions import UserAnswers
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
@@ -20,6 +20,7 @@ from friso.stage.controllers import controller_of
 TRAVEL, MOTOR_CONSTANT = "travel_per_turn", "motor_constant"
 """What the user may say: what a turn moves, and the torque of an ampere [N m/A], or the force [N/A] without a turn."""
 
+TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), KINDS["rotary"]: Quantity("rad", positive, "360 deg")}
 TORQUE_PER_AMPERE, FORCE_PER_AMPERE = Quantity("N*m/A", positive, "0.5 N*m/A"), Quantity("N/A", positive, "30 N/A")
 
 
@@ -41,6 +42,13 @@ class Conversion:
         return all(isfinite(value) for value, _ in self.values)
 
 
+def travel_of(flat: Mapping[str, Any]) -> float | None:
+    """What one turn of the motor moves [m or rad], as the transmission tells; None without one."""
+    if "transmission.ratio" in flat:
+        return 2 * pi / flat["transmission.ratio"]
+    return flat.get("transmission.lead")
+
+
 @dataclass(frozen=True)
 class Turn:
     """What a turn moves [m or rad] and what an ampere exerts at the load [N or N m]; None where unknown."""
@@ -52,11 +60,7 @@ class Turn:
     def of(cls, flat: Mapping[str, Any], answers: UserAnswers) -> Turn:
         """As the transmission or the user says. Raises InputError for an answer in another unit."""
         kind = axis_of(flat)
-        travel = flat.get("transmission.lead")
-        if "transmission.ratio" in flat:
-            travel = 2 * pi / flat["transmission.ratio"]
-        if TRAVEL in answers:
-            travel = answers.value(TRAVEL, Quantity("m", positive, "10 mm").on(kind))
+        travel = answers.value(TRAVEL, TRAVELS[kind]) if TRAVEL in answers else travel_of(flat)
         per_ampere = None
         if MOTOR_CONSTANT in answers and travel is not None:
             per_ampere = answers.value(MOTOR_CONSTANT, TORQUE_PER_AMPERE) * 2 * pi / travel

@@ -21,6 +21,7 @@ from friso.stage.controllers import (
     controller_of,
 )
 from friso.stage.filters import FilterForm, filter_forms
+from friso.stage.rig import LOOPS
 from friso.stage.standstill import NO_SETTINGS, FrictionSettings, settings_of
 from friso.stage.tables import friction_law
 from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
@@ -149,5 +150,5 @@ def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
         anti_windup=flat.get(ANTI_WINDUP, DEFAULT_ANTI_WINDUP) if FORCE_LIMIT in flat else None,
         filters=filter_forms(flat, FILTERS_KEY),
         settings=settings_of(flat),
-        loops=tuple(name for name in ("velocity", "position") if f"drive.{name}_sample_time" in flat),
+        loops=tuple(name for name in LOOPS if f"drive.{name}_sample_time" in flat),
     )

@@ -11,6 +11,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.frequency.system import Complex, System
+from friso.stage.rig import LOOPS
 
 LIGHT = 0.3
 """Damping ratio below which a pole is a resonance."""
@@ -26,7 +27,7 @@ its delay is unstable anyway."""
 MOST_SECTIONS, MOST_SAMPLES = 24, 64
 """Longest row of these, and longest delay of a sampled drive in samples."""
 
-SLOW_LOOPS = ("drive.position_sample_time", "drive.velocity_sample_time")
+SLOW_LOOPS = tuple(f"drive.{name}_sample_time" for name in LOOPS)
 """Keys of the sample times of loops that are carried out more slowly."""
 
 PADE_6 = tuple(comb(6, k) / (comb(12, k) * factorial(k)) for k in range(7))

@@ -25,11 +25,10 @@ from friso.equations.structure import ControllerForm, shared_structure
 from friso.errors import InputError
 from friso.frequency.declared import Declared
 from friso.frequency.system import Complex, System
+from friso.stage.rig import LOOPS
 from friso.stage.standstill import FrictionSettings
 
 POSITION, FORCE = "position", "force"
-
-LOOPS = ("position", "velocity")
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from friso.remedies.verified import Performance, RemedyOutcome, doubts, measure,
 from friso.remedies.window import windows
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
+from friso.stage.rig import AS_BUILT
 from friso.studies.compare.options import linear_flat
 
 TRIES = 3
@@ -180,7 +181,7 @@ def _moves(stage: Stage) -> None:
 
 def _ideal(stage: Stage) -> Stage:
     """The stage without what cycles leave out: rail, cable, floor, sampling and delay."""
-    return stage.replace({table: None for table in ("drive", "rail", "cable", "floor") if getattr(stage, table)})
+    return stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
 
 
 def _steps(remedy: Remedy, budget: Budget) -> int:

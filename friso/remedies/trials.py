@@ -71,12 +71,16 @@ def moved(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slowe
     return Moves(settling.reshape(shape), looser.reshape(shape), force.reshape(shape))
 
 
+def timing(drive: Stage) -> dict[str, float]:
+    """Sampling and delay of a stage, as flat keys."""
+    return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
+
+
 @np.errstate(all="ignore")
 def margins(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
     """The least modulus margin of the limit cases (0: not stable), shape (points, machines), with the sampling and
     delay of the stage `drive`."""
-    timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
-    flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing}
+    flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
     count = len(shares) * machines.count
     return linear_loops(remedy.stage, linear_flat(drive, flat), count).margin.reshape(len(shares), machines.count)
 

@@ -17,7 +17,7 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile
+from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile, timing
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -110,7 +110,6 @@ def measure(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performa
     """A stage on machines, with the sampling and delay of the stage `drive` for its margins."""
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
-    timing = {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
     stiffness = proportional_stiffness(flat)
     if flat.get("joint.locked") is False:
         stiffness = in_series(stiffness, flat["joint.stiffness"])
@@ -118,7 +117,7 @@ def measure(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performa
         moved(remedy, ONE, machines, goal),
         margins(remedy, ONE, machines, drive),
         attraction(remedy, ONE, machines, goal),
-        settled_margin({**flat, **timing}),
+        settled_margin({**flat, **timing(drive)}),
         float(stiffness),
     )
 

@@ -28,6 +28,13 @@ above_minus_1 = Bound("greater than -1", lambda value: value > -1)
 seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & (value < 1e15) & (value % 1 == 0))
 
 
+AS_BUILT = ("drive", "rail", "cable", "floor")
+"""The tables of the machine as built, which the analyses of the ideal one leave out."""
+
+LOOPS = ("velocity", "position")
+"""The loops that may have a sample time of their own, drive.<loop>_sample_time."""
+
+
 def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
     """The rule that one sample time is a whole multiple of another."""
     optional = "velocity" in fast

@@ -12,18 +12,14 @@ from collections.abc import Mapping
 from math import inf, pi
 from typing import Any
 
-from friso.axis import KINDS, LINEAR, AxisKind, axis_of
+from friso.axis import LINEAR, AxisKind, axis_of
+from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
 from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
-from friso.quantities import Quantity, positive
 from friso.stage.controllers import FILTERS_KEY
 from friso.stage.filters import FEEDBACK
 from friso.stage.lists import row_keys
-
-TRAVEL = "travel_per_turn"
-ROTARY = KINDS["rotary"]
-TRAVELS = {LINEAR: Quantity("m", positive, "10 mm"), ROTARY: Quantity("rad", positive, "360 deg")}
 
 CONFIG, MOTOR, ENCODER, MOVE = "controller.config", "motor.config", "encoder.config", "trap_traj.config"
 GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
@@ -233,18 +229,11 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
 
 def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """What a turn moves, where no transmission tells."""
-    if TRAVEL in answers or _travel(flat) is not None:
+    if TRAVEL in answers or travel_of(flat) is not None:
         return ()
     return (
         OpenQuestion(TRAVEL, "what one turn of the motor moves", '"10 mm"' if axis_of(flat) == LINEAR else '"360 deg"'),
     )
-
-
-def _travel(flat: Flat) -> float | None:
-    """What one turn of the motor moves [m or rad], as the transmission tells."""
-    if "transmission.ratio" in flat:
-        return 2 * pi / flat["transmission.ratio"]
-    return flat.get("transmission.lead")
 
 
 def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
@@ -256,7 +245,7 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
         raise lacks("an integral in the position loop", "a proportional position loop")
     if flat[f"{name}proportional_on"] != "error":
         raise lacks('proportional_on = "measurement"', 'proportional_on = "error"')
-    answered = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else _travel(flat)
+    answered = answers.value(TRAVEL, TRAVELS[axis_of(flat)]) if TRAVEL in answers else travel_of(flat)
     assert answered is not None  # it was asked for
     travel = float(answered)
     force = 2 * pi / travel
