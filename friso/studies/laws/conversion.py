@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.frequency.friction import steady_force
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest, numeric_fields
-from friso.stage.tables import FRICTION, FrictionSection, friction_law
+from friso.stage.tables import FrictionSection, friction_law, friction_laws
 
 ELEMENTS = 6
 """Elements of a law that has several, unless told otherwise."""
@@ -73,12 +73,8 @@ class LawConversion:
 
 
 def convertible() -> list[str]:
-    """The laws that can be made from measurements."""
-    return [
-        name
-        for name, law in FRICTION.classes.items()
-        if issubclass(law, FrictionSection) and law.keeping is not FrictionSection.keeping
-    ]
+    """The laws that can be made from measurements, in the order of their names, whatever is imported first."""
+    return sorted(name for name, law in friction_laws().items() if law.keeping is not FrictionSection.keeping)
 
 
 def measured(flat: Mapping[str, Any]) -> MeasuredFriction:
