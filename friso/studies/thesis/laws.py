@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.laws.conversion import LawConversion, Shown, compared, convert, convertible, measured
-from friso.studies.laws.verdicts import NEEDED
+from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, measured
+from friso.studies.laws.verdicts import kept_laws
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
 from friso.studies.thesis.experiments import experiments_on
 from friso.studies.thesis.linear import analysed
@@ -51,22 +51,17 @@ class ConclusionByLaw:
 
 @dataclass(frozen=True)
 class ConclusionsByLaw:
-    """The conclusions, law by law, the thesis's own first; and what each of the others does not keep of what is
-    measured of it, and needs to."""
+    """The conclusions under each law that keeps what is measured, the thesis's own first; and the laws that were
+    `left_out`: what they do not keep."""
 
     laws: tuple[str, ...]
-    lost: Mapping[str, tuple[Shown, ...]]
+    left_out: Mapping[str, tuple[Shown, ...]]
     conclusions: tuple[ConclusionByLaw, ...]
 
     @property
-    def alike(self) -> tuple[str, ...]:
-        """The other laws that keep what is measured."""
-        return tuple(law for law in self.laws[1:] if not self.lost[law])
-
-    @property
     def of_one_law(self) -> tuple[ConclusionByLaw, ...]:
-        """The conclusions that do not survive all laws that keep what is measured."""
-        return tuple(c for c in self.conclusions if not all(c.survives(law) for law in self.alike))
+        """The conclusions that do not survive all laws."""
+        return tuple(c for c in self.conclusions if not all(c.survives(law) for law in self.laws[1:]))
 
 
 def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:
@@ -82,7 +77,8 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
         and not {need for need in entry.needs if need in STUDIES} - reproduction.maps.keys()
     }
     evidences = {own: _evidence(reproduction.maps, reproduction.responses, rig)}
-    converted = [_converted(rig, law) for law in convertible() if law != own]
+    (_, *kept), left_out = kept_laws(rig, ELEMENTS)
+    converted = [_apart(rig, conversion) for conversion in kept]
     for number, conversion in enumerate(converted):
         progress(number, len(converted), conversion.law)
         changes = {"friction": conversion.stage.as_written()["friction"]}
@@ -95,7 +91,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
     }
     return ConclusionsByLaw(
         tuple(evidences),
-        {c.law: tuple(item.kind for item in c.lost if item.kind in NEEDED) for c in converted},
+        left_out,
         tuple(
             ConclusionByLaw(claim, {law: by_claim[claim.id] for law, by_claim in findings.items()})
             for claim in claims()
@@ -108,10 +104,9 @@ def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response],
     return Evidence(maps, responses, analysed(stage), experiments_on(stage))
 
 
-def _converted(rig: Stage, law: str) -> LawConversion:
+def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
     """The rig under a law: as converted, or, where that is the rig's own law, with what is left open as far from it as
     measurements allow."""
-    conversion = convert(rig, law)
     same = all(change.off <= change.allowed / 10 for change in conversion.compared)
     if not same:
         return conversion

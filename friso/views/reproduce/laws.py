@@ -16,14 +16,12 @@ TITLE = "Conclusions of the thesis under each friction law"
 def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
     """How many conclusions survive, which do not, and which laws cannot say since they keep too little."""
     count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.of_one_law]
-    others = ", ".join(laws.alike)
+    others = ", ".join(laws.laws[1:])
     alike = f"{count - len(of_one)} of {count} conclusions are judged alike"
     lines = [f"{alike} under every law that keeps what is measured ({others})."]
     if of_one:
         lines.append(f"Those of {laws.laws[0]} alone: {', '.join(of_one)}.")
-    lines += [
-        f"{law} does not keep {listed([SHOWN[k] for k in lost], 'and')}." for law, lost in laws.lost.items() if lost
-    ]
+    lines += [f"{law} does not keep {listed([SHOWN[k] for k in lost], 'and')}." for law, lost in laws.left_out.items()]
     return lines
 
 
@@ -41,7 +39,7 @@ def laws_document(laws: ConclusionsByLaw) -> dict[str, Any]:
     """For the JSON document."""
     return {
         "laws": list(laws.laws),
-        "not_kept": {law: [SHOWN[kind] for kind in lost] for law, lost in laws.lost.items()},
+        "left_out": {law: [SHOWN[kind] for kind in lost] for law, lost in laws.left_out.items()},
         "conclusions": [
             {
                 "id": conclusion.claim.id,
