@@ -15,7 +15,6 @@ from friso.stage import Stage
 from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, measured
 from friso.studies.laws.verdicts import kept_laws
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
-from friso.studies.thesis.experiments import experiments_on
 from friso.studies.thesis.linear import analysed
 from friso.studies.thesis.reproduce import RESPONSES, Reproduction, maps_of, response_of
 from friso.studies.thesis.studies import STUDIES, thesis_rig
@@ -101,7 +100,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
 
 
 def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response], stage: Stage) -> Evidence:
-    return Evidence(maps, responses, analysed(stage), experiments_on(stage))
+    return Evidence(maps, responses, analysed(stage))
 
 
 def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
