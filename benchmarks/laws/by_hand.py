@@ -18,6 +18,9 @@ JOINTS = ("rigid", "locked", "free")
 ROUNDED = 1e-4
 """Share of the level below which bristles of rolling friction give way in proportion (docs/friction.md)."""
 
+ROUNDING = 1e-7
+"""Share of its limit by which an element may lack and slip at the start: a state says it no better."""
+
 EVENTS = 20_000
 """Events that a run may have."""
 
@@ -42,12 +45,15 @@ class Stage:
         return np.array([names.get(name, 0.0) for name in (*order, *bristles)])
 
     def run(self, y: np.ndarray, duration: float, rtol: float) -> tuple[np.ndarray, np.ndarray, float, float]:
-        """States at the end of a run from a state in which no element slips, their rates there, and the highest and
+        """States at the end of a run from a state, their rates there, and the highest and
         lowest position [m] on the way."""
         body = V if self.joint == "rigid" else VC
         slips = np.zeros(len(self.elements[0]))
         t, y, touch = 0.0, np.array(y, dtype=float), self._touches(y)
         way = float(np.sign(y[body])) or float(np.sign(self._rates(y, slips, 1.0, touch)[body]))
+        if self.law == "gms":  # what bears its share slips on
+            bearing = [self._lacks(y, n, way, body) for n in range(len(slips))]
+            slips = (np.array(bearing) <= ROUNDING * self.elements[1] * _level(y[body], self.numbers)).astype(float)
         high = low = y[X]
         for _ in range(EVENTS):
             surfaces = self._surfaces(body, slips, way, touch)

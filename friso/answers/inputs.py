@@ -68,7 +68,8 @@ def read_stage(
         LOGGER.warning(
             f"{several} uncertain ({named}): {centres} used; friso check --draws 1000 samples the whole range"
         )
-    left = [name for name in leaves_out if getattr(stage, name)]
+    placed = stage.conditions is not None and stage.conditions.place is not None
+    left = [name for name in leaves_out if getattr(stage, name) and not (name == "rail" and placed)]
     if left:
         tables = ", ".join(f"[{name}]" for name in left)
         bode = "; friso bode takes sampling and delay into account" if "drive" in left else ""

@@ -51,9 +51,9 @@ class Elements(NamedTuple):
     damped: bool
 
 
-def _as_many(key: str, what: str) -> Rule:
-    """The rule that a list is as long as that of the stiffnesses."""
-    example = 'element_stiffness = ["70 N/mm", "30 N/mm"], element_share = [0.4, 0.6]'
+def _as_many(key: str, what: str, two: str) -> Rule:
+    """The rule that a list is as long as that of the stiffnesses; `two` are values of two elements."""
+    example = f'element_stiffness = ["70 N/mm", "30 N/mm"], {key.removeprefix("friction.")} = {two}'
     return Rule(
         (STIFFNESS, key),
         lambda flat: len(element_keys(flat, key)) in (len(element_keys(flat, STIFFNESS)), 0),
@@ -83,8 +83,8 @@ class GeneralisedMaxwellSlip(StribeckSection):
 
     rules: ClassVar[tuple[Rule, ...]] = (
         COULOMB_BELOW_STATIC,
-        _as_many(SHARE, "share"),
-        _as_many(DAMPING, "damping"),
+        _as_many(SHARE, "share", "[0.4, 0.6]"),
+        _as_many(DAMPING, "damping", '["220 N*s/m", "95 N*s/m"]'),
         Rule(
             (SHARE,),
             lambda flat: abs(sum(flat[name] for name in element_keys(flat, SHARE)) - 1) < 1e-9,

@@ -109,6 +109,7 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
         ]
     rows.append(("Varied (left open)", [_drawn(verdict) for verdict in laws.verdicts]))
     rows.append(("Not reproduced", [_lost(verdict) for verdict in laws.verdicts]))
+    rows.append(("Passive only if", [verdict.conversion.active or "it is" for verdict in laws.verdicts]))
     return [(axis_shown().text(name), texts) for name, texts in rows]
 
 
