@@ -14,9 +14,10 @@ from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
-from friso.hunting.boundary.locate import Kind, changes, last_inside
+from friso.hunting.boundary.locate import TIGHTER, Kind, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import families, hunting_cycles
+from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import simplest
 
 SCALE = 0.06
@@ -120,7 +121,7 @@ class Outward:
             if flip:
                 (place.at, reserve), distance, ended = flip, orbit.distance, True
             else:
-                (place.at, distance, ended), reserve = self._followed(at, orbit), PRECISE
+                place.at, distance, ended, reserve = self._followed(at, orbit)
             at = place.at
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
@@ -173,9 +174,10 @@ class Outward:
         return 1.0 if self.farthest >= at else -1.0
 
     @np.errstate(all="ignore")
-    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float, bool]:
-        """The last factor at which a closed orbit attracts, the distance [m] at which the stage sticks there, and
-        whether it was followed to its end: a flip, a fold or a torus, and not lost on the way."""
+    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float, bool, float]:
+        """The last factor at which a closed orbit attracts, the distance [m] at which the stage sticks there, whether
+        it was followed to its end: a flip, a fold or a torus, and not lost on the way; and up to what share of it the
+        factor is known."""
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
 
@@ -185,7 +187,7 @@ class Outward:
         length = abs(float(np.log(self.farthest / at)))
         tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=PACE)
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
-        farthest = start
+        farthest, reserve = start, PRECISE
 
         def over(point: Point) -> bool:
             nonlocal farthest
@@ -201,9 +203,11 @@ class Outward:
             last = last_inside(tracer, first, second, kind, FLAT if kind == "fold" else PRECISE)
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
+            if last is not None and kind == "flip":
+                reserve = max(PRECISE, _rough(tracer, last, first, second))
         elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):
             raise Beyond
-        return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), ended
+        return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), ended, reserve
 
     @np.errstate(all="ignore")
     def _flip(self, at: float, outside: float) -> tuple[float, float] | None:
@@ -260,6 +264,19 @@ def _is_simple(orbit: Swinging) -> bool:
 def orbit_distance(point: Point, orbit: Swinging) -> float:
     """The distance [m] at which a stage sticks on an orbit, on the side on which it was followed."""
     return float(np.copysign(np.exp(point.distance), orbit.distance))
+
+
+def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> float:
+    """Up to what share of its bandwidth a flip is known, between two points: twice by what the multiplier changes at a
+    tighter tolerance, over its slope. It is rough where a law turns sharply, as rolling friction at full deflection;
+    where a limiter chatters the slope of the return map decides, and this says nothing."""
+    stages = tracer.family(np.zeros(1, np.int64), np.array([last.place]))
+    if stages.chatters:
+        return PRECISE
+    tight = multipliers(stages, last.cycle.orbits, TIGHTER * tracer.rtol).local[0, 0]
+    slope = (second.multiplier - first.multiplier) / (second.place - first.place)
+    rough = 2 * abs(float(tight.real) - last.multiplier) / abs(slope)
+    return float(rough) if np.isfinite(rough) else PRECISE
 
 
 def _kind(first: Point, second: Point) -> Kind:
