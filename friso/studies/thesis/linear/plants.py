@@ -15,6 +15,7 @@ from friso.frequency.margins import DENSITY, frequencies
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.stiffness import limiter_in_series
+from friso.stage.tables import friction_law
 
 PARASITIC = 300.0
 """Frequency [Hz] at which the thesis finds the parasitic mode (Sec. 3.4.2)."""
@@ -66,7 +67,8 @@ def springs_of(flat: Mapping[str, Any]) -> Springs:
     """The springs of a stage whose cart is stuck, its limiter free."""
     machine = plant(flat, limit_cases(flat)["stuck"]).take((FORCE,), (STAGE,))
     both = float(1 / abs(machine.at(np.zeros(1))[0, 0, 0, 0]))
-    return Springs(flat["joint.stiffness"], flat["friction.bristle_stiffness"], both)
+    bristles = friction_law(flat["friction.model"]).shown(flat).stiffness
+    return Springs(flat["joint.stiffness"], bristles, both)
 
 
 def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
