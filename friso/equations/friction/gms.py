@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 import numpy as np
 
 from friso.equations.conditions import friction_level
-from friso.equations.friction import rolling
 from friso.equations.friction.common import (
     COULOMB_BELOW_STATIC,
     STEADY_LOAD,
@@ -27,7 +26,13 @@ from friso.equations.friction.common import (
     stribeck_level_from_speed,
     viscous_force,
 )
-from friso.equations.friction.measured import MeasuredFriction, displacements, levels_of, levels_under_conditions
+from friso.equations.friction.measured import (
+    MeasuredFriction,
+    displacements,
+    levels_of,
+    levels_under_conditions,
+    power_law,
+)
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage import Rule, Several, Values, element_keys, register_friction
 
@@ -170,7 +175,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         as long as LuGre's does at the Stribeck velocity."""
         levels, stiffness = measured.levels, measured.stiffness
         way = displacements(levels.static, stiffness)
-        curve = rolling.virgin(levels.static, stiffness, shape["rolling_exponent"], way)
+        curve = power_law(levels.static, stiffness, shape["rolling_exponent"], way)
         whole = MeasuredFriction(levels, stiffness, measured.damping, way, curve)
         parts = _tangents(whole, (1 - np.arange(FITTED + 1) / FITTED) ** EVEN)
         return _elements_with(whole, *parts) | {

@@ -85,6 +85,14 @@ def on_bristles(flat: Mapping[str, Any], force: np.ndarray) -> MeasuredFriction:
     )
 
 
+def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
+    """A virgin curve whose slope falls by a power of the force that is lacking, Dahl's exponent: force [N] over
+    displacement [m] from rest, both of shape (n,)."""
+    way, more = stiffness * displacement / static, exponent - 1
+    lacking = np.exp(-way) if more == 0 else (1 + more * way) ** (-1 / more)
+    return static * (1 - lacking)
+
+
 def best(candidates: np.ndarray, misfits: np.ndarray) -> float:
     """The candidate whose misfit is the smallest."""
     return float(candidates[int(np.argmin(misfits))])

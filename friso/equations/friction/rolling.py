@@ -29,6 +29,7 @@ from friso.equations.friction.measured import (
     displacements,
     levels_under_conditions,
     on_bristles,
+    power_law,
 )
 from friso.quantities import Bound, Number, Quantity, Value, non_negative, positive
 from friso.stage import register_friction
@@ -72,7 +73,7 @@ class Rolling(StribeckSection):
         """From rest as Dahl's exponent has it."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = displacements(static, stiffness)
-        return on_bristles(flat, virgin(static, stiffness, flat["friction.rolling_exponent"], displacement))
+        return on_bristles(flat, power_law(static, stiffness, flat["friction.rolling_exponent"], displacement))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
@@ -115,12 +116,5 @@ def softening(lacking: Any, exponent: Any) -> Any:
 def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
     """Exponents, and how far the virgin curve is off with each."""
     tried = np.linspace(1.0, 4.0, 301)
-    curves = (virgin(measured.levels.static, measured.stiffness, i, measured.displacement) for i in tried)
+    curves = (power_law(measured.levels.static, measured.stiffness, i, measured.displacement) for i in tried)
     return tried, np.array([measured.misfit(curve) for curve in curves])
-
-
-def virgin(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
-    """Force [N] over displacement [m] from rest, both of shape (n,)."""
-    deflection, more = stiffness * displacement / static, exponent - 1
-    lacking = np.exp(-deflection) if more == 0 else (1 + more * deflection) ** (-1 / more)
-    return static * (1 - lacking)
