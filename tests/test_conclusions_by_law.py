@@ -26,7 +26,7 @@ def test_a_conclusion_survives_the_laws_under_which_the_same_parts_hold() -> Non
         ConclusionByLaw(second, by_law_of((True, False), (False, True), (True, False))),
     )
     by_law = ConclusionsByLaw(LAWS, {"dahl": ("static",)}, conclusions)
-    assert [conclusion.claim.id for conclusion in by_law.of_one_law] == ["F12B"]
+    assert [conclusion.claim.id for conclusion in by_law.dependent] == ["F12B"]
     assert conclusions[1].turned("gms") == ("number 0", "number 1")
     document = laws_document(by_law)
     assert [row["turned"] for row in document["conclusions"]] == [{}, {"gms": ["number 0", "number 1"]}]

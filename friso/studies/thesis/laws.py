@@ -58,8 +58,8 @@ class ConclusionsByLaw:
     conclusions: tuple[ConclusionByLaw, ...]
 
     @property
-    def of_one_law(self) -> tuple[ConclusionByLaw, ...]:
-        """The conclusions that do not survive all laws."""
+    def dependent(self) -> tuple[ConclusionByLaw, ...]:
+        """The conclusions that do not survive every law."""
         return tuple(c for c in self.conclusions if not all(c.survives(law) for law in self.laws[1:]))
 
 
