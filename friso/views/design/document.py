@@ -36,12 +36,15 @@ def design_document(design: Design) -> dict[str, Any]:
         "front": _front(design),
         "controller": _controller(design),
         "verification": _verification(design),
-        "friction_laws": {
-            law: {"without_highest_edge_hz": without.highest, "joint_highest_edge_hz": isolated.highest}
-            for law, (without, isolated) in design.by_law.items()
-        },
     }
-    return plain_json(document)
+    return plain_json(document | ({"friction_laws": _by_law(design)} if len(design.by_law) > 1 else {}))
+
+
+def _by_law(design: Design) -> dict[str, Any]:
+    return {
+        law: {"without_highest_edge_hz": without.highest, "joint_highest_edge_hz": isolated.highest}
+        for law, (without, isolated) in design.by_law.items()
+    }
 
 
 def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
