@@ -158,9 +158,9 @@ class Variants:
 
     @property
     def classes(self) -> dict[str, type[Section]]:
-        """The variants by name."""
+        """The variants by name; those of modules of their own alphabetically, whichever is imported first."""
         load_own(self.group)
-        return self._classes
+        return dict(sorted(self._classes.items())) if self.group else self._classes
 
     def name_of(self, cls: type[Section]) -> str:
         """The name that a variant declares as `kind: Literal["step"]`."""
