@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import sympy as sp
 
@@ -123,5 +124,6 @@ def _function(head: str, expressions: Iterable[sp.Expr], names: Mapping[sp.Symbo
     shared = {case: sp.Symbol(f"w{k}") for k, case in enumerate(cases)}
     rename: Rename = {**names, **{symbol: symbol.name for symbol in shared.values()}}.__getitem__
     steps = [f"    {symbol.name} = {print_numpy(case, rename)}" for case, symbol in shared.items()]
-    lines = [f"        {print_numpy(e.xreplace(shared), rename)}," for e in expressions]
+    whole: list[Any] = [e.xreplace(shared) for e in expressions]
+    lines = [f"        {print_numpy(e, rename)}," for e in whole]
     return "\n".join([f"def {head}:", *steps, "    return [", *lines, "    ]"])

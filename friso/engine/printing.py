@@ -88,8 +88,9 @@ class _Renamed(NumPyPrinter):
     def _print_Piecewise(self, expr: sp.Piecewise) -> str:
         """As `where` in `where`: quicker than the `select` of SymPy's own."""
         text = "np.nan"
-        for value, condition in reversed(expr.args):
-            value = self._print(value)
+        for case in reversed(expr.args):
+            result, condition = case.args
+            value = self._print(result)
             text = value if condition == sp.true else f"np.where({self._print(condition)}, {value}, {text})"
         return text
 

@@ -54,13 +54,13 @@ class Friction:
 
     def with_values(self, values: Mapping[Any, Any]) -> Friction:
         """The law with expressions in the place of others, but for its scales and its steady motion."""
-        part = self.component
+        part, force = self.component, cast(Any, self.force.xreplace(values))
         states = tuple(replace(x, derivative=x.derivative.xreplace(values)) for x in part.states)
         outputs = {name: replace(x, expression=x.expression.xreplace(values)) for name, x in part.outputs.items()}
         component = replace(
             part, states=states, kinks=tuple(k.with_values(values) for k in part.kinks), outputs=outputs
         )
-        return Friction(self.force.xreplace(values), self.breakaway, component, self.sliding)
+        return Friction(force, self.breakaway, component, self.sliding)
 
     def slid(self) -> dict[sp.Symbol, sp.Expr]:
         """The law's own states, and the sides of its kinks but the direction, in a steady motion at the velocity.

@@ -126,7 +126,7 @@ class LawProblem:
         starts = np.clip(starts, low + 2 * STEP, high - 2 * STEP)
         first = starts[np.argmin(np.sum(self._weighed(starts, weights) ** 2, axis=1))]
         options = {"max_nfev": EVALUATIONS, "xtol": TOLERANCE, "ftol": TOLERANCE}
-        best = least_squares(lambda numbers: at(numbers)[0], first, jacobian, (low, high), **options).x
+        best = least_squares(lambda numbers: at(numbers)[0], first, jac=jacobian, bounds=(low, high), **options).x
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:

@@ -177,7 +177,7 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
         if law == own:
             continue
         conversion = convert(stage, law, elements)
-        lost = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
+        lost: tuple[Shown, ...] = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
         if lost:
             left_out[law] = lost
         else:
