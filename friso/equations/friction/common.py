@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, cast
 
 from friso.equations.conditions import LEVELS, friction_level, has_conditions
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
