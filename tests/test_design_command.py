@@ -289,7 +289,7 @@ def test_leaves_and_what_binds_them(designed: Design, wording: Wording) -> None:
     other = replace(designed, confirmed=(broken, *designed.confirmed[1:]))
     wording(" ".join(leaves_step(other).sentences))
     assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
-    assert [row[3] for row in rows] == ["98.5 %, binds", "20.0 %", "10.0 %", "60.0 %", "99.0 %, binds"]
+    assert [row[3] for row in rows] == ["98.5 %, binds", "20 %", "10 %", "60 %", "99 %, binds"]
     loose = replace(designed.fitted, choice=replace(tight, excess=excess / 2))
     spared = " ".join(leaves_step(replace(designed, fitted=loose)).sentences)
     assert [name for name, *_ in rows if name in spared] == []
