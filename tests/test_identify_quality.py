@@ -339,6 +339,18 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
     assert fair.half_width <= viscous.half_width
 
 
+@pytest.mark.parametrize("what", ["a jump", "gaps", "coarse digits"])
+def test_a_broken_record_says_what_is_broken(what: str, wording: Wording) -> None:
+    log = axis()
+    if what == "gaps":
+        broken = replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))
+    else:
+        position = np.where(log.time > 3, log["position"] - 0.05, log["position"])
+        position = position if what == "a jump" else np.round(log["position"], 3)
+        broken = replace(log, signals={**log.signals, "position": position})
+    wording(causes(broken, inverse_model(broken, 5.0), 0.0)[0].sentence)
+
+
 def test_gravity_is_found(wording: Wording) -> None:
     log = axis(offset=60.0)
     wording(sentences(log))

@@ -9,12 +9,18 @@ from scipy.signal import welch
 
 from friso.identification.alternatives import alternatives
 from friso.identification.inverse_model import InverseModel
-from friso.identification.logs.checks import CLIPPED, clipped_share
+from friso.identification.logs.checks import CLIPPED, clipped_share, jumps
 from friso.identification.logs.log import Log
 from friso.quantities import percent
 
 PEAK = 0.5
 """Share of the power of what is left in one peak from which on that counts as an oscillation."""
+
+FRAGMENT = 0.2
+"""Share of a record in its longest stretch without gaps up to which the gaps are named."""
+
+COARSE = 500
+"""Steps of the position's digits over the whole travel from which on these are fine enough not to be named."""
 
 UNKNOWN = (
     "a delay, a filter, a constant force, one that drifts or differs along the way, a feed-forward and a mode in the "
@@ -37,8 +43,39 @@ def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
     """What may be wrong with a log that the inverse model does not describe, as far as the log tells; nothing where
     none of these explains it."""
     better = [Cause(other.sentence, other.model, True) for other in alternatives(log, inverse, cart_share)]
+    of_record = [_fragment(log), _jump(log), _coarse(log)]
     plain = [_constant(inverse, log.unit("force")), "" if better else _oscillation(inverse)]
-    return [*better, *_clipped(log), *(Cause(sentence) for sentence in plain if sentence)]
+    first, last = ([Cause(sentence) for sentence in sentences if sentence] for sentences in (of_record, plain))
+    return [*first, *better, *_clipped(log), *last]
+
+
+def _fragment(log: Log) -> str:
+    part, step = log.longest, log.sample_time
+    count = part.stop - part.start
+    if count > FRAGMENT * len(log.time):
+        return ""
+    return (
+        f"the record has gaps, and the longest stretch without one is {step * count:.3g} s of "
+        f"{step * len(log.time):.3g} s: export it without gaps"
+    )
+
+
+def _jump(log: Log) -> str:
+    part = log.longest
+    size, sample = jumps(log["position"][part])
+    if not size:
+        return ""
+    at = log.time[part][sample]
+    return f"the position jumps by {size:.3g} m at {at:.4g} s, as homing or a reset does: cut the record there"
+
+
+def _coarse(log: Log) -> str:
+    position = log["position"][log.longest]
+    steps = np.abs(np.diff(position))
+    digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
+    if digit * COARSE < travel:
+        return ""
+    return f"the position is in steps of {digit:.2g} m, of a travel of {travel:.3g} m: more digits are needed"
 
 
 def _clipped(log: Log) -> list[Cause]:

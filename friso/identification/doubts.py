@@ -64,7 +64,7 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
             "this force, a wrong --scale, or friction that a drive compensates"
         )
     differing = tuple(halves(inverse)) if plain.lacks_something else ()
-    for one in differing:
+    for one in () if poor else differing:
         unit_of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == one.name)
         values = f"{one.first:.4g} and {one.second:.4g} {unit_of_it}"
         doubts.append(f"The halves of the record differ in {WORDS[one.name]}: {values}; its interval holds both")

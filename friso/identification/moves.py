@@ -124,6 +124,8 @@ def _with_changes(
 ) -> tuple[OutputErrorFit, InverseModel, Quality]:
     """The model that estimates are taken from with intervals that allow for what changes during the record, and the
     quality that says so; `velocity` [m/s] is smooth, `unit` that of the force."""
+    if quality.failed:
+        return fit, inverse, quality
     changes = changes_beside(inverse) if quality.rejected else changes_of(fit, velocity)
     if changes is None:
         return fit, inverse, quality

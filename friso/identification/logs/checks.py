@@ -10,6 +10,9 @@ CLIPPED, REPEATED = 1e-3, 0.01
 """Share of the samples in flat tops above which a signal is reported as clipped, and of those that repeat the one
 before up to which it hardly ever repeats a value."""
 
+JUMP, FEW_JUMPS = 10.0, 20
+"""How many times larger than the twentieth largest step one is that is no motion, and that number."""
+
 SLOWEST, ALL = 20, 0.999
 """Times slower than the log at most that a signal may have been sampled, and share of its bends that count as all: the
 rest is rounding."""
@@ -33,9 +36,9 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     if other.size:
         i = int(other[0])
         actual = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
-        raise LogError(
-            name, actual, "one value per time stamp; if the stamps are rounded too coarsely, use --dt", '--dt "1 ms"'
-        )
+        step = 1e3 * (time[-1] - time[0]) / (len(time) - 1)
+        expected = "one value per time stamp; if the stamps are rounded too coarsely, use --dt"
+        raise LogError(name, actual, expected, f'--dt "{step:.4g} ms"')
     keep = np.r_[True, steps > 0]
     if keep.sum() < 2:
         raise LogError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that increases", '--dt "1 ms"')
@@ -85,6 +88,18 @@ def clipped_share(values: np.ndarray) -> float:
             if stop - start >= 3 and (kink or not repeats):
                 count += int(stop - start)
     return count / values.size
+
+
+def jumps(values: np.ndarray) -> tuple[float, int]:
+    """The largest step of a signal and the sample behind it, where it is no part of a motion: many times larger than
+    all steps but a few; else 0 and 0."""
+    steps = np.diff(values)
+    if steps.size < FEW_JUMPS:
+        return 0.0, 0
+    sizes = np.abs(steps)
+    largest = int(np.argmax(sizes))
+    usual = np.partition(sizes, -FEW_JUMPS)[-FEW_JUMPS]
+    return (float(steps[largest]), largest + 1) if sizes[largest] > JUMP * usual else (0.0, 0)
 
 
 def held(values: np.ndarray) -> int:

@@ -101,7 +101,8 @@ def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel
             return matches[0]
     names = [channel.name for channel in table.channels]
     near = difflib.get_close_matches(name, names, 1, 0.6)
-    example = f'--map {role}="{near[0] if near else names[0]}"'
+    nearest = near[0] if near else names[0]
+    example = f'--unit "{nearest}"=mm' if role == "unit" else f'--map {role}="{nearest}"'
     raise LogError(role, f"{quoted(name)}, which the log does not contain", listing(table), example, origin)
 
 

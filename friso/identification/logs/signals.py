@@ -144,7 +144,7 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
         if role == "force":
             expected += f", or a scale such as {option('--scale', role, f'35 {wanted}/V')}"
         return LogError(role, actual, expected, option("--unit", name, usual), reading.origin)
-    number = "35.1507" if role in ("force", "disturbance") else "1.5"
+    number = "35.1507" if role in ("force", "disturbance") else "5e-7" if si == "count" else "1.5"
     scale = f"{wanted}/{si}"
     expected = f'a scale to {wanted}, such as --scale {role}="{number} {scale}"'
     example = f'--scale {role}="NUMBER {scale}"'  # nobody should copy one that is made up
