@@ -33,6 +33,7 @@ def test_channels_ranges_rates_and_roles(tmp_path: Path) -> None:
     by_name = {channel.name: channel for channel in content.channels}
     assert content.kind == "moves"
     assert not content.gaps
+    assert by_name["time"].role == "time"
     assert by_name["position"].role == "position"
     assert by_name["position"].range == pytest.approx((1e3 * M["position"].min(), 1e3 * M["position"].max()))
     assert by_name["position"].sample_rate == pytest.approx(1000)

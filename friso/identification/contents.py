@@ -16,7 +16,7 @@ from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.mapping import Mapping, load
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response
-from friso.identification.logs.roles import AssignedRole, Proposal, propose
+from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
 from friso.identification.sources import named, unnamed
 
@@ -118,6 +118,9 @@ def _content(channel: Channel, proposal: Proposal, reading: Reading) -> ChannelC
     for name, rivals in proposal.rivals.items():
         if any(rival is channel for rival in rivals):
             reason = f"one of {len(rivals)} that could be the {name.replace('_', ' ')}"
+    meaning = role_of(channel.name)
+    if not (role or reason) and meaning and meaning[0] == "time" and channel.unit and not reading.mapping.sample_time:
+        role, reason = "time", f'the name says "{meaning[1]}"'
     return ChannelContent(channel.name, channel.unit, channel.values, _time(channel, proposal, reading), role, reason)
 
 
