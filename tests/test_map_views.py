@@ -19,6 +19,7 @@ import xarray as xr
 from browser import browsed, needs_browser
 from matplotlib.colors import to_hex
 from pages import Page, packed_values
+from scipy.stats import binomtest
 from snapshots import Snapshots
 
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
@@ -115,12 +116,10 @@ def test_axes_are_written_in_the_words_of_an_engineer():
 
 def test_the_verification_stands_on_the_figure(snapshots: Snapshots):
     figure = map_figure(plain(verified_cells=84, verified_surviving=81, verified_rtol=1e-6), "peaks")
-    share, z = 81 / 84, 1.959963984540054
-    middle = (share + z**2 / 168) / (1 + z**2 / 84)
-    half = z * math.sqrt(share * (1 - share) / 84 + z**2 / (4 * 84**2)) / (1 + z**2 / 84)  # Wilson (1927)
+    interval = binomtest(81, 84).proportion_ci(0.95, "exact")  # Clopper, Pearson (1934)
     first, texts, runs = figure.note.splitlines()
-    ends = [round(100 * (middle + sign * half), 1) for sign in (-1, 1)]
-    assert numbers(texts) == [round(100 * share, 1), 84, 1e-6, 95, *ends]
+    ends = [round(100 * end, 1) for end in (interval.low, interval.high)]
+    assert numbers(texts) == [round(100 * 81 / 84, 1), 84, 1e-6, 95, *ends]
     assert (numbers(first), numbers(runs)) == ([75], [20, 1e-4, 15, 5])
     on_paper = " ".join(text.get_text() for text in matplotlib_renderer.render(figure).texts)
     assert texts in on_paper
@@ -472,7 +471,7 @@ def test_the_page_opens_offline_and_says_what_it_shows():
     assert "default-src 'none'" in page
     assert not re.findall(r"https?://[^\"'<> ]*", page.replace(plotly_renderer.script(), ""))
     for text in (
-        "90.0 % of 10 outcomes are the same at rtol 1e-07",
+        "90 % of 10 outcomes are the same at rtol 1e-07",
         "1 to 16 Hz, 4 values (controller.crossover)",
         "0 to 1 mm, 5 values (joint.stroke)",
         "13 swing, 4 rest, 1 failed, 1 invalid, 1 not run",

@@ -163,7 +163,7 @@ def _percent(part: int, total: int) -> str:
 
 
 def verification(runs: xr.Dataset) -> str:
-    """How many of the outcomes checked survive a tighter tolerance, with Wilson's 95 % confidence interval."""
+    """How many of the outcomes checked survive a tighter tolerance, with its 95 % interval (Clopper, Pearson)."""
     checked = int(runs.attrs.get("verified_cells", 0))
     if not checked:
         return "Not verified: no outcome was checked at a tighter tolerance."
