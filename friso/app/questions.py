@@ -157,7 +157,7 @@ def tune(asked: Asked, work: Work) -> Iterator[Part]:
     """What stops it: the ways, and the stage of each that works."""
     options = asked.chosen("within", "settle", "force_limit", "bandwidth_limit", "only", "keep")
     answer = friso.tune(asked.machine.stage, **options, progress=work.progress)
-    ways = [{"name": cure.name, "toml": cure.stage.to_toml()} for cure in answer.working]
+    ways = [{"name": outcome.remedy.name, "toml": outcome.stage.to_toml()} for outcome in answer.working]
     yield parts_of(asked, answer, ways=ways, **_lines("tune", asked, options))
 
 
