@@ -22,6 +22,10 @@ SPREAD = 3.0
 """Factor about its example within which a key that is not known here is drawn."""
 
 
+ELEMENTS = 4
+"""Maxwell-slip elements; their number decides on the structure."""
+
+
 @dataclass(frozen=True)
 class Form:
     """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
@@ -132,9 +136,10 @@ class _Draw:
         """Known keys from what bearings are like; others about their examples."""
         law = FRICTION.classes[self.form.friction]
         bristles = self.static / self.log(2e-7, 1e-4)
+        coulomb = self.static * self.rng.uniform(0.2, 1.0)
         keys: dict[str, Any] = {
             "static": _text(self.static, "N"),
-            "coulomb": _text(self.static * self.rng.uniform(0.2, 1.0), "N"),
+            "coulomb": _text(coulomb, "N"),
             "stribeck_velocity": _text(self.log(1e-4, 5e-2), "m/s"),
             "stribeck_exponent": self.form.exponent or self.rng.uniform(0.6, 2.6),
             "bristle_stiffness": _text(bristles, "N/m"),
@@ -150,7 +155,27 @@ class _Draw:
                 table[name] = keys[name]
             elif law.model_fields[name].is_required():
                 table[name] = self.about(field)
+        if self.form.friction == "elasto_plastic":
+            table["breakaway_deflection"] = _text(coulomb / bristles * self.rng.uniform(0.1, 0.95), "m")
+        if self.form.friction == "rolling":
+            table["rolling_exponent"] = self.rng.uniform(1.0, 3.0)
+        if self.form.friction == "gms":
+            table |= self.elements(bristles)
+            table["attraction"] = _text(bristles * self.log(3e-5, 0.15), "N/s")
         return table
+
+    def elements(self, stiffness: float) -> dict[str, Any]:
+        """Maxwell-slip elements that yield one after the other, and stick by a stiffness [N/m] together."""
+        shares = self.rng.dirichlet(np.full(ELEMENTS, 2.0))
+        shares[-1] += 1 - float(np.sum(shares))
+        parts = np.geomspace(1.0, self.log(0.01, 0.5), ELEMENTS) * shares
+        parts *= stiffness / parts.sum()
+        damping = self.log(0.03, 1.5) * 2 * np.sqrt(stiffness * self.mass) / stiffness
+        return {
+            "element_stiffness": [_text(part, "N/m") for part in parts],
+            "element_share": [float(share) for share in shares],
+            "element_damping": [_text(damping * part, "N*s/m") for part in parts],
+        }
 
     def about(self, field: Any) -> Any:
         """A value about the example of a key."""

@@ -108,7 +108,7 @@ def swinging(bench: Bench, trial: Trial) -> str:
 
 def attracts(bench: Bench, end: np.ndarray) -> bool:
     """Whether neighbours of a state that a run ended in, which swung for long, swing on too, for very long."""
-    words = bench.follow(bench.beside(end), ROUGH, LINGERING).words
+    words = bench.follow(bench.beside(end), FINE, LINGERING).words
     return bool(np.mean(words == SWINGS) >= MOST)
 
 

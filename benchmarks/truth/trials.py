@@ -36,9 +36,10 @@ ROUNDS = (150.0, 800.0, 4000.0)
 NEIGHBOURS = (0.99, 0.997, 1.003, 1.01)
 """Factors of a state that has swung for long, beside which the swing has to be taken up again."""
 
-LINGERING = (6_000.0,)
-"""Periods for which neighbours of a swing are followed: the solver's errors of 1e-6 push a run off a cycle that repels
-by 0.2 % a swing within 7000 swings."""
+LINGERING = (12_000.0,)
+"""Periods for which neighbours of a swing are followed, at the fine tolerance: a deviation of 0.3 % from a cycle that
+repels by 0.03 % a swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by as much
+as it is off 1: at the rough tolerance runs stay at it for 60 000 periods."""
 
 FOLLOWED = 6
 """Runs that are followed on."""
