@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.truth.draws import draw
+from benchmarks.truth.draws import draw, forms
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from friso.stage.files import loads
 
@@ -44,7 +44,7 @@ def test_small_swings_are_rest() -> None:
     assert evenly(np.full(300, 1e-4)) == RESTS
 
 
-@pytest.mark.parametrize("number", range(24))
+@pytest.mark.parametrize("number", range(len(forms())))
 def test_stages_are_drawn_again_by_seed_and_number(number: int) -> None:
     stage = draw(7, number)
     assert stage == draw(7, number)

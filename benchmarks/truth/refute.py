@@ -86,7 +86,7 @@ def swinging(bench: Bench, trial: Trial) -> str:
     rough = bench.follow(trial, ROUGH)
     for start in rough.swinging[:: max(1, len(rough.swinging) // TRIED)][:TRIED]:
         fine = bench.follow(trial.take(np.array([start])), FINE, ROUNDS[1:])
-        if fine.words[0] == SWINGS and attracts(bench, fine.ends[0]):
+        if fine.words[0] == SWINGS and attracts(bench, fine.ends[0], fine.periods[0]):
             return "; ".join(
                 [
                     f"{trial.kinds[start]} {trial.sizes[start]:.6g} swings on by {rough.amplitude[start]:.6g} m, "
@@ -98,7 +98,7 @@ def swinging(bench: Bench, trial: Trial) -> str:
     second = trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
     fine = bench.follow(second, FINE)
     for start in fine.swinging[:TRIED]:
-        if attracts(bench, fine.ends[start]):
+        if attracts(bench, fine.ends[start], fine.periods[start]):
             size, swing = second.sizes[start], fine.amplitude[start]
             kind, followed = second.kinds[start], fine.followed[start]
             about = by_scipy(bench, fine.ends[start], float(swing))
@@ -106,9 +106,10 @@ def swinging(bench: Bench, trial: Trial) -> str:
     return ""
 
 
-def attracts(bench: Bench, end: np.ndarray) -> bool:
-    """Whether neighbours of a state that a run ended in, which swung for long, swing on too, for very long."""
-    words = bench.follow(bench.beside(end), FINE, LINGERING).words
+def attracts(bench: Bench, end: np.ndarray, period: float) -> bool:
+    """Whether neighbours of a state that a run ended in, which swung for long with a period [s], swing on too, for very
+    long."""
+    words = bench.follow(bench.beside(end), FINE, (LINGERING * period / bench.period,)).words
     return bool(np.mean(words == SWINGS) >= MOST)
 
 

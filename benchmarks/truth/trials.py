@@ -36,8 +36,8 @@ ROUNDS = (150.0, 800.0, 4000.0)
 NEIGHBOURS = (0.99, 0.997, 1.003, 1.01)
 """Factors of a state that has swung for long, beside which the swing has to be taken up again."""
 
-LINGERING = (12_000.0,)
-"""Periods for which neighbours of a swing are followed, at the fine tolerance: a deviation of 0.3 % from a cycle that
+LINGERING = 12_000.0
+"""Periods of a swing for which its neighbours are followed, at the fine tolerance: a deviation of 0.3 % from a cycle that
 repels by 0.03 % a swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by as much
 as it is off 1: at the rough tolerance runs stay at it for 60 000 periods."""
 
@@ -62,13 +62,14 @@ class Trial:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of starts: words of `swings`, half of peak to peak at the end [m], states at the end, and the time
-    [s] for which each was followed."""
+    """What became of starts: words of `swings`, half of peak to peak at the end [m], states at the end, the time
+    [s] for which each was followed, and the mean time of two large legs in the last quarter of that [s]."""
 
     words: np.ndarray
     amplitude: np.ndarray
     ends: np.ndarray
     followed: np.ndarray
+    periods: np.ndarray
 
     @property
     def swinging(self) -> np.ndarray:
@@ -195,7 +196,7 @@ class Bench:
     ) -> Outcome:
         count = 1 if states is None else len(states)
         words = np.full(count, UNSURE, dtype=object)
-        amplitude, followed = np.zeros(count), np.zeros(count)
+        amplitude, followed, own_periods = np.zeros(count), np.zeros(count), np.full(count, self.period)
         ends = np.full((count, len(self.kernel.full_state)), np.nan)
         on, begin = np.arange(count), states
         for number, periods in enumerate(rounds):
@@ -203,7 +204,7 @@ class Bench:
             own = {**flat, "motion.duration": end}
             for part in run_chunks(self.kernel, own, len(on), self._options(rtol), begin):
                 which = on[part.numbers]
-                words[which], amplitude[which] = self._words(part, end, number == len(rounds) - 1)
+                words[which], amplitude[which], own_periods[which] = self._words(part, end, number == len(rounds) - 1)
                 ends[which] = part.results.ends
                 followed[which] += end
             unsure = np.flatnonzero(words == UNSURE)
@@ -212,7 +213,7 @@ class Bench:
             on = unsure[np.unique(np.linspace(0, len(unsure) - 1, FOLLOWED).astype(int))]
             begin, corner = self._resumed(ends[on], flat), 0.0
             flat = self._after(flat)
-        return Outcome(words, amplitude, ends, followed)
+        return Outcome(words, amplitude, ends, followed, own_periods)
 
     def _after(self, flat: Mapping[str, Any]) -> dict[str, Any]:
         """The stage once its reference has come to rest; positions count from there."""
@@ -236,13 +237,14 @@ class Bench:
     def small(self) -> float:
         return SMALL * self.length
 
-    def _words(self, part: Any, end: float, patient: bool) -> tuple[list[str], list[float]]:
+    def _words(self, part: Any, end: float, patient: bool) -> tuple[list[str], list[float], list[float]]:
         results = part.results
         high, low = (results.statistics[:, STATISTICS.index(f"deviation_{side}")] for side in ("max", "min"))
-        words, sizes = [], []
+        words, sizes, periods = [], [], []
         for k, count in enumerate(results.turn_counts):
             seen = legs(results.turn_times[k, :count], results.turn_values[k, :count], end)
             done = results.statuses[k] == Status.DONE
             words.append(judge(seen, float(high[k] - low[k]), self.small, patient) if done else FAILED)
             sizes.append(float(high[k] - low[k]) / 2)
-        return words, sizes
+            periods.append(end / 2 / max(seen.count, 1))
+        return words, sizes, periods

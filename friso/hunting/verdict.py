@@ -271,24 +271,31 @@ def judge_runs(
         decided &= survey.decided
         attracts = survey.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
+    run_options = options(rtol, threads, cancel)
     attracted = np.flatnonzero(decided & attracts)
     if survey is not None and attracted.size:
-        in_cycle[attracted], decided[attracted] = _end_in_a_cycle(
-            _part(flat, attracted), survey.take(attracted), threads, cancel
+        ends, completed, _ = ends_in(
+            _part(flat, attracted), attracted.size, survey.take(attracted).target, threads=threads, cancel=cancel
         )
+        in_cycle[attracted], decided[attracted] = ends, completed
+        restless = attracted[completed & ~ends & ~np.isfinite(motions.settling[attracted])]
+        if restless.size:  # something may attract them that swings less than what was found
+            in_cycle[restless], decided[restless] = _swing_on(_part(flat, restless), motions.take(restless), run_options)
     free = np.flatnonzero(decided & ~attracts)
     if free.size:
-        run_options = options(rtol, threads, cancel)
         rest = _rest(_part(flat, free), motions.take(free), free.size, run_options, possible=survey is not None)
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
     return verdicts(decided, attracts, in_cycle, rests)
 
 
-def _end_in_a_cycle(
-    flat: Mapping[str, Any], survey: Attractors, threads: int | None, cancel: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages' own motions end in what attracts, and which runs were completed."""
-    return ends_in(flat, len(survey.decided), survey.target, threads=threads, cancel=cancel)[:2]
+def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
+    """Of motions that do not end in what was found to attract their stages, which swing on by less once they were
+    followed for long, and of which that is decided: they do, or they have come to rest."""
+    count = len(motions.completed)
+    rest = _rest(flat, motions, count, run_options, possible=True)
+    length = Ensemble.held(flat, count, form=shared_structure(flat)).length
+    stands = np.isfinite(rest.followed) & (rest.swing <= 2 * RESOLVED * length)
+    return rest.steady, rest.steady | np.isfinite(rest.after) | stands
 
 
 @dataclass(frozen=True)

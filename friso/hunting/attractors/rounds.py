@@ -25,6 +25,9 @@ PERIODS, LONGER = 24.0, 3.0
 TYPICAL = 0.3
 """Distance, in units of the deflection of the loop by the break-away force, whose cycle is typical."""
 
+AT_MOST = 10.0
+"""The same of runs that have not swung so far."""
+
 KEPT = 32
 """Swings at the end of a round that are looked at."""
 
@@ -36,6 +39,9 @@ BUDGET = 2_000_000
 
 LEG = 0.25
 """Legs of a swing are at least this share of peak to peak."""
+
+OFTEN = 3
+"""How often a run turns in the second half of a round, after such legs, that swings: one that creeps home does not."""
 
 RESOLVED = 0.0004
 """Least swing that is looked at, in units of the deflection of the loop by the break-away force."""
@@ -85,6 +91,11 @@ class Ends:
     repeats: Recurrence
     values: np.ndarray
     times: np.ndarray
+
+    @property
+    def swing(self) -> np.ndarray:
+        """Which runs swing, whether they repeat themselves yet or not, shape (runs,)."""
+        return (self.repeats.swings > 0) | (np.isfinite(self.values).sum(axis=1) >= OFTEN)
 
     def take(self, numbers: np.ndarray) -> Ends:
         """Those of the runs with these numbers."""
@@ -145,7 +156,7 @@ def _stands_still(
 
 
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
-    """The same, with a longer round before them: of those that do not `swing`, shape (runs,), long enough to show that
-    they rest, or swing slowly."""
-    least = np.where(swing, 0.0, SHOWN * wait(runs.stages, runs.loose))
+    """The same, with a longer round before them: of those that do not `swing`, shape (runs,), as long as shows that
+    they rest, or swing slowly, but not so much longer that one which begins to swing does so for most of it."""
+    least = np.where(swing, 0.0, np.minimum(SHOWN * wait(runs.stages, runs.loose), AT_MOST * runs.durations))
     return replace(runs, durations=np.maximum(LONGER * runs.durations, least))

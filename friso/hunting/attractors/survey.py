@@ -201,7 +201,7 @@ class Survey:
             if not swinging.size:
                 return
             before, owners = ends.repeats.mean[swinging], owners[swinging]
-            runs = lengthened(runs.take(swinging), ends.repeats.swings[swinging] > 0)
+            runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
