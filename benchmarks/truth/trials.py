@@ -37,9 +37,9 @@ NEIGHBOURS = (0.99, 0.997, 1.003, 1.01)
 """Factors of a state that has swung for long, beside which the swing has to be taken up again."""
 
 LINGERING = 12_000.0
-"""Periods of a swing for which its neighbours are followed, at the fine tolerance: a deviation of 0.3 % from a cycle that
-repels by 0.03 % a swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by as much
-as it is off 1: at the rough tolerance runs stay at it for 60 000 periods."""
+"""Periods of a swing for which its neighbours are followed, at the fine tolerance: a deviation of 0.3 % from a cycle
+that repels by 0.03 % a swing grows by a factor of a thousand in that time. Errors of 1e-6 change such a multiplier by
+as much as it is off 1: at the rough tolerance runs stay at it for 60 000 periods."""
 
 FOLLOWED = 6
 """Runs that are followed on."""

@@ -280,7 +280,8 @@ def judge_runs(
         in_cycle[attracted], decided[attracted] = ends, completed
         restless = attracted[completed & ~ends & ~np.isfinite(motions.settling[attracted])]
         if restless.size:  # something may attract them that swings less than what was found
-            in_cycle[restless], decided[restless] = _swing_on(_part(flat, restless), motions.take(restless), run_options)
+            moved = _part(flat, restless), motions.take(restless)
+            in_cycle[restless], decided[restless] = _swing_on(*moved, run_options)
     free = np.flatnonzero(decided & ~attracts)
     if free.size:
         rest = _rest(_part(flat, free), motions.take(free), free.size, run_options, possible=survey is not None)
