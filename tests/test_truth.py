@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from benchmarks.truth.draws import draw, forms
+from benchmarks.truth.draws import FORMS, draw
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from friso.stage.files import loads
+from friso.stage.tables import FRICTION
 
 END = 1000.0
 
@@ -44,9 +45,14 @@ def test_small_swings_are_rest() -> None:
     assert evenly(np.full(300, 1e-4)) == RESTS
 
 
-@pytest.mark.parametrize("number", range(len(forms())))
+@pytest.mark.parametrize("number", range(len(FORMS)))
 def test_stages_are_drawn_again_by_seed_and_number(number: int) -> None:
     stage = draw(7, number)
     assert stage == draw(7, number)
     assert loads(stage.to_toml()) == stage
     assert stage.flat() != draw(8, number).flat()
+
+
+def test_stages_of_every_friction_law_are_drawn() -> None:
+    laws = {name for name, law in FRICTION.classes.items() if law.__module__.startswith("friso.")}
+    assert {form.friction for form in FORMS} == laws

@@ -42,7 +42,7 @@ class Form:
     bias: str = ""
 
 
-_KNOWN = (
+FORMS = (
     Form("rigid"),
     Form("free"),
     Form("locked"),
@@ -67,20 +67,19 @@ _KNOWN = (
     Form("rigid", "stribeck", exponent=None, asymmetry=True, control="filtered"),
     Form("rigid", "none", bias="stage"),
     Form("free", exponent=1.0, asymmetry=True, bias="cart", control="filtered"),
+    Form("rigid", "elasto_plastic"),
+    Form("free", "elasto_plastic"),
+    Form("rigid", "gms"),
+    Form("free", "gms"),
+    Form("rigid", "rolling"),
+    Form("free", "rolling"),
 )
-"""Structures, as many as there are kernels to compile."""
-
-
-def forms() -> tuple[Form, ...]:
-    """The pool of structures: those above, and one with each law that is registered besides."""
-    others = sorted({*FRICTION.classes} - {form.friction for form in _KNOWN})
-    return (*_KNOWN, *(Form(joint, law) for law in others for joint in ("rigid", "free")))
+"""Structures, as many as there are kernels to compile, with every friction law that comes with friso."""
 
 
 def draw(seed: int, number: int) -> Stage:
     """The stage with this number of the series that begins with `seed`."""
-    pool = forms()
-    tables = _Draw(np.random.default_rng([seed, number]), pool[number % len(pool)]).tables()
+    tables = _Draw(np.random.default_rng([seed, number]), FORMS[number % len(FORMS)]).tables()
     return Stage(name=f"seed {seed}, number {number}", **tables)
 
 
