@@ -1,6 +1,7 @@
 """Everything that attracts a stage: stages whose symmetric cycle repels, or rests on jumps of the return map, and which
 hunt all the same. What they do is simulated here from the kicks that start it, at two tolerances."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,13 +11,15 @@ from variants import VARIANTS
 
 import friso
 import friso.hunting.attractors
+from friso.engine.allowance import allowance
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
+from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import stuck
+from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.margin import margin, searched
 from friso.hunting.outward import Beyond, Outward
-from friso.hunting.verdict import judge_many
+from friso.hunting.verdict import WORK, Motions, judge_many, judge_runs
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
@@ -311,3 +314,54 @@ def test_swings_that_repeat_themselves() -> None:
     assert repeats.time.tolist() == [1.0, 2.0, 4.0]
     noisy = recurrence(np.random.default_rng(1).normal(size=(1, 32)), times[:1], np.ones(1, bool))
     assert noisy.swings.tolist() == [0]
+
+
+def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_at_rest() -> None:
+    """A survey of many stages stops at one motion that attracts: there may be smaller ones."""
+    flat = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"}).flat()
+    survey = attractors(Ensemble.held(flat, 1))
+    larger = replace(survey, motions=tuple(replace(m, amplitude=10 * m.amplitude) for m in survey.motions))
+    still_moving = Motions(np.ones(1, bool), np.zeros(1), np.full(1, np.nan), np.full(1, np.nan))
+    assert judge_runs(flat, still_moving, larger, 1e-6).tolist() == ["hunts"]
+
+
+def test_runs_that_have_not_swung_are_not_followed_for_thousands_of_swings_next() -> None:
+    stages = held(VARIANTS["rigid"])
+    nearly_home = 1e-4 * stages.length
+    runs = Pending(stages, np.zeros((1, len(stages.kernel.states))), np.ones(1), nearly_home, stages.symmetric)
+    assert wait(stages, nearly_home)[0] > 100 * runs.durations[0]
+    assert lengthened(runs, np.zeros(1, bool)).durations.tolist() == [10.0]
+    assert lengthened(runs, np.ones(1, bool)).durations.tolist() == [3.0]
+
+
+@pytest.mark.thorough
+def test_a_stage_that_begins_to_hunt_after_hundreds_of_seconds() -> None:
+    """Number 12 of seed 302 of `benchmarks.truth`: a bias on one side, and bristles that hardly yield."""
+    lazy = VARIANTS["rigid"].replace(
+        {
+            "masses": {"cart": "7.30387 kg", "stage": "22.5995 kg"},
+            "friction": {
+                "model": "lugre",
+                "static": "119.049 N",
+                "coulomb": "95.7216 N",
+                "stribeck_velocity": "13.863 mm/s",
+                "stribeck_exponent": 1.0891841348861435,
+                "viscous": "1.16355 N*s/m",
+                "asymmetry": 0.02522679536792999,
+                "bristle_stiffness": "2.21415e8 N/m",
+                "bristle_damping": "7837.87 N*s/m",
+            },
+            "bias": {"cart": "10.3906 N"},
+            "controller": {
+                "kind": "pid",
+                "crossover": "2.54702 Hz",
+                "alpha": 0.21540433018859048,
+                "beta": 5.154440753165315,
+                "tuned_mass": "30.3778 kg",
+            },
+        }
+    )
+    with allowance(WORK / 2) as work:
+        survey = attractors(held(lazy), thorough=True)
+    assert not work.exhausted
+    assert [motion.amplitude for motion in survey.motions] == pytest.approx([2.90279e-3], rel=1e-4)  # SciPy's as well
