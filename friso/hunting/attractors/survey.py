@@ -190,7 +190,10 @@ class Survey:
             if not swinging.size:
                 return
             if number > 0:
-                swinging = swinging[self._kinds(owners[swinging], ends.take(swinging), MOST_KINDS)]
+                still = swinging[~ends.swing[swinging]]  # each of them somewhere else
+                moving = np.setdiff1d(swinging, still)
+                kinds = moving[self._kinds(owners[moving], ends.take(moving), MOST_KINDS)]
+                swinging = np.union1d(kinds, still)
             if number == ROUNDS - 1:
                 return self._last(runs.take(swinging), owners[swinging], ends.take(swinging), before[swinging])
             regular = self._exact(owners[swinging], ends.take(swinging))
