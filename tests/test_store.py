@@ -4,6 +4,7 @@ import errno
 import json
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -23,6 +24,7 @@ from friso.stage import Stage
 from friso.studies import refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
+from friso.studies.metadata import digest
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store, check_store, read_store
@@ -402,6 +404,58 @@ def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Re
     (stored / ".zmetadata").unlink()
     with refused(kind=StoreError):
         read_store(stored)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links, pipes and devices of POSIX")
+@pytest.mark.parametrize(
+    "name", [".zmetadata", ".zattrs", "peaks/.zarray", "joint.stroke/0", ".blocks/0.0", "peaks/0.0"]
+)
+@pytest.mark.parametrize("kind", ["pipe", "device", "link", "huge"])
+def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: str, tmp_path: Path) -> None:
+    file = stored / name
+    content = file.read_bytes()
+    file.unlink()
+    if kind == "pipe":
+        os.mkfifo(file)
+    elif kind == "device":
+        file.symlink_to("/dev/zero")
+    elif kind == "link":
+        (tmp_path / "elsewhere").write_bytes(content)
+        file.symlink_to(tmp_path / "elsewhere")
+    else:
+        with file.open("wb") as stream:
+            stream.truncate(1 << 40)
+    for read in (read_store, check_store):
+        with pytest.raises(StoreError, match=re.escape(name)):
+            read(stored)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+@pytest.mark.parametrize("name", [".blocks", "peaks", "joint.stroke"])
+def test_nothing_is_written_where_a_link_in_a_store_leads(stored: Path, rig: Stage, name: str, tmp_path: Path) -> None:
+    (stored / name).rename(tmp_path / "elsewhere")
+    (stored / name).symlink_to(tmp_path / "elsewhere")
+    for file in (tmp_path / "elsewhere").iterdir():
+        file.write_bytes(b"mine")
+    with pytest.raises(StoreError, match=re.escape(name)):
+        sweep(rig, AXES, store=stored)
+    assert all(file.read_bytes() == b"mine" for file in (tmp_path / "elsewhere").iterdir())
+
+
+@pytest.mark.parametrize("name", ["../mine/.zattrs", "/mine/.zarray", "../mine", "peaks/../../.zarray"])
+def test_metadata_name_no_file_outside_their_store(stored: Path, rig: Stage, name: str) -> None:
+    document = json.loads((stored / ".zmetadata").read_text())
+    document["metadata"][name] = {"written": "by others"}
+    entry = document["friso"]
+    entry["sha256"] = digest([document["metadata"], {key: entry[key] for key in entry if key != "sha256"}])
+    (stored / ".zmetadata").write_text(json.dumps(document))
+    with pytest.raises(StoreError, match="damaged"):
+        sweep(rig, AXES, store=stored)
+
+
+def test_metadata_of_an_equal_number_of_another_kind_are_damaged(stored: Path) -> None:
+    (stored / ".zgroup").write_text('{"zarr_format": 2.0}')
+    assert check_store(stored).files == [".zgroup"]
 
 
 def test_a_store_of_a_newer_friso_says_so(stored: Path, refused: Refused) -> None:

@@ -2,12 +2,12 @@
 
 import os
 import re
-import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from friso.bounded_file import LargeFileError, content_of
 from friso.errors import InputError, StageError
 from friso.escapes import one_line
 from friso.quantities import quoted
@@ -16,8 +16,6 @@ from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
 """Size of a text file at most."""
-
-_READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -112,16 +110,10 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
     """What stands in a text file, which is to be what is `expected`. Raises InputError, also for a device, for a pipe
     and for more than MOST_BYTES."""
     try:
-        with open(os.open(path, _READING), "rb") as file:
-            if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
-                raise InputError("", "a device or a pipe", expected, example, str(path))
-            content = file.read(MOST_BYTES + 1)
-        if len(content) > MOST_BYTES:
-            actual, most = f"a file of {path.stat().st_size / 1e6:.3g} MB", f"of at most {MOST_BYTES / 1e6:g} MB"
-            raise InputError("", actual, f"{expected}, {most}", example, str(path))
-        return content.decode("utf-8-sig")
-    except InputError:
-        raise
+        return content_of(path, MOST_BYTES).decode("utf-8-sig")
+    except LargeFileError as error:
+        most = f"of at most {MOST_BYTES / 1e6:g} MB"
+        raise InputError("", str(error), f"{expected}, {most}", example, str(path)) from None
     except UnicodeDecodeError as error:
         text = f"byte {error.start + 1} is not UTF-8"
         raise InputError("", text, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None

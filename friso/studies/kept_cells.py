@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import zipfile
-import zlib
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -13,6 +11,7 @@ import numpy as np
 
 from friso.studies.cells import WORDS, Columns
 from friso.studies.refine import Ask
+from friso.studies.store_files import stored_arrays
 from friso.whole_file import whole_file
 
 
@@ -46,9 +45,5 @@ class KeptCells:
 
 def _kept(file: Path, cells: np.ndarray) -> Columns | None:
     """What was kept about just these cells, None if nothing."""
-    try:
-        with np.load(file) as stored:
-            columns = dict(stored)
-    except (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error):
-        return None
-    return columns if np.array_equal(columns.pop("cells", None), cells) else None
+    columns = stored_arrays(file)
+    return columns if columns is not None and np.array_equal(columns.pop("cells", None), cells) else None

@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from friso.studies.metadata import digest_of, put
+from friso.studies.store_files import digest_of, put, stored
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Ledger:
     def is_whole(self, number: str) -> bool:
         """Whether all chunks of a block are what was written."""
         try:
-            return self._file(number).is_file() and self._file(number).read_bytes() == self._entry(number)
+            return stored(self._file(number)) == self._entry(number)
         except OSError:
             return False
 

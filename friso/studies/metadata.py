@@ -9,19 +9,23 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from friso.errors import StoreError
-from friso.whole_file import whole_file
+from friso.studies.store_files import digest_of, put, stored
 
 FORMAT = 2
 """Version of what friso writes into a store."""
 
 _FILE, _OWN, _ATTRIBUTES = ".zmetadata", "friso", ".zattrs"
 """The file, friso's own entry in it, and the entry with the attributes of the study."""
+
+_NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w[\w.-]*/\d+")
+"""Names of files beside the arrays and of those of axes: all of them in the store, whatever metadata of others say."""
 
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
@@ -48,7 +52,7 @@ class Metadata:
 
     def damaged_files(self, path: Path) -> list[str]:
         """The files beside the arrays of the store at `path` that do not say the same."""
-        return [name for name, content in self.files.items() if _content(path / name) != content]
+        return [name for name, content in self.files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:
         """The files of the axes that are not what was written."""
@@ -62,7 +66,7 @@ class Metadata:
 
 def seal_metadata(path: Path, axes: Iterable[str]) -> None:
     """Seal the metadata of a store that is new, with the digests of its `axes`, by name. Raises OSError."""
-    document = json.loads((path / _FILE).read_bytes())
+    document = json.loads(stored(path / _FILE))
     files = [
         f"{name}/{file.name}" for name in axes for file in (path / name).iterdir() if not file.name.startswith(".")
     ]
@@ -98,7 +102,7 @@ def checked_metadata(path: Path) -> Metadata:
     if not path.is_dir():
         raise StoreError("", "a file; nothing was overwritten", expected, "--out study.zarr", str(path))
     try:
-        document = json.loads((path / _FILE).read_bytes())
+        document = json.loads(stored(path / _FILE))
         entry, metadata = document.get(_OWN), document["metadata"]
         attributes = dict(metadata[_ATTRIBUTES])
         sealed = digest([metadata, {key: value for key, value in entry.items() if key != "sha256"}]) if entry else ""
@@ -117,7 +121,7 @@ def checked_metadata(path: Path) -> Metadata:
     if number == FORMAT:
         study, axes, notes = (entry.get(name) for name in ("study", "axes", "notes"))
         complete = isinstance(study, str) and isinstance(axes, dict) and isinstance(notes, dict)
-        if not complete or entry.get("sha256") != sealed:
+        if not complete or entry.get("sha256") != sealed or not _are_of_a_store(metadata, axes):
             raise _damaged(path, "is damaged")
         return Metadata(document, study, axes, notes)
     if "equations" in attributes:
@@ -129,40 +133,28 @@ def checked_metadata(path: Path) -> Metadata:
 
 def is_store(path: Path) -> bool:
     """Whether friso made the folder, as far as its metadata tell, damaged or not."""
-    return any(b'"equations"' in _bytes(path / name) for name in (_FILE, _ATTRIBUTES))
+    return any(_mentions(path / name, b'"equations"') for name in (_FILE, _ATTRIBUTES))
 
 
-def put(file: Path, content: bytes) -> None:
-    """Write a file of a store, whole or not at all, for whom the user lets read files. Raises OSError."""
-    with whole_file(file) as stream:
-        stream.write(content)
-
-
-def digest_of(file: Path) -> str | None:
-    """The SHA-256 of a file; None where it cannot be read, or is a device or a pipe, which may have no end."""
-    if not file.is_file():
-        return None
+def _says(file: Path, content: Any) -> bool:
+    """Whether a file of JSON says just this: 1 is neither 1.0 nor true."""
     try:
-        with file.open("rb") as stream:
-            return hashlib.file_digest(stream, "sha256").hexdigest()
+        return digest(json.loads(stored(file))) == digest(content)
+    except (OSError, ValueError, RecursionError):
+        return False
+
+
+def _mentions(file: Path, words: bytes) -> bool:
+    """Whether some words are in a file."""
+    try:
+        return words in stored(file)
     except OSError:
-        return None
+        return False
 
 
-def _bytes(file: Path) -> bytes:
-    """What is in a file; nothing where it cannot be read, or is a device or a pipe."""
-    try:
-        return file.read_bytes() if file.is_file() else b""
-    except OSError:
-        return b""
-
-
-def _content(file: Path) -> Any:
-    """What a file of JSON says; None where it cannot be read."""
-    try:
-        return json.loads(_bytes(file))
-    except (ValueError, RecursionError):
-        return None
+def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
+    """Whether the files that metadata name are such as a store has: none is elsewhere."""
+    return all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group)
 
 
 def _damaged(path: Path, damage: str) -> StoreError:

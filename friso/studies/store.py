@@ -24,6 +24,7 @@ from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
+from friso.studies.store_files import refuse_foreign
 from friso.studies.store_folder import exchange, locked, make, remove_leftovers, remove_partial_files
 from friso.studies.study import Block, Study, study_of
 
@@ -181,8 +182,8 @@ class Store:
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
 
-    Raises StoreError if there is none, or its metadata or axes are damaged; RuntimeError where a damaged value is
-    looked at.
+    Raises StoreError if there is none, its metadata or axes are damaged, or anything but files is in it; RuntimeError
+    where a damaged value is looked at.
 
     Examples
     --------
@@ -192,6 +193,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     import xarray as xr
 
     metadata = checked_metadata(Path(path))
+    refuse_foreign(Path(path))
     try:
         if metadata.damaged_axes(Path(path)):
             raise ValueError("other axes than were written")

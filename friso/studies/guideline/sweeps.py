@@ -20,6 +20,7 @@ from friso.hunting.edges import ROUNDS, Edges, find_edges, joined
 from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
+from friso.studies.store_files import stored_arrays
 from friso.version import VERSION
 from friso.whole_file import whole_file
 
@@ -121,9 +122,9 @@ class Keep:
         settings = (VERSION, _sources(), name, *boxes, ROUNDS)
         key = hashlib.sha256(repr(settings).encode()).hexdigest()[:16]
         path = self.folder / f"{key}.npz"
-        if path.exists():
-            with np.load(path, allow_pickle=False) as stored:
-                return Edges(**{field.name: stored[field.name] for field in fields(Edges)})
+        kept = stored_arrays(path)
+        if kept is not None and kept.keys() == {field.name for field in fields(Edges)}:
+            return Edges(**kept)
         edges = make()
         self.folder.mkdir(parents=True, exist_ok=True)
         with whole_file(path) as file:

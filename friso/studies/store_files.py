@@ -1,0 +1,78 @@
+"""Files of a store, which may come from others: read only where they are regular files of the store itself, and no
+larger than friso writes them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import os
+import stat
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from friso.bounded_file import content_of
+from friso.errors import StoreError
+from friso.whole_file import whole_file
+
+MOST_BYTES = 64 << 20
+"""Size of a file of a store at most: the largest chunk, of texts that nothing compresses, has a sixth of it."""
+
+
+def stored(file: Path) -> bytes:
+    """What is in a file of a store. Raises OSError, also for a link, a device, a pipe and more than MOST_BYTES."""
+    return content_of(file, MOST_BYTES, follow=False)
+
+
+def digest_of(file: Path) -> str | None:
+    """The SHA-256 of a file of a store; None where `stored` raises."""
+    try:
+        return hashlib.sha256(stored(file)).hexdigest()
+    except OSError:
+        return None
+
+
+def stored_arrays(file: Path) -> dict[str, np.ndarray] | None:
+    """The arrays of an archive (.npz); None where there is none, or it is damaged."""
+    try:
+        with np.load(io.BytesIO(stored(file)), allow_pickle=False) as arrays:
+            return dict(arrays)
+    except (OSError, ValueError, EOFError, KeyError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error):
+        return None
+
+
+def put(file: Path, content: bytes) -> None:
+    """Write a file of a store, whole or not at all, for whom the user lets read files. Raises OSError."""
+    with whole_file(file) as stream:
+        stream.write(content)
+
+
+def refuse_foreign(path: Path) -> None:
+    """Raises StoreError for a store with anything in it that Zarr must not read, nor friso write to: a link, which may
+    lead elsewhere, a device, a pipe, a huge file."""
+    for entry in _entries(path):
+        status = entry.stat(follow_symlinks=False)
+        if stat.S_ISLNK(status.st_mode):
+            actual = "is a link"
+        elif not stat.S_ISREG(status.st_mode):
+            actual = "is a device or a pipe"
+        elif status.st_size > MOST_BYTES:
+            actual = f"has {status.st_size / 1e6:.3g} MB"
+        else:
+            continue
+        name = Path(entry.path).relative_to(path).as_posix()
+        expected = f"files of the store alone, of at most {MOST_BYTES / 1e6:.3g} MB: remove that one"
+        raise StoreError("", f"a store whose {name} {actual}", expected, f"rm {name}", str(path))
+
+
+def _entries(folder: Path | str) -> Iterator[os.DirEntry[str]]:
+    """All that is in a folder and those below it, but for the folders; no link is followed."""
+    with os.scandir(folder) as entries:
+        for entry in entries:
+            if entry.is_dir(follow_symlinks=False):
+                yield from _entries(entry.path)
+            else:
+                yield entry
