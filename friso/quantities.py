@@ -47,7 +47,7 @@ def as_toml(value: Any) -> str:
     if isinstance(value, int):
         return str(value) if abs(value) < LARGEST_INTEGER else "a huge integer"
     names = {dict: "a table", list: "an array", type(None): "nothing"}
-    return names.get(type(value)) or f"{value} (a {type(value).__name__})"
+    return names.get(type(value)) or f"{' '.join(str(value).split())} (a {type(value).__name__})"
 
 
 def quoted(value: Any, hint: str = "") -> str:

@@ -58,9 +58,9 @@ class Registry(Generic[Declared]):
         """The name, if it is one of these. Raises InputError for the `option` otherwise, whose `example`, with {} for
         the name, shows the nearest one."""
         names = tuple(self)
-        if name in names:
+        if isinstance(name, str) and name in names:
             return name
         from friso.quantities import quoted  # imports pydantic, which takes longer than the list of commands
 
-        nearest = next(iter(get_close_matches(name, names, 1, 0)), "")
+        nearest = next(iter(get_close_matches(str(name), names, 1, 0)), "")
         raise InputError(option, quoted(name), f"one of {', '.join(names)}", example.format(nearest))

@@ -8,12 +8,16 @@ import sys
 import time
 from importlib import import_module
 from pathlib import Path
+from threading import Event
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from filelock import FileLock
 from inside import friso_inside
 
 from friso import interrupts
+from friso.engine import building
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 COMMAND = [sys.executable, "-X", "importtime", "-m", "friso.cli", "bode", str(RIG)]
@@ -68,3 +72,51 @@ def test_an_import_that_is_under_way_ends_first(tmp_path: Path, monkeypatch: pyt
 def _import_and_wait() -> None:
     import_module("half_there")
     time.sleep(10)
+
+
+class Builder:
+    """Stands in for a process that builds: it ends, with nothing built, when it is killed."""
+
+    def __init__(self, *_: object) -> None:
+        self.killed = Event()
+
+    def build(self, request: object) -> str:
+        self.killed.wait(10)
+        return ""
+
+    def kill(self) -> None:
+        self.killed.set()
+
+    def end(self) -> str:
+        return "ended"
+
+
+def requests(folder: Path, count: int) -> list[Any]:
+    """What is to be built, each with a lock of its own."""
+    shared = {"entry": lambda: None, "title": "a kernel", "plug_ins": ""}
+    return [SimpleNamespace(lock=lambda n=n: FileLock(folder / f"{n}.lock"), **shared) for n in range(count)]
+
+
+def test_compiling_that_is_given_up_is_not_begun_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting, started = [Builder()], []
+
+    class Failing(Builder):
+        def build(self, request: object) -> str:
+            started.append(self)
+            return ""
+
+    monkeypatch.setattr(building, "usable_cores", lambda: 2)
+    monkeypatch.setattr(building, "_taken", lambda surroundings: waiting.pop() if waiting else None)
+    monkeypatch.setattr(building, "_Builder", Failing)
+    with pytest.raises(RuntimeError, match="could not be compiled"):
+        building._Work(requests(tmp_path, 2)).finish()
+    assert len(started) == 1  # the builder that was killed is not replaced
+
+
+def test_who_waits_for_another_that_compiles_can_be_interrupted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(building, "usable_cores", lambda: 1)
+    interrupts.signal_later(0.3, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+    with FileLock(tmp_path / "0.lock"), pytest.raises(KeyboardInterrupt), interrupts.raising():
+        building._Work(requests(tmp_path, 1)).finish()

@@ -291,3 +291,14 @@ def test_a_command_that_fails_while_writing_leaves_nothing(
     assert done.returncode == 1
     assert "could not be completed: disk full" in done.stderr
     assert tree(tmp_path) == {}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@pytest.mark.parametrize("content", [None, b"files = " + b"[" * 100_000, b"\xff", b"command = 3"])
+def test_a_marker_of_others_marks_nothing(tmp_path: Path, content: bytes | None) -> None:
+    if content is None:
+        os.mkfifo(tmp_path / MARKER)
+    else:
+        (tmp_path / MARKER).write_bytes(content)
+    with pytest.raises(InputError, match="--overwrite"):
+        place(tmp_path)

@@ -1,9 +1,11 @@
 """Files and values that are no stage files: devices, pipes, foreign names, wrong types."""
 
+import inspect
 import json
 import os
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,7 +18,7 @@ from friso.stage.files import MOST_BYTES
 EXAMPLES = Path(__file__).parent.parent / "examples"
 AXIS = EXAMPLES / "drives" / "linuxcnc_torque_axis.ini"
 MACHINE = {
-    **{"torque_per_output": "1 N*m", "travel_per_turn": "10 mm", "force_per_output": "10 N"},
+    **{"force_per_output": "10 N"},
     **{"masses.stage": "3 kg", "friction.model": "none"},
     **{"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "30 ms"},
 }
@@ -112,3 +114,34 @@ def test_numbers_of_a_parameter_file_may_overflow(tmp_path: Path) -> None:
     source.write_text(text.replace(line, "P = 1" + 400 * "0"), "utf-8")
     with pytest.raises(InputError):
         friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)
+
+
+def test_an_option_out_of_range_is_named() -> None:
+    with pytest.raises(InputError) as caught:
+        friso.tune(EXAMPLES / "thesis_rig.toml", within="1e200 m")
+    assert caught.value.key == "within"
+
+
+QUESTIONS = {name: getattr(friso, name) for name in ("check", "bode", "simulate", "tune", "flexure", "reproduce")}
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+@pytest.mark.parametrize("value", [np.array([1.0, 2.0]), {"a": {}}, object(), b"x", complex(1, 1)], ids=repr)
+def test_an_argument_of_another_type_is_named(name: str, value: Any) -> None:
+    for parameter in ("rtol", "seed", "only", "series", "stroke", "sample_time", "points"):
+        if parameter not in inspect.signature(QUESTIONS[name]).parameters:
+            continue
+        arguments = {} if name == "reproduce" else {"stage": EXAMPLES / "thesis_rig.toml"}
+        with pytest.raises(InputError) as caught:
+            QUESTIONS[name](**arguments, **{parameter: value})
+        assert caught.value.key == parameter
+
+
+def test_huge_values_of_a_log_are_shown_as_far_as_a_picture_can(tmp_path: Path) -> None:
+    rows = [f"{i}e305,{1.7e308 * (-1) ** i},{i * 1e-320}" for i in range(20)]
+    (tmp_path / "log.csv").write_text("\n".join(["time [s],position [m],force [N]", *rows]), "utf-8")
+    answer = friso.logs(tmp_path / "log.csv")
+    assert "1.7e+308" in str(answer)
+    assert answer.figures()
+    drawn = answer.figures()[0].panels[0]
+    assert "not drawn" in drawn.title

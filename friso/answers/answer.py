@@ -11,6 +11,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
 
+from friso.answers.arguments import checked
 from friso.axis import LINEAR, AxisKind, speaking_of
 from friso.errors import InputError
 from friso.escapes import escaped
@@ -28,11 +29,12 @@ Returned = TypeVar("Returned")
 
 
 def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """A public function: the kind of axis that it speaks of stays its own."""
+    """A public function: its arguments are checked, and the kind of axis that it speaks of stays its own."""
+    answer = checked(function)
 
     @wraps(function)
     def asked(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
-        return copy_context().run(function, *arguments, **options)
+        return copy_context().run(answer, *arguments, **options)
 
     return asked
 

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, changes_of, stage_of
+from friso.answers.inputs import Changes, StageLike, changes_of, choice, stage_of
 from friso.axis import speak_of
 from friso.drives.gains import Gains, gains_of
-from friso.errors import InputError
 from friso.progress import Progress, silent
-from friso.quantities import quoted
 
 if TYPE_CHECKING:
     from friso.views.files import Files
@@ -93,8 +91,7 @@ def export(
     >>> import friso
     >>> friso.export("gains", friso.example("twincat_cascade"), set={"travel_per_turn": "10 mm"})  # doctest: +SKIP
     """
-    if what != "gains":
-        raise InputError("WHAT", quoted(what), "gains", "friso export gains stage.toml")
+    choice(what, "WHAT", ("gains",), "friso export gains stage.toml")
     pairs = changes_of(set)
     overrides = {key: value for key, value in pairs.items() if "." in key}
     chosen = stage_of(stage, overrides)

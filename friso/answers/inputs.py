@@ -129,12 +129,23 @@ def whole_number(value: int, name: str, least: int, most: int, example: str) -> 
     return value
 
 
+def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
+    """One of some texts. Raises InputError for anything else."""
+    if not (isinstance(value, str) and value in choices):
+        raise InputError(
+            name, quoted(value), choices[0] if len(choices) == 1 else f"one of {', '.join(choices)}", example
+        )
+    return value
+
+
 def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
     """Keys to texts from a dictionary, or from texts KEY=VALUE. Raises InputError."""
     if isinstance(values, Mapping):
         return dict(values)
     pairs: dict[str, str] = {}
     for text in values or ():
+        if not isinstance(text, str):
+            raise wrong(name, quoted(text), "KEY=VALUE", example)
         key, equals, value = text.partition("=")
         key = key.strip()
         if not (equals and key and value.strip()):

@@ -14,6 +14,7 @@ import numpy as np
 from friso.answers.inputs import Changes, axes_of, pairs_of
 from friso.answers.output_folder import refuse_device
 from friso.errors import InputError, StoreError
+from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import Values
 from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
@@ -127,7 +128,7 @@ def _check_metric(metric: str, possible: Sequence[str]) -> None:
     """Raises InputError for a metric that there is not."""
     names = [name for name in possible if name != "status"]
     if metric not in names:
-        raise InputError("metric", metric, f"one of {', '.join(names)}", "metric=peak_to_peak")
+        raise InputError("metric", quoted(metric), f"one of {', '.join(names)}", "metric=peak_to_peak")
 
 
 def coloured_by(study: Study, metric: str) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import logging
 import os
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +13,7 @@ from friso.answers.drafts import DRAFTS, Drafts, made
 from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
+from friso.stage.files import parsed, text_of
 from friso.system import device_in
 from friso.version import VERSION
 
@@ -118,8 +118,8 @@ def marker(command: str, names: Iterable[str]) -> str:
 def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     """The command that made a folder and the files that it wrote there; empty where no command of friso did."""
     try:
-        document = tomllib.loads((folder / MARKER).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        document = parsed(text_of(folder / MARKER, "a marker"), "a marker")
+    except InputError:
         return "", ()
     command, files = document.get("command"), document.get("files")
     if not (isinstance(command, str) and isinstance(files, list)):

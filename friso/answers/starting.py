@@ -8,7 +8,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from friso.answers.inputs import LOGGER, Changes, changes_of
+from friso.answers.arguments import checked
+from friso.answers.inputs import LOGGER, Changes, changes_of, choice
 from friso.answers.output_folder import refuse_device, write
 from friso.errors import InputError
 from friso.stage import load
@@ -28,6 +29,7 @@ def example_names() -> list[str]:
     return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
 
 
+@checked
 def example(name: str) -> Path:
     """The path of an example that comes with friso.
 
@@ -52,13 +54,11 @@ def example(name: str) -> Path:
     >>> friso.load(friso.example("thesis_rig")).name
     'Thesis rig'
     """
-    names = example_names()
     stem = name.removesuffix(".toml").removeprefix("examples/")
-    if stem not in names:
-        raise InputError("NAME", repr(name), f"one of {', '.join(names)}", "friso example thesis_rig")
-    return examples_folder() / f"{stem}.toml"
+    return examples_folder() / f"{choice(stem, 'NAME', example_names(), 'friso example thesis_rig')}.toml"
 
 
+@checked
 def init(
     path: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
@@ -149,6 +149,7 @@ def _start(
     return stage_of_axis.text()
 
 
+@checked
 def schema(of: str = "stage") -> dict[str, Any]:
     """The JSON Schema of the stage file, or of the specification of a design: keys, units, bounds, examples.
 
@@ -175,6 +176,4 @@ def schema(of: str = "stage") -> dict[str, Any]:
     """
     from friso.answers.schema import SCHEMAS
 
-    if of not in SCHEMAS:
-        raise InputError("of", repr(of), f"one of {', '.join(SCHEMAS)}", "of=stage")
-    return SCHEMAS[of]()
+    return SCHEMAS[choice(of, "of", tuple(SCHEMAS), "of=stage")]()

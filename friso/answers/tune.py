@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, text_of, whole_number, wrong
+from friso.answers.inputs import Changes, StageLike, choice, correlations_of, read_stage, text_of, whole_number, wrong
 from friso.errors import InputError
 from friso.progress import Progress, silent
-from friso.quantities import Quantity, positive
+from friso.quantities import Bound, Quantity, positive
 from friso.remedies import Changeable
 from friso.remedies.goal import Goal
 from friso.stage import Stage
@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from friso.views.files import Files
 
 MOST_SEED = 2**31 - 1
+
+_IN_POSITION = Bound("greater than 0 and at most 1", lambda value: (value > 0) & (value <= 1))
+"""Deviations [m or rad] that may count as in position."""
 
 
 class TuneAnswer(Answer):
@@ -152,11 +155,14 @@ def _goal(
     keep: Changeable | None,
 ) -> Goal:
     """The goal of the options. Raises InputError."""
+    for name, part in (("only", only), ("keep", keep)):
+        if part is not None:
+            choice(part, name, get_args(Changeable), f"{name}=controller")
     if only is not None and only == keep:
         raise InputError("keep", str(keep), f"something else than --only {only}, or nothing is left to change", "")
 
-    def read(name: str, value: float | str | None, unit: str, example: str) -> float | None:
-        quantity = Quantity(unit, positive, example).on(stage.axis_kind)
+    def read(name: str, value: float | str | None, unit: str, example: str, bound: Bound = positive) -> float | None:
+        quantity = Quantity(unit, bound, example).on(stage.axis_kind)
         text = None if value is None else text_of(value, quantity.unit)
         try:
             return None if text is None else float(quantity.read(text))
@@ -164,7 +170,7 @@ def _goal(
             raise wrong(name, error.actual, error.expected, error.example) from None
 
     return Goal(
-        within=read("within", within, "m", "1 um") or Goal.within,
+        within=read("within", within, "m", "1 um", _IN_POSITION) or Goal.within,
         settle=read("settle", settle, "s", "0.3 s"),
         force_limit=read("force_limit", force_limit, "N", "50 N"),
         bandwidth_limit=read("bandwidth_limit", bandwidth_limit, "Hz", "25 Hz"),

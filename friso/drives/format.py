@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -30,7 +31,7 @@ class AxisParameters:
         if entry is None:
             raise InputError(name, "nothing", "a number", f"{name} = 1.0")
         try:
-            if isinstance(entry, bool):
+            if isinstance(entry, bool) or (isinstance(entry, str) and not _NUMBER.fullmatch(entry.strip())):
                 raise TypeError
             value = float(entry)
         except (TypeError, ValueError, OverflowError):
@@ -44,6 +45,9 @@ class AxisParameters:
         entry = self.values.get(name)
         return entry is not None and str(entry).strip().lower() not in ENDLESS and self.number(name) != 0
 
+
+_NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?|nan)", re.IGNORECASE)
+"""A number as drives read it: neither the underscores nor the digits of other scripts that Python takes."""
 
 MOST = 1e30
 """Largest number that a parameter can be."""

@@ -9,7 +9,7 @@ from typing import Any
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, quoted
-from friso.stage.section import Section, numeric_fields
+from friso.stage.section import Section, nearest, numeric_fields
 from friso.stage.tables import FRICTION, Masses, ThereAndBack, friction_law
 
 
@@ -32,9 +32,21 @@ class UserAnswers:
 
     def __init__(self, texts: Mapping[str, Any]) -> None:
         self.texts = dict(texts)
+        self.wanted: set[str] = set()
 
     def __contains__(self, key: object) -> bool:
+        self.wanted.add(str(key))
         return key in self.texts
+
+    def refuse_unwanted(self) -> None:
+        """Raises InputError for an answer to what nothing asked, such as a misspelled one; keys of tables are checked
+        with the stage."""
+        for key in self.texts:
+            if "." not in key and key not in self.wanted:
+                wanted = sorted(name for name in self.wanted if "." not in name)
+                near = nearest(key, wanted) or "masses.stage"
+                expected = f"a key of the stage{''.join(f', {name}' for name in wanted)}"
+                raise InputError("--set", quoted(key), expected, f"--set {near}=...")
 
     def value(self, key: str, field: Quantity | Number) -> float:
         """A number in SI. Raises InputError for another answer."""

@@ -43,6 +43,7 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
         asked = kind.questions(chosen, answers)
         refuse_open(asked, f"{path}, {chosen.name}")
         of_axis = kind.stage(chosen, answers)
+        answers.refuse_unwanted()
         stage = _with_answers(of_axis, kind, chosen, path, user_answers)
     except InputError as error:
         raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None

@@ -13,16 +13,21 @@ import subprocess
 import sys
 import tempfile
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 
+from filelock import Timeout
+
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
 from friso.engine.prune import prune
 from friso.system import usable_cores
+
+_PATIENCE = 0.1
+"""How long [s] another process that builds the same is waited for before it is looked whether there is still need."""
 
 
 def entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
@@ -45,6 +50,7 @@ class _Work:
     def __init__(self, requests: list[CodeRequest]) -> None:
         self._count, self._waiting = len(requests), deque(enumerate(requests, 1))
         self._busy: list[_Builder] = []
+        self._given_up = False
 
     def finish(self) -> None:
         """Meet all of them. Whatever ends it early ends the builders too."""
@@ -54,22 +60,40 @@ class _Work:
                 for job in [pool.submit(self._meet) for _ in range(cores)]:
                     job.result()
             except BaseException:
-                self._waiting.clear()
+                self._given_up = True  # before any is ended: one that starts now ends itself
                 for builder in list(self._busy):
                     builder.kill()
                 raise
 
     def _meet(self) -> None:
-        while True:
+        while not self._given_up:
             try:
                 number, request = self._waiting.popleft()
             except IndexError:
                 return
-            with request.lock():
+            with self._turn(request):
                 if request.entry() is None:  # no other process has built it meanwhile
                     place = f"{number} of {self._count}"
                     logger.warning("compiling, once on this machine, %s: %s", place, request.title)
                     request.answer(self._built(request))
+
+    @contextmanager
+    def _turn(self, request: CodeRequest) -> Iterator[None]:
+        """Hold the lock of what is requested, once no other process does. Raises RuntimeError where the work is given
+        up meanwhile."""
+        lock = request.lock()
+        while not lock.is_locked:
+            self._go_on()
+            with suppress(Timeout):
+                lock.acquire(timeout=_PATIENCE)
+        try:
+            yield
+        finally:
+            lock.release()
+
+    def _go_on(self) -> None:
+        if self._given_up:
+            raise RuntimeError("the kernels were not compiled: interrupted")
 
     def _built(self, request: CodeRequest) -> str:
         """Build what is requested, by a builder that waits where there is one; the name of the entry."""
@@ -78,12 +102,15 @@ class _Work:
             waiting = _taken(surroundings)
             builder = waiting or _Builder(surroundings)
             self._busy.append(builder)
+            if self._given_up:
+                builder.kill()
             name = builder.build(request)
             self._busy.remove(builder)
             if name:
                 _waiting.append(builder)
                 return name
             message = builder.end()
+            self._go_on()
             if waiting is None:  # one that has waited may have ended meanwhile
                 raise RuntimeError(f"the kernel could not be compiled:\n{message}")
 

@@ -58,7 +58,8 @@ class ChannelContent:
         """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""
         parts = np.array_split(self.values, min(BINS, max(self.values.size, 1)))
         finite = [part[np.isfinite(part)] for part in parts]
-        return np.array([part.mean() if part.size else np.nan for part in finite])
+        # divided first: the sum of huge values is infinite
+        return np.array([(part / part.size).sum() if part.size else np.nan for part in finite])
 
 
 @dataclass(frozen=True)

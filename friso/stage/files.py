@@ -91,7 +91,13 @@ def parse_set(text: str) -> tuple[str, Any]:
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise InputError("", quoted(text), "KEY=VALUE", 'masses.stage="0.6 kg"', origin="--set")
-    return key.strip(), _value(value.strip())
+    value = value.strip()
+    if value[:1] in ("'", '"') and (opened := _open_quote(value)) is not None:
+        before = one_line(text[: text.index(value, len(key)) + opened])
+        shown = f"{_INDENT}{one_line(text)[:_WIDTH]}\n{_INDENT}{' ' * len(before)}^"
+        actual = f"a quote that is not closed\n{shown}"
+        raise InputError("", actual, "KEY=VALUE", 'masses.stage="0.6 kg"', origin="--set")
+    return key.strip(), _value(value)
 
 
 def _value(text: str) -> Any:

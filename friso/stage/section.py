@@ -66,6 +66,9 @@ class Section(BaseModel):
         return section
 
     def _take(self, data: Mapping[str, Any], kind: AxisKind) -> None:
+        for key in data:
+            if not isinstance(key, str):
+                raise self.refusal("", f"a key that is no text: {quoted(key)}", "keys of texts", '"stiffness"')
         try:
             self.__pydantic_validator__.validate_python(dict(data), self_instance=self, context=kind)
         except ValidationError as error:

@@ -260,6 +260,9 @@ class Stage(Section):
 
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
         """The stage with dotted keys set, or removed by None; checked like a file. Raises StageError."""
+        if not (isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes)):
+            expected = "a dictionary of keys to new values"
+            raise StageError("", quoted(changes), expected, 'stage.replace({"masses.stage": "0.6 kg"})')
         tables = self.as_written()
         for key, value in changes.items():
             _put(tables, key, getattr(value, "text", value))

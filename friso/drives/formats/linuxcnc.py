@@ -44,6 +44,9 @@ NOT_CARRIED = {
 }
 MOST_LINES = 100_000
 
+_AXIS = r"(?:JOINT|AXIS)_[0-9]{1,3}"
+"""The name of a section with the parameters of an axis."""
+
 HELD = frozenset(
     {
         "kp",
@@ -62,7 +65,7 @@ HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforwa
 
 def recognises(name: str, text: str) -> bool:
     """By a section of a joint or an axis."""
-    return re.search(r"^\s*\[(JOINT|AXIS)_\d+\]", text, re.MULTILINE) is not None
+    return re.search(rf"^\s*\[{_AXIS}\]", text, re.MULTILINE) is not None
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:
@@ -76,7 +79,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     with_gains = [
         AxisParameters(f"[{name}]", values, {key: value for key, value in machine.items() if value is not None})
         for name, values in sections.items()
-        if re.fullmatch(r"(JOINT|AXIS)_\d+", name) and "P" in values
+        if re.fullmatch(_AXIS, name) and "P" in values
     ]
     joints = [axis for axis in with_gains if axis.name.startswith("[JOINT")]
     if not with_gains:
@@ -122,7 +125,7 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
         meaning += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
         asked.append(OpenQuestion(FORCE, meaning, FORCE_FIELD.on(kind).written_example))
-    moved = "MAX_ACCELERATION" in axis.values and "MAX_VELOCITY" in axis.values
+    moved = axis.given("MAX_ACCELERATION") and axis.given("MAX_VELOCITY")
     return (*asked, *of_the_machine(answers, kind, moved))
 
 

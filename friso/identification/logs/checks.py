@@ -45,6 +45,10 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     return time[keep], values[keep], int(again.size)
 
 
+COUNTER_BITS = 64
+"""Bits of a counter at most."""
+
+
 def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
     """Whole numbers of a counter with the jumps of its overflow taken out, and its bits; unchanged with 0 bits where
     it is no counter that overflows.
@@ -53,7 +57,7 @@ def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
     back is at most twice as large as those (a square wave fails this).
     """
     finite = values[np.isfinite(values)]
-    if finite.size < 3 or np.any(finite != np.round(finite)):
+    if finite.size < 3 or np.any(finite != np.round(finite)) or np.abs(finite).max() > 2.0**COUNTER_BITS:
         return values, 0
     bits = int(np.ceil(np.log2(np.ptp(finite) + 1))) if np.ptp(finite) > 0 else 0
     steps = np.diff(values)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.identification.contents import ChannelContent, LogContent
+from friso.identification.logs.signals import LARGEST
 from friso.views.drawing.figure import BLUE, Axis, Figure, Panel, Series
 from friso.views.logs.words import title
 
@@ -28,9 +29,18 @@ def _figure(content: LogContent, number: int) -> Figure:
 
 
 def _panel(channel: ChannelContent) -> Panel:
-    timed = channel.time is not None and channel.time.size == channel.values.size
-    x = channel.time if timed and channel.time is not None else np.arange(channel.values.size, dtype=float)
-    values = np.where(np.isfinite(channel.values), channel.values, np.nan)
+    time = channel.time
+    timed = time is not None and time.size == channel.values.size and not np.isnan(_shown(time)).all()
+    x = _shown(time) if timed and time is not None else np.arange(channel.values.size, dtype=float)
+    values = _shown(channel.values)
     words = f"{channel.name}: {channel.role.replace('_', ' ')}" if channel.role else channel.name
+    if np.isnan(values[np.isfinite(channel.values)]).any():
+        words += f" (values beyond {LARGEST:g} not drawn)"
     across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)
     return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))
+
+
+def _shown(values: np.ndarray) -> np.ndarray:
+    """The values that a picture can show, which no instrument exceeds; NaN for others, 0 for what is next to it."""
+    sizes = np.abs(values)
+    return np.where(sizes <= LARGEST, np.where(sizes < 1 / LARGEST, 0.0, values), np.nan)

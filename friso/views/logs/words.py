@@ -68,6 +68,7 @@ def _samples(channel: ChannelContent) -> str:
 
 def sparkline(values: np.ndarray) -> str:
     """A line of blocks as high as the values, shape (n,), are between the least and the greatest; a space for NaN."""
+    values = values / max(float(np.abs(values[np.isfinite(values)]).max(initial=0.0)), np.finfo(float).tiny)
     finite = values[np.isfinite(values)]
     low, span = (float(finite.min()), float(np.ptp(finite))) if finite.size else (0.0, 0.0)
     heights = (values - low) / span if span > 0 else np.where(np.isfinite(values), 0.0, np.nan)
