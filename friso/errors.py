@@ -3,6 +3,9 @@
 from collections.abc import Iterable
 from typing import Self
 
+_LONGEST = 4096
+"""Characters of a path that are shown, at most: no file has a longer one."""
+
 
 class InputError(ValueError):
     """A wrong input: which key, what was given, what was expected, a correct example, and which file; and what `also`
@@ -22,7 +25,8 @@ class InputError(ValueError):
         self.also = also
 
     def __str__(self) -> str:
-        head = ": ".join(part for part in (self.origin, self.key) if part)
+        origin = self.origin if len(self.origin) <= _LONGEST else f"{self.origin[:_LONGEST]}..."
+        head = ": ".join(part for part in (origin, self.key) if part)
         rows = {"given:": self.actual, "expected:": self.expected, "example:": self.example}
         lines = [f"  {name:<9} {text}" for name, text in rows.items() if text]
         lines += [f"  {'also:':<9} {key}: {actual}" for key, actual in self.also]

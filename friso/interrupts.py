@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-from friso.system import signal_later
+from friso.system import no_signal_later, signal_later
 
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """The signals that end a command."""
@@ -49,6 +49,7 @@ def raising() -> Iterator[None]:
         yield
     finally:
         _raising = False
+        no_signal_later()
         if not _IS_COMMAND:  # which ends now, and is not to be interrupted in that
             _came.clear()
             for number, handler in before.items():

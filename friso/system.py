@@ -39,6 +39,9 @@ if sys.platform == "win32":
         timer.daemon = True
         timer.start()
 
+    def no_signal_later() -> None:
+        """Nothing: the timer ends with the process."""
+
     def replace_file(draft: Path, path: Path) -> None:
         """Give a file another's name and place. Raises OSError; one that another program holds open for longer than
         `PATIENCE` is a PermissionError that says so."""
@@ -93,6 +96,10 @@ else:
         """Have a handler called in the main thread after some time, as for SIGALRM."""
         signal.signal(signal.SIGALRM, handler)
         signal.setitimer(signal.ITIMER_REAL, seconds)
+
+    def no_signal_later() -> None:
+        """Have it not called after all: Python's end takes its handlers away, and SIGALRM would kill the process."""
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
     def replace_file(draft: Path, path: Path) -> None:
         """Give a file another's name and place. Raises OSError."""

@@ -93,7 +93,7 @@ class Builder:
 
 def requests(folder: Path, count: int) -> list[Any]:
     """What is to be built, each with a lock of its own."""
-    shared = {"entry": lambda: None, "title": "a kernel", "plug_ins": ""}
+    shared = {"entry": lambda: None, "answer": print, "title": "a kernel", "plug_ins": ""}
     return [SimpleNamespace(lock=lambda n=n: FileLock(folder / f"{n}.lock"), **shared) for n in range(count)]
 
 

@@ -141,7 +141,6 @@ def test_huge_values_of_a_log_are_shown_as_far_as_a_picture_can(tmp_path: Path) 
     rows = [f"{i}e305,{1.7e308 * (-1) ** i},{i * 1e-320}" for i in range(20)]
     (tmp_path / "log.csv").write_text("\n".join(["time [s],position [m],force [N]", *rows]), "utf-8")
     answer = friso.logs(tmp_path / "log.csv")
-    assert "1.7e+308" in str(answer)
-    assert answer.figures()
+    assert any("1.7e+308" in text for _, texts in answer.tables()[0].rows for text in texts)
     drawn = answer.figures()[0].panels[0]
     assert "not drawn" in drawn.title

@@ -11,10 +11,10 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
 
-from friso.answers.arguments import checked
 from friso.axis import LINEAR, AxisKind, speaking_of
 from friso.errors import InputError
 from friso.escapes import escaped
+from friso.stage.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr

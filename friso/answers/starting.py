@@ -8,11 +8,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from friso.answers.arguments import checked
 from friso.answers.inputs import LOGGER, Changes, changes_of, choice
 from friso.answers.output_folder import refuse_device, write
 from friso.errors import InputError
 from friso.stage import load
+from friso.stage.arguments import checked
 
 EXAMPLES = "examples"
 

@@ -14,11 +14,13 @@ from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
 from friso.quantities import quoted
 from friso.stage import Stage
+from friso.stage.arguments import checked
 
 if TYPE_CHECKING:
     from control import StateSpace
 
 
+@checked
 def linear(stage: Stage, case: str | Members | None = None, part: str = "plant", series: bool = False) -> StateSpace:
     """A stage in one state as a `control.StateSpace` in SI units, its states, inputs and outputs named.
 
@@ -46,6 +48,8 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
     >>> friso.linear(stage, "stuck").output_labels
     ['stage', 'cart', 'joint deflection']
     """
+    if not isinstance(case, str | Members | None):
+        raise InputError("case", quoted(case), "the name of a limit case, or a state", "case=friso.member(speed=1e-3)")
     flat: Mapping[str, Any] = stage.flat()
     cases = limit_cases(flat)
     member = _checked(flat, case) if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)

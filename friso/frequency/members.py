@@ -11,6 +11,7 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.friction import level, speeds
+from friso.stage.arguments import checked
 from friso.stage.transmission import leading_friction
 
 BIASES, SPEEDS = 65, 257
@@ -63,6 +64,7 @@ class Members:
         return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 
+@checked
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
     """A single state: sliding at a speed [m/s], `forward` or back, or, at 0, stuck under a bias force [N]; with its
     limiter `touched` or not. Raises InputError for a speed that is negative and for a bias of a cart that slides.

@@ -8,6 +8,7 @@ from friso.equations.controllers.van_dijk import numbers, tuned
 from friso.errors import InputError
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
+from friso.stage.arguments import checked
 from friso.stage.stage import numeric_keys
 
 
@@ -28,6 +29,11 @@ class Tuning:
         return self.margins.crossovers[-1]
 
 
+EXAMPLE, MOST = "friso.tuning(8.0, 0.1, 2.0, 1.7)", 1e30
+"""How it is called, and the largest number of any of its arguments."""
+
+
+@checked
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules with `alpha` and `beta`, and how it does
     on that mass. Raises InputError for numbers that no stage file may have.
@@ -38,8 +44,12 @@ def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     >>> round(friso.tuning(8.0, 0.1, 2.0, 1.7).true_crossover, 2)
     8.08
     """
+    given = {"crossover": crossover, "alpha": alpha, "beta": beta, "mass": mass}
+    for name, value in given.items():
+        if not 1 / MOST <= value <= MOST:
+            raise InputError(name, f"{value:g}", f"a number from {1 / MOST:g} to {MOST:g}", EXAMPLE)
     flat = {"friction.model": "none", "masses.stage": mass, **tuned(crossover, alpha, beta, mass)}
     for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
         if key in flat and not item.bound.holds(flat[key]):
-            raise InputError(key.split(".")[1], str(flat[key]), item.bound.text, "friso.tuning(8.0, 0.1, 2.0, 1.7)")
+            raise InputError(key.split(".")[1], str(flat[key]), item.bound.text, EXAMPLE)
     return Tuning(**numbers(flat), margins=margins(flat, member()))

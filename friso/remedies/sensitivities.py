@@ -25,6 +25,7 @@ from friso.hunting.cycle.shooting import Orbits, close
 from friso.hunting.margin import Margin
 from friso.hunting.verdict import can_hunt
 from friso.stage import Stage, numeric_keys
+from friso.stage.arguments import checked
 from friso.stage.controllers import as_tuned, controller_of
 
 RTOL = 1e-11
@@ -96,6 +97,7 @@ class Sensitivities:
         return [(self.keys[k], float(moves[k])) for k in np.argsort(-np.abs(moves), kind="stable")]
 
 
+@checked
 def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None) -> Sensitivities:
     """Derivatives of cycle, edge of hunting and modulus margin to keys; all that the equations contain if none are
     named. The `edge` is located unless it is given (that of a check).

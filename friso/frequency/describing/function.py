@@ -22,6 +22,7 @@ from friso.equations.imposed import HARMONIC
 from friso.errors import InputError
 from friso.frequency.describing.steady import RTOL, Imposition, closed, share_of_period, steady
 from friso.stage import Stage
+from friso.stage.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,6 +48,7 @@ def dynamic_stiffness(
     return np.where(good, first[:, 1] / amplitudes, np.nan)
 
 
+@checked
 def describing(
     stage: Stage,
     amplitudes: Sequence[float] | np.ndarray,

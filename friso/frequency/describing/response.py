@@ -18,6 +18,7 @@ from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke
 from friso.frequency.describing.steady import RTOL
 from friso.stage import Stage
+from friso.stage.arguments import checked
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -26,6 +27,7 @@ NOT_FOUND = "no amplitude was found at which this force moves the cart"
 MISSING = "answers are missing: friction was not found at some amplitude, or the least or greatest answer does not last"
 
 
+@checked
 def plant_response(
     stage: Stage,
     forces: Sequence[float] | np.ndarray,

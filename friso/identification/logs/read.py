@@ -26,8 +26,9 @@ def file_format(path: Path) -> str:
         size = path.stat().st_size
         with path.open("rb") as file:
             head = FileHead(path, file.read(520))
-    except OSError as error:
-        raise LogError("log", f"a file that cannot be opened ({error.strerror})", "a log", "", str(path)) from None
+    except (OSError, ValueError) as error:  # a name that no file has
+        reason = getattr(error, "strerror", None) or "no name of a file"
+        raise LogError("log", f"a file that cannot be opened ({reason})", "a log", "", str(path)) from None
     if size == 0:
         raise LogError("log", "an empty file (0 bytes)", "a heading and rows of numbers", "", str(path))
     if size > MOST_BYTES:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from functools import wraps
 from inspect import signature
 from numbers import Integral, Real
@@ -14,40 +14,68 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.quantities import quoted
-from friso.stage import Stage
+from friso.stage.stage import Stage
 
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
 
 
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
 def _is_path(value: Any) -> bool:
-    return isinstance(value, str) or (isinstance(value, os.PathLike) and isinstance(os.fspath(value), str))
+    return _is_text(value) or (isinstance(value, os.PathLike) and _is_text(os.fspath(value)))
+
+
+def _has_text_keys(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(map(_is_text, value))
+
+
+def _is_list(value: Any, of: Callable[[Any], bool]) -> bool:
+    return isinstance(value, Sequence | Set) and not isinstance(value, str | bytes) and all(map(of, value))
+
+
+def _is_number(value: Any) -> bool:
+    """Whether a value is one number that a float can be."""
+    if not isinstance(value, Real) or isinstance(value, bool):
+        return False
+    try:
+        float(value)
+    except (OverflowError, ValueError):
+        return False
+    return True
+
+
+def _are_numbers(value: Any) -> bool:
+    try:
+        return np.asarray(value, dtype=float).ndim > 0
+    except (TypeError, ValueError, OverflowError):
+        return False
 
 
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "None": (lambda value: value is None, "None"),
-    "str": (lambda value: isinstance(value, str), "a text"),
+    "str": (_is_text, "a text"),
     "int": (lambda value: isinstance(value, Integral) and not isinstance(value, bool), "a whole number"),
-    "float": (lambda value: isinstance(value, Real) and not isinstance(value, bool), "a number"),
+    "float": (_is_number, "a number"),
     "bool": (lambda value: isinstance(value, bool | np.bool_), "True or False"),
     "os.PathLike[str]": (_is_path, "a path"),
     "Path": (lambda value: isinstance(value, Path), "a path"),
+    "Stage": (lambda value: isinstance(value, Stage), "a stage, such as friso.load(path)"),
     "StageLike": (
-        lambda value: isinstance(value, Stage | Mapping) or _is_path(value),
+        lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
         "a stage, the path of a stage file, or its tables as a dictionary",
     ),
     "Changes": (
-        lambda value: value is None or (isinstance(value, Iterable) and not isinstance(value, str | bytes)),
+        lambda value: value is None or _has_text_keys(value) or _is_list(value, _is_text),
         "a dictionary of keys, or a list of texts KEY=VALUE",
     ),
-    "LogFiles": (
-        lambda value: _is_path(value) or (isinstance(value, Sequence) and all(map(_is_path, value))),
-        "the path of a file, or a list of paths",
-    ),
-    "Iterable[str]": (
-        lambda value: isinstance(value, list | tuple | set | frozenset) and all(isinstance(v, str) for v in value),
-        "a list of texts",
-    ),
+    "LogFiles": (lambda value: _is_path(value) or _is_list(value, _is_path), "the path of a file, or a list of paths"),
+    "Iterable[str]": (lambda value: _is_list(value, _is_text), "a list of texts"),
+    "Sequence[str]": (lambda value: _is_list(value, _is_text), "a list of texts"),
+    "Sequence[float]": (_are_numbers, "numbers in a row"),
+    "np.ndarray": (_are_numbers, "numbers in a row"),
 }
 """What an annotation stands for: a test, and words. Arguments with another annotation are checked where they are
 used."""
