@@ -14,7 +14,7 @@ import sys
 import tempfile
 from collections import deque
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,7 +57,7 @@ class _Work:
         cores = min(self._count, usable_cores())
         with ThreadPoolExecutor(cores) as pool:
             try:
-                for job in [pool.submit(self._meet) for _ in range(cores)]:
+                for job in as_completed([pool.submit(self._meet) for _ in range(cores)]):
                     job.result()
             except BaseException:
                 self._given_up = True  # before any is ended: one that starts now ends itself
