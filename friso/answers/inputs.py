@@ -98,7 +98,7 @@ def tolerance_of(value: str | float) -> float:
     try:
         return checked_rtol(float(value))
     except ValueError:
-        raise wrong("rtol", str(value), "a number from 1e-12 to 1e-2", "1e-6") from None
+        raise wrong("rtol", quoted(value), "a number from 1e-12 to 1e-2", "1e-6") from None
 
 
 def text_of(value: str | float, unit: str) -> str:

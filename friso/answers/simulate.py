@@ -137,7 +137,11 @@ def simulate(
             )
         chosen, name, usual = read_stage(source, set), stem_of(source), RTOL
     else:
-        index = [] if stage is None else list(stage)  # type: ignore[arg-type]
+        if not isinstance(stage, list | tuple | None):
+            raise InputError(
+                "STAGE.toml", "a stage beside --cell", "the numbers of a cell", "friso.simulate([3, 4], cell=...)"
+            )
+        index = list(stage or ())
         chosen, name, usual = _cell(Path(cell), [str(number) for number in index], set)
     from friso.engine.simulate import simulate as simulated
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence, Set
 from functools import wraps
 from inspect import signature
@@ -49,10 +50,13 @@ def _is_number(value: Any) -> bool:
 
 def _are_numbers(value: Any) -> bool:
     try:
-        return np.asarray(value, dtype=float).ndim > 0
+        np.asarray(value, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return False
+    return True
 
+
+_ALTERNATIVES = re.compile(r" \| (?![^\[]*\])")
 
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "None": (lambda value: value is None, "None"),
@@ -71,11 +75,23 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: value is None or _has_text_keys(value) or _is_list(value, _is_text),
         "a dictionary of keys, or a list of texts KEY=VALUE",
     ),
+    "Spec": (lambda value: type(value).__name__ == "Spec", "a specification"),
+    "tuple[float, float]": (
+        lambda value: _is_list(value, lambda end: _is_number(end) or _is_text(end)) and len(value) == 2,
+        "both ends of a range",
+    ),
+    "Sequence[int | str]": (
+        lambda value: _is_list(value, lambda item: _is_path(item) or isinstance(item, Integral)),
+        "the numbers of a cell",
+    ),
+    "Iterable[str | os.PathLike[str]]": (lambda value: _is_list(value, _is_path), "a list of paths"),
+    "Mapping[str, str]": (_has_text_keys, "a dictionary of keys to ranges"),
+    "Mapping[str, Values]": (_has_text_keys, "a dictionary of keys to ranges or values"),
     "LogFiles": (lambda value: _is_path(value) or _is_list(value, _is_path), "the path of a file, or a list of paths"),
     "Iterable[str]": (lambda value: _is_list(value, _is_text), "a list of texts"),
     "Sequence[str]": (lambda value: _is_list(value, _is_text), "a list of texts"),
-    "Sequence[float]": (_are_numbers, "numbers in a row"),
-    "np.ndarray": (_are_numbers, "numbers in a row"),
+    "Sequence[float]": (_are_numbers, "numbers"),
+    "np.ndarray": (_are_numbers, "numbers"),
 }
 """What an annotation stands for: a test, and words. Arguments with another annotation are checked where they are
 used."""
@@ -84,7 +100,9 @@ used."""
 def checked(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
     """A function that raises InputError for an argument of another type than is annotated."""
     parameters = signature(function)
-    annotated = {name: str(parameter.annotation).split(" | ") for name, parameter in parameters.parameters.items()}
+    annotated = {
+        name: _ALTERNATIVES.split(str(parameter.annotation)) for name, parameter in parameters.parameters.items()
+    }
     kinds = {name: parts for name, parts in annotated.items() if _KINDS.keys() >= set(parts)}
 
     @wraps(function)

@@ -163,7 +163,7 @@ def _listed(name: str, values: Values, reader: _Reader) -> SweptAxis:
         if len(si) < 2:
             raise InputError("", quoted(values, "one point"), "a range or a list of 2 points or more", RANGE_EXAMPLE)
     else:
-        si = np.array([reader.text(value) for value in values], dtype=float)
+        si = np.array([reader.text(value) for value in _items(values)], dtype=float)
     if si.ndim != 1 or not si.size:
         raise InputError("", "no values", "a list or one-dimensional array of values", '["4 Hz", "8 Hz"]')
     if not np.all(np.isfinite(si)):
@@ -171,9 +171,19 @@ def _listed(name: str, values: Values, reader: _Reader) -> SweptAxis:
     return SweptAxis(name, si, reader.unit)
 
 
+def _items(values: Any) -> list[Any]:
+    """The values of a list. Raises InputError for what is none."""
+    try:
+        return list(values)
+    except TypeError:
+        raise InputError("", quoted(values), "a range, or a list of values", RANGE_EXAMPLE) from None
+
+
 def _words(stage: Stage, key: str, values: Values) -> SweptAxis:
     """An axis of words or booleans, each of which the stage takes."""
-    options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
+    options = (
+        [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else _items(values)
+    )
     table, _, rest = key.partition(".")
     if rest and getattr(stage, table, 0) is None:
         problem = f"a key of [{table}], which this stage does not have"

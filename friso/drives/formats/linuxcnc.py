@@ -125,7 +125,7 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
         meaning += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
         asked.append(OpenQuestion(FORCE, meaning, FORCE_FIELD.on(kind).written_example))
-    moved = axis.given("MAX_ACCELERATION") and axis.given("MAX_VELOCITY")
+    moved = axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY")
     return (*asked, *of_the_machine(answers, kind, moved))
 
 

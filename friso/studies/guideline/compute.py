@@ -15,6 +15,7 @@ from friso.engine.kernel import KernelRequest, kernels
 from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
 from friso.progress import Progress, Tally, silent
+from friso.quantities import quoted
 from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted, values_of
 from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fitted
@@ -183,7 +184,9 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
 def checked_samples(samples: int) -> None:
     """Raises InputError for a number of samples that does not do."""
     if not FEWEST <= samples <= MOST:
-        raise InputError("--samples", f"{samples}", f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}")
+        raise InputError(
+            "--samples", quoted(samples), f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}"
+        )
 
 
 def counts() -> dict[str, Count]:
