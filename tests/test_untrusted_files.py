@@ -144,3 +144,66 @@ def test_huge_values_of_a_log_are_shown_as_far_as_a_picture_can(tmp_path: Path) 
     assert any("1.7e+308" in text for _, texts in answer.tables()[0].rows for text in texts)
     drawn = answer.figures()[0].panels[0]
     assert "not drawn" in drawn.title
+
+
+@pytest.mark.parametrize("line", ["P = 2_0", "P = \u0663", "P = 0x10"])
+def test_numbers_of_a_parameter_file_are_those_that_drives_read(line: str, tmp_path: Path) -> None:
+    source = tmp_path / "axis.ini"
+    lines = [line if one.startswith("P ") else one for one in AXIS.read_text("utf-8").splitlines()]
+    source.write_text("\n".join(lines), "utf-8")
+    with pytest.raises(InputError) as caught:
+        friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)
+    assert caught.value.key == "P"
+
+
+def test_a_section_with_a_huge_number_is_no_axis(tmp_path: Path) -> None:
+    source = tmp_path / "axis.ini"
+    source.write_text(f"{AXIS.read_text('utf-8')}\n[JOINT_{5000 * '9'}]\nP = 3\n", "utf-8")
+    assert friso.load(friso.init(tmp_path / "new.toml", from_=source, set=MACHINE)).masses.stage is not None
+
+
+def test_a_move_without_acceleration_is_asked_for(tmp_path: Path) -> None:
+    source = tmp_path / "axis.ini"
+    lines = [line for line in AXIS.read_text("utf-8").splitlines() if not line.startswith("MAX_ACCELERATION")]
+    at = next(k for k, line in enumerate(lines) if line.startswith("P "))
+    source.write_text("\n".join([*lines[:at], "MAX_ACCELERATION = 0", *lines[at:]]), "utf-8")
+    machine = {key: value for key, value in MACHINE.items() if not key.startswith("motion")}
+    with pytest.raises(InputError, match=r"motion\.acceleration"):
+        friso.init(tmp_path / "new.toml", from_=source, set=machine)
+
+
+@pytest.mark.parametrize("key", ["torqe_per_output", "mass", ""])
+def test_an_answer_to_no_question_is_refused(key: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="force_per_output"):
+        friso.init(tmp_path / "new.toml", from_=AXIS, set={**MACHINE, key: "3 kg"})
+    assert not (tmp_path / "new.toml").exists()
+
+
+@pytest.mark.parametrize("changes", [{"joint": {1: 2}}, {3: 4}, ["masses.stage"], np.array([1.0]), "masses.stage"])
+def test_keys_that_are_no_texts_are_refused(changes: Any) -> None:
+    stage = friso.load(EXAMPLES / "thesis_rig.toml")
+    with pytest.raises(InputError):
+        stage.replace(changes)
+
+
+def test_tables_whose_keys_are_no_texts_are_refused() -> None:
+    with pytest.raises(InputError):
+        friso.export("gains", {3: 4})  # type: ignore[dict-item]
+
+
+@pytest.mark.parametrize("choice", [np.array([1.0, 2.0]), 3, None, [], b"gains", float("nan")])
+def test_a_choice_of_another_type_is_refused(choice: Any) -> None:
+    rig = EXAMPLES / "thesis_rig.toml"
+    asked = [lambda: friso.export(choice, rig), lambda: friso.example(choice), lambda: friso.schema(choice)]
+    asked += [lambda: friso.export("gains", rig, to=choice)] if choice is not None else []
+    for ask in asked:
+        with pytest.raises(InputError):
+            ask()
+
+
+@pytest.mark.parametrize("text", ['masses.stage="0.6 kg', "masses.stage = '0.6 kg"])
+def test_a_quote_that_is_not_closed_is_shown(text: str) -> None:
+    with pytest.raises(InputError) as caught:
+        friso.export("gains", EXAMPLES / "thesis_rig.toml", set=[text])
+    _, line, caret = caught.value.actual.splitlines()
+    assert line[caret.index("^")] in "\"'"
