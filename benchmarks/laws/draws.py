@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.truth.draws import Form, draw, forms
+from benchmarks.truth.draws import FORMS, Form, draw
 from friso.stage import Stage
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
@@ -21,14 +21,13 @@ ELEMENTS = {"rigid": 4, "free": 2, "locked": 6}
 
 def numbers(stages: int) -> list[int]:
     """The numbers of the first stages with LuGre friction, a van Dijk controller and nothing else."""
-    pool = forms()
-    return list(islice((n for n in count() if pool[n % len(pool)] in JOINTS), stages))
+    return list(islice((n for n in count() if FORMS[n % len(FORMS)] in JOINTS), stages))
 
 
 def under(law: str, seed: int, number: int) -> Stage:
     """The stage with this number under a law whose shape before sliding is drawn too, not that of LuGre."""
     stage, rng = draw(seed, number), np.random.default_rng([seed, number, 11])
-    joint = forms()[number % len(forms())].joint
+    joint = FORMS[number % len(FORMS)].joint
     measured = friction_law("lugre").shown(stage.flat())
     keys = friction_law(law).keeping(measured, ELEMENTS[joint])
     return with_friction(stage, law, keys | _shape(law, keys, rng))
