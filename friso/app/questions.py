@@ -6,6 +6,7 @@ import base64
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import friso
@@ -15,8 +16,10 @@ from friso.app.frames import drawn
 from friso.app.ghosts import ghosts_of, with_places
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
+from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.errors import InputError
+from friso.identification.logs.mapping import MAPPABLE
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 from friso.views.check.cases import case_labels
@@ -32,22 +35,23 @@ Part = dict[str, Any]
 @dataclass(frozen=True)
 class Asked:
     """What a page asks about: the machine shown, the one that is `pinned` beside it or None, the options, and whether
-    figures are for a `narrow` page."""
+    figures are for a `narrow` page; and the files that were dropped on it."""
 
     machine: Machine
     pinned: Machine | None
     options: Mapping[str, Any]
-    narrow: bool = False
+    narrow: bool
+    uploads: Uploads
 
     @classmethod
-    def of(cls, data: Mapping[str, Any]) -> Asked:
+    def of(cls, data: Mapping[str, Any], uploads: Uploads) -> Asked:
         """What a request holds. Raises InputError."""
         options = data.get("options") or {}
         if not isinstance(options, Mapping):
             raise InputError("options", type(options).__name__, "options by name")
         pinned = data.get("pinned")
         both = Machine.of(data.get("machine")), None if pinned is None else Machine.of(pinned)
-        return cls(*both, options, bool(data.get("narrow")))
+        return cls(*both, options, bool(data.get("narrow")), uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
         """The options of these names that are given: texts, numbers, true or false. Raises InputError for others."""
@@ -169,6 +173,38 @@ def design(asked: Asked, work: Work) -> Iterator[Part]:
     yield parts_of(asked, answer, ways=ways, **_lines("design", asked))
 
 
+def logs(asked: Asked, work: Work) -> Iterator[Part]:
+    """What dropped files hold, and which channels there are to choose from."""
+    files, assigned = _dropped(asked)
+    answer = friso.logs(files, **assigned, progress=work.progress)
+    channels = list(dict.fromkeys(channel.name for item in answer.result for channel in item.channels))
+    yield parts_of(asked, answer, channels=channels, roles=[*MAPPABLE])
+
+
+def identify(asked: Asked, work: Work) -> Iterator[Part]:
+    """The machine that dropped logs show, with its uncertainties; with `assumed`, the one shown is what is known."""
+    files, assigned = _dropped(asked)
+    stage = asked.machine.stage if asked.options.get("assumed") is True else None
+    answer = friso.identify(files, stage=stage, **assigned, progress=work.progress)
+    stages = [] if answer.stage is None else [{"name": "identified", "toml": answer.stage.to_toml()}]
+    yield parts_of(asked, answer, ways=stages)
+
+
+def _dropped(asked: Asked) -> tuple[list[Path], dict[str, Any]]:
+    """The files of a question about logs, and what is said of their channels. Raises InputError."""
+    names, options = asked.options.get("files"), {}
+    if not isinstance(names, list) or not names:
+        raise InputError("files", "none", "files that were dropped on the page")
+    for name in ("map", "unit", "scale"):
+        said = asked.options.get(name) or {}
+        if not isinstance(said, Mapping) or not all(isinstance(text, str) for text in said.values()):
+            raise InputError(name, "something else", "texts by name")
+        options[name] = {key: text for key, text in said.items() if text}
+    if step := asked.options.get("dt"):
+        options["dt"] = str(step)
+    return [asked.uploads.path(name) for name in names], options
+
+
 QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[Part]]] = {
     "machine": machine,
     "run": run,
@@ -180,6 +216,8 @@ QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[Part]]] = {
     "boundary": boundary,
     "tune": tune,
     "design": design,
+    "logs": logs,
+    "identify": identify,
 }
 """The questions by name."""
 

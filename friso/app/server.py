@@ -17,6 +17,8 @@ from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
 from friso.app.questions import QUESTIONS, REPORTS, Asked, report
+from friso.app.uploads import MOST_BYTES as UPLOADED
+from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
 
@@ -31,7 +33,7 @@ BINARY = "application/octet-stream"
 def application(access: Access, begin: dict[str, Any]) -> ASGIApp:
     """The server for those who have an access; `begin`: name and text of the stage file that it starts with, and
     whether it was `asked` for."""
-    workshop = Workshop()
+    workshop, uploads = Workshop(), Uploads()
 
     async def ask(request: Request) -> Response:
         name = request.path_params["question"]
@@ -40,24 +42,32 @@ def application(access: Access, begin: dict[str, Any]) -> ASGIApp:
             return _refused(f"there is no question {name[:40]!r}", 404)
         try:
             data = await _json(request)
-            asked = Asked.of(data)
+            asked = Asked.of(data, uploads)
         except InputError as error:
             return _refused(str(error), 422)
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
         return StreamingResponse(workshop.answer(page, lane, partial(job, asked)), media_type=BINARY)
 
     async def started_with(request: Request) -> Response:
-        return JSONResponse(begin)
+        return JSONResponse({**begin, "most_bytes": UPLOADED})
+
+    async def upload(request: Request) -> Response:
+        try:
+            return JSONResponse({"file": await uploads.keep(request.path_params["name"], request.stream())})
+        except InputError as error:
+            return _refused(str(error), 413)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         with workshop.listening():
             yield
         workshop.close()
+        uploads.remove()
 
     routes = [
         Route("/ask/{question}", ask, methods=["POST"]),
         Route("/begin", started_with),
+        Route("/logs/{name}", upload, methods=["POST"]),
         Route("/plotly.js", _plotly),
         Route("/", _page),
         Route("/{file}", _page),

@@ -24,6 +24,7 @@ const pictures = new Pictures(sent, {
   set: (values) => set(withUnits(values)),
   progress: answers.progress,
   shown: (part) => (answer = part),
+  take: (name, toml) => machines.add(`${name.replaceAll(" ", "_")}.toml`, toml),
   check,
 });
 
@@ -148,7 +149,10 @@ const redo = () => machines.go(machines.current().step + 1);
 
 async function opened(file) {
   if (file.name.endsWith(".toml") && file.size < 4e6) machines.add(file.name, await file.text());
-  else trouble(`${file.name}: drop a stage file (.toml, at most 4 MB) here.`);
+  else {
+    pictures.show("logs");
+    pictures.own.logs.add([file]);
+  }
 }
 
 function trouble(text) {
@@ -188,7 +192,7 @@ function wire() {
 
 /** Ask for what the command would write, and save it; resolves to what to say. */
 async function report(part) {
-  const question = pictures.shown === "run" ? "check" : pictures.shown;
+  const question = ["bode", "map", "boundary", "flexure"].includes(pictures.shown) ? pictures.shown : "check";
   const options = pictures.form ? pictures.form() : {};
   const made = await ask(`${question}.zip`, { ...pictures.body(options), ...sent() }, "report", part);
   if (!made || made.kind !== "files") return made?.text;

@@ -1,6 +1,8 @@
 // The pictures of the answer, in tabs: each asks its own question.
 import { $, el, words } from "./dom.js";
+import { Logs } from "./logs.js";
 import { clear, draw, stale } from "./plot.js";
+import { Remedies } from "./remedies.js";
 import { ask, Live } from "./wire.js";
 import { paragraphs, table } from "./tables.js";
 
@@ -19,7 +21,10 @@ export class Pictures {
       { id: "map", label: "Map" },
       { id: "boundary", label: "Boundary" },
       { id: "flexure", label: "Leaf springs", when: () => this.has("flexure") },
+      { id: "remedies", label: "What stops it" },
+      { id: "logs", label: "Logs" },
     ];
+    this.own = { remedies: new Remedies(sent, tell), logs: new Logs(sent, tell) };
     window.addEventListener("resize", () => {
       if (this.narrow !== this.was) this.ask();
     });
@@ -54,7 +59,7 @@ export class Pictures {
     this.shown = id;
     this.live.stop();
     const place = $("picture");
-    clear(place);
+    if (this.plots) clear(this.plots);
     place.replaceChildren();
     this.bar();
     this.begin(place);
@@ -64,6 +69,8 @@ export class Pictures {
   /** What stands above the plots of a tab. */
   begin(place) {
     this.form = null;
+    this.plots = null;
+    if (this.own[this.shown]) return place.append(this.own[this.shown].place);
     if (this.shown === "map" || this.shown === "boundary") this.form = this.axes(place);
     this.plots = el("div", { class: "plots" });
     this.below = el("div", {});
@@ -72,8 +79,9 @@ export class Pictures {
 
   /** The machine has changed; `dragged`: not yet for good. */
   changed(dragged) {
-    if (!this.plots) this.begin($("picture"));
     this.bar();
+    if (this.own[this.shown]) return;
+    if (!this.plots) this.begin($("picture"));
     if (this.shown === "run") this.live.ask(this.body());
     else {
       stale($("picture"));
@@ -84,7 +92,7 @@ export class Pictures {
 
   async ask() {
     const { shown } = this;
-    if (!this.machine) return;
+    if (!this.machine || this.own[shown]) return;
     if (shown === "run") return this.live.ask(this.body());
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};

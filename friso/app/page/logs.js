@@ -1,0 +1,74 @@
+// Logs: dropped files, their channels with roles, and the machine that they show.
+import { el } from "./dom.js";
+import { shownAnswer } from "./long.js";
+
+const LARGEST = 64e6;
+
+export class Logs {
+  constructor(sent, tell) {
+    Object.assign(this, { sent, tell, files: [], roles: new Map() });
+    this.input = el("input", { type: "file", id: "log-files", multiple: true, "aria-label": "Logs", onchange: () => this.add([...this.input.files]) });
+    this.status = el("p", { class: "status", role: "status" });
+    this.form = el("div", { class: "form" });
+    this.result = el("div", {});
+    this.place = el("div", {}, el("div", { class: "drop" }, "Drop logs here (CSV, TwinCAT, MAT, TDMS, UFF58, LVM), or choose them: ", this.input), this.status, this.form, this.result);
+  }
+
+  async add(files) {
+    for (const file of files) {
+      if (file.size > LARGEST) {
+        this.status.textContent = `${file.name} has ${Math.round(file.size / 1e6)} MB, at most ${LARGEST / 1e6} MB are taken here: friso identify on the command line takes larger ones.`;
+        return;
+      }
+      const response = await fetch(`logs/${encodeURIComponent(file.name)}`, { method: "POST", body: file });
+      const said = await response.json();
+      if (!response.ok) {
+        this.status.textContent = said.text;
+        return;
+      }
+      this.files.push({ name: file.name, id: said.file });
+    }
+    this.status.textContent = this.files.map((file) => file.name).join(", ");
+    this.look();
+  }
+
+  options(more = {}) {
+    return { ...this.sent(), options: { files: this.files.map((file) => file.id), map: Object.fromEntries(this.roles), dt: this.dt?.value ?? "", ...more } };
+  }
+
+  async look() {
+    const answer = await shownAnswer(this.result, "logs", () => this.options(), this.tell);
+    if (answer) this.fields(answer);
+  }
+
+  fields({ roles, channels }) {
+    const choice = (role) => {
+      const options = ["", ...channels].map((name) => el("option", { value: name, selected: name === (this.roles.get(role) ?? "") }, name || "as recognised"));
+      const choose = (event) => {
+        if (event.target.value) this.roles.set(role, event.target.value);
+        else this.roles.delete(role);
+        this.look();
+      };
+      return el("label", {}, role.replaceAll("_", " "), el("select", { id: `role-${role}`, onchange: choose }, ...options));
+    };
+    this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
+    this.assumed = el("input", { type: "checkbox", id: "assumed" });
+    const start = () => shownAnswer(this.result, "identify", () => this.options({ assumed: this.assumed.checked }), this.tell);
+    this.form.replaceChildren(
+      ...roles.map(choice),
+      el("label", {}, "sample time", this.dt),
+      el("label", {}, "the machine shown is what is known", this.assumed),
+      el("button", { type: "button", id: "identify", onclick: start }, "Identify"),
+      el("button", { type: "button", onclick: () => this.forget() }, "Other files"),
+    );
+  }
+
+  forget() {
+    this.files = [];
+    this.roles.clear();
+    this.input.value = "";
+    this.status.textContent = "";
+    this.form.replaceChildren();
+    this.result.replaceChildren();
+  }
+}

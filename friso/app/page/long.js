@@ -1,0 +1,35 @@
+// A question that takes long, with its progress, an end, its answer, and the machines that it gives.
+import { el } from "./dom.js";
+import { draw } from "./plot.js";
+import { paragraphs, table } from "./tables.js";
+import { ask, end } from "./wire.js";
+
+/** Ask, and show progress and answer in a place; resolves to the answer, or null. */
+export async function shownAnswer(place, question, body, tell) {
+  const status = el("p", { class: "status", role: "status" }, "…");
+  const stop = el("button", { type: "button", onclick: () => { end("long"); place.replaceChildren(); } }, "Stop");
+  place.replaceChildren(status, stop);
+  const answer = await ask(question, body(), "long", (part) => {
+    if (part.kind === "progress") {
+      const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
+      status.replaceChildren(bar, part.label);
+    } else if (part.kind === "message") status.replaceChildren(part.text);
+  });
+  if (!answer) return null;
+  if (answer.kind !== "answer") {
+    place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, answer.text));
+    return null;
+  }
+  const take = ({ name, toml }) => el("button", { type: "button", class: "take", onclick: () => tell.take(name, toml) }, `Take over: ${name}`);
+  const plots = el("div", {});
+  place.replaceChildren(
+    ...paragraphs([...answer.sentences, answer.failure].filter(Boolean)),
+    el("div", { class: "form" }, ...(answer.ways ?? []).map(take)),
+    ...answer.tables.map(table),
+    plots,
+    ...paragraphs(answer.details),
+  );
+  draw(plots, answer.figures);
+  tell.shown(answer);
+  return answer;
+}

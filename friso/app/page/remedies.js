@@ -1,0 +1,22 @@
+// What stops the hunting: the ways of tune and of design, and machines that are taken over from them.
+import { el } from "./dom.js";
+import { shownAnswer } from "./long.js";
+
+export class Remedies {
+  constructor(sent, tell) {
+    const within = el("input", { id: "within", type: "text", placeholder: "e.g. 1 um" });
+    const only = el("select", { id: "only" }, ...["", "controller", "joint"].map((word) => el("option", { value: word }, word || "anything")));
+    this.result = el("div", {});
+    const start = (question, options) =>
+      shownAnswer(this.result, question, () => ({ ...sent(), options: options() }), tell);
+    const tune = el("button", { type: "button", id: "tune", onclick: () => start("tune", () => ({ within: within.value, only: only.value })) }, "Find the least change");
+    const design = el("button", { type: "button", id: "design", onclick: () => start("design", () => ({})) }, "Design an isolator");
+    this.place = el(
+      "div",
+      {},
+      el("p", { class: "note" }, "The least change of controller or joint that stops the hunting (friso tune), or a joint of leaf springs (friso design). Both take minutes."),
+      el("div", { class: "form" }, el("label", {}, "In position within", within), el("label", {}, "May change", only), tune, design),
+      this.result,
+    );
+  }
+}

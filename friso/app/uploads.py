@@ -1,0 +1,61 @@
+"""Files that were dropped on the page: kept in a folder of this server's own, for as long as it runs."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+from collections.abc import AsyncIterable
+from pathlib import Path
+
+from friso.errors import InputError
+
+MOST_BYTES = 64_000_000
+"""Size of a log at most."""
+
+MOST_FILES = 50
+"""Files that are kept at most."""
+
+_OUTSIDE = re.compile(r"[^\w.+ -]")
+
+
+class Uploads:
+    """The files by the names under which the page knows them. The page names no other file."""
+
+    def __init__(self) -> None:
+        self.folder = Path(tempfile.mkdtemp(prefix="friso-app-"))
+        self.files: dict[str, Path] = {}
+
+    async def keep(self, name: str, chunks: AsyncIterable[bytes]) -> str:
+        """Keep a file as it comes; the name by which it is asked for. Raises InputError for one that is too large."""
+        if len(self.files) >= MOST_FILES:
+            raise InputError("file", f"more than {MOST_FILES} files", "a server that is started anew")
+        plain = _OUTSIDE.sub("_", Path(name.replace("\\", "/")).name).lstrip(".")[-100:] or "log"
+        place = self.folder / str(len(self.files) + 1)
+        place.mkdir()
+        size = 0
+        try:
+            with open(place / plain, "wb") as file:
+                async for chunk in chunks:
+                    size += len(chunk)
+                    if size > MOST_BYTES:
+                        most = f"at most {MOST_BYTES / 1e6:g} MB; friso identify on the command line takes larger ones"
+                        raise InputError(plain, f"more than {MOST_BYTES / 1e6:g} MB", most)
+                    file.write(chunk)
+        except BaseException:
+            shutil.rmtree(place, ignore_errors=True)
+            raise
+        label = f"{place.name}/{plain}"
+        self.files[label] = place / plain
+        return label
+
+    def path(self, name: object) -> Path:
+        """The file of a name. Raises InputError for any other."""
+        path = self.files.get(name) if isinstance(name, str) else None
+        if path is None:
+            raise InputError("file", str(name)[:60], "a file that was dropped on the page while this server ran")
+        return path
+
+    def remove(self) -> None:
+        """Delete all of them."""
+        shutil.rmtree(self.folder, ignore_errors=True)

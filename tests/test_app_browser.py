@@ -1,0 +1,181 @@
+"""`friso app` in a real browser, on the thesis rig: what a user does, and what he sees."""
+
+from __future__ import annotations
+
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from browser import BROWSER, needs_browser
+from log_files import motion, write_text
+
+import friso
+
+pytestmark = needs_browser
+
+RIG = Path(friso.example("thesis_rig"))
+
+
+class Browsed:
+    """The page, and what went wrong in it or left this machine."""
+
+    def __init__(self, page: Any, address: str) -> None:
+        self.page, self.address = page, address
+        self.wrong: list[str] = []
+        self.outside: list[str] = []
+        page.on(
+            "console", lambda message: self.wrong.append(message.text) if message.type in ("error", "warning") else 0
+        )
+        page.on("pageerror", lambda error: self.wrong.append(str(error)))
+        page.on("request", lambda request: self._note(request.url))
+
+    def _note(self, url: str) -> None:
+        if not url.startswith((self.address, "data:", "blob:")):
+            self.outside.append(url)
+
+    def type(self, key: str, text: str) -> None:
+        """A value is typed into the field of a key, by the keyboard alone."""
+        self.page.focus(f'[data-path="{key}"] input[type=text]')
+        self.page.keyboard.press("Control+a")
+        self.page.keyboard.type(text)
+        self.page.keyboard.press("Enter")
+
+    def answered(self, text: str) -> None:
+        """Wait until the answer has a text."""
+        self.page.wait_for_function(
+            "text => document.getElementById('answer').innerText.includes(text)", arg=text, timeout=60_000
+        )
+
+
+@pytest.fixture(scope="module")
+def browsed() -> Iterator[Browsed]:
+    driver = pytest.importorskip("playwright.sync_api")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "friso.cli", "app", str(RIG), "--no-browser", "--port", str(port)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, driver.sync_playwright() as play:
+        assert server.stdout is not None
+        address = re.search(r"http://\S+", server.stdout.readline())
+        assert address is not None
+        chromium = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+        page = chromium.new_page(viewport={"width": 1600, "height": 1000})
+        browsed = Browsed(page, f"http://127.0.0.1:{port}/")
+        page.goto(address[0])
+        page.wait_for_selector(".js-plotly-plot .main-svg", timeout=60_000)
+        yield browsed
+        chromium.close()
+        server.terminate()
+
+
+def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> None:
+    """9.75 Hz, where the cycle stops attracting; undo takes it back."""
+    page = browsed.page
+    page.focus("[data-part=lock]")
+    page.keyboard.press("Space")
+    browsed.answered("Locked (as given): hunts")
+    browsed.type("controller.crossover", "9.7 Hz")
+    browsed.answered("Locked (as given): hunts")
+    browsed.type("controller.crossover", "12 Hz")
+    browsed.answered("Locked (as given): settles")
+    page.keyboard.press("Tab")
+    page.click("#undo")
+    browsed.answered("Locked (as given): hunts")
+    assert page.input_value('[data-path="controller.crossover"] input[type=text]') == "9.7 Hz"
+
+
+def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
+    page = browsed.page
+    last = "Array.from(document.querySelector('.plot').data.find((line) => line.name === 'position').y.slice(-40))"
+    before = page.evaluate(last)
+    slider = page.locator('[data-path="controller.crossover"] input[type=range]').bounding_box()
+    assert slider is not None
+    page.mouse.move(slider["x"] + 0.5 * slider["width"], slider["y"] + slider["height"] / 2)
+    page.mouse.down()
+    page.mouse.move(slider["x"] + 0.7 * slider["width"], slider["y"] + slider["height"] / 2, steps=4)
+    page.wait_for_function(f"before => JSON.stringify({last}) !== JSON.stringify(before)", arg=before, timeout=60_000)
+    page.mouse.up()
+    page.click("#undo")
+
+
+def test_what_is_wrong_is_said_in_place(browsed: Browsed) -> None:
+    browsed.type("controller.crossover", "3 kg")
+    browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', timeout=30_000)
+    assert "convertible to Hz" in browsed.page.inner_text('[data-path="controller.crossover"] .wrong')
+    browsed.page.click("#undo")
+    browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', state="detached", timeout=30_000)
+
+
+def test_a_pinned_machine_stays_as_a_ghost(browsed: Browsed) -> None:
+    page = browsed.page
+    page.click("#pin")
+    ghost = "document.querySelector('.plot').data.some((line) => line.name === 'pinned')"
+    page.wait_for_function(ghost, timeout=60_000)
+    page.click("#pin")
+    page.wait_for_function(f"!({ghost})", timeout=60_000)
+
+
+def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Browsed, tmp_path: Path) -> None:
+    page = browsed.page
+    page.click("#out")
+    with page.expect_download() as download:
+        page.click("text=Stage file")
+    download.value.save_as(tmp_path / "out.toml")
+    line = page.inner_text("#dialog pre")
+    page.keyboard.press("Escape")
+    assert friso.load(tmp_path / "out.toml").controller.crossover == pytest.approx(9.7)
+    assert line == "friso simulate thesis_rig.toml --set joint.locked=true --set 'controller.crossover=9.7 Hz'"
+    page.set_input_files("#file", tmp_path / "out.toml")
+    page.wait_for_function("document.querySelectorAll('#machines [role=tab]').length > 1", timeout=30_000)
+    text = friso.simulate(tmp_path / "out.toml").sentences()[0]
+    page.wait_for_function(
+        "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=60_000
+    )
+
+
+def test_a_click_on_the_map_sets_the_machine_there(browsed: Browsed) -> None:
+    page = browsed.page
+    page.click("#tab-map")
+    page.wait_for_selector(".plot .heatmaplayer image", timeout=60_000)
+    before = page.input_value('[data-path="controller.crossover"] input[type=text]')
+    place = page.locator(".plot .nsewdrag").first.bounding_box()
+    assert place is not None
+    page.mouse.click(place["x"] + 0.8 * place["width"], place["y"] + 0.5 * place["height"])
+    field = '[data-path="controller.crossover"] input[type=text]'
+    page.wait_for_function(
+        "([field, before]) => document.querySelector(field).value !== before", arg=[field, before], timeout=30_000
+    )
+    assert float(page.input_value(field).split()[0]) > 20
+
+
+def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> None:
+    page, moved = browsed.page, motion()
+    log = write_text(
+        tmp_path / "log.csv",
+        ["time [s]", "position [m]", "force [N]"],
+        [np.asarray(moved[n]) for n in ("time", "position", "force")],
+    )
+    page.click("#tab-logs")
+    page.set_input_files("#log-files", log)
+    page.wait_for_selector("#role-position", timeout=60_000)
+    assert "log.csv" in page.inner_text("#picture")
+
+
+@pytest.mark.parametrize("width", [400, 900, 1600])
+def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
+    browsed.page.set_viewport_size({"width": width, "height": 900})
+    browsed.page.click("#tab-run")
+    browsed.page.wait_for_selector(".plot .main-svg")
+    browsed.page.wait_for_timeout(300)
+    assert browsed.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_nothing_went_wrong_and_nothing_left_this_machine(browsed: Browsed) -> None:
+    """At the end of this file."""
+    assert (browsed.wrong, browsed.outside) == ([], [])
