@@ -17,6 +17,7 @@ import pytest
 import uvicorn
 
 import friso
+from friso.app import uploads
 from friso.app.gate import Access
 from friso.app.machine import Machine, shown
 from friso.app.server import application
@@ -184,6 +185,25 @@ def test_options_name_no_file(served: Served) -> None:
     for question in ("check", "map", "boundary", "tune", "design", "run"):
         for options in ({"out": "/tmp/x"}, {"spec": "/etc/passwd"}, {"export": ["/tmp/x.csv"]}):
             assert served.ask(question, RIG, {}, **options)[-1]["kind"] == "refused"
+
+
+def test_logs_are_kept_under_names_of_the_server_and_no_others_are_read(served: Served) -> None:
+    log = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
+    status, _, content = served.request("POST", "/logs/..%5C..%5Cmy%20log.csv", log)
+    assert (status, json.loads(content)) == (200, {"file": "1/my log.csv"})
+    (part,) = served.ask("logs", RIG, files=["1/my log.csv"])
+    assert part["channels"] == ["time", "position"]
+    assert "position" in part["roles"]
+    for name in ("/etc/passwd", "../1/my log.csv", str(RIG), 3):
+        assert served.ask("identify", RIG, files=[name])[0]["kind"] == "refused"
+    assert served.request("POST", "/logs/x.csv", log, Origin="http://evil.example")[0] == 403
+
+
+def test_a_log_that_is_too_large_is_refused_and_not_kept(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(uploads, "MOST_BYTES", 100)
+    status, _, content = served.request("POST", "/logs/large.csv", 1000 * b"1")
+    assert status == 413
+    assert "friso identify" in json.loads(content)["text"]
 
 
 # ---------------------------------------------------------------- what is answered

@@ -116,9 +116,9 @@ def test_a_pinned_machine_stays_as_a_ghost(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#pin")
     ghost = "document.querySelector('.plot').data.some((line) => line.name === 'pinned')"
-    page.wait_for_function(ghost, timeout=60_000)
+    page.wait_for_function(f"() => {ghost}", timeout=60_000)
     page.click("#pin")
-    page.wait_for_function(f"!({ghost})", timeout=60_000)
+    page.wait_for_function(f"() => !({ghost})", timeout=60_000)
 
 
 def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Browsed, tmp_path: Path) -> None:
@@ -132,7 +132,7 @@ def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Brows
     assert friso.load(tmp_path / "out.toml").controller.crossover == pytest.approx(9.7)
     assert line == "friso simulate thesis_rig.toml --set joint.locked=true --set 'controller.crossover=9.7 Hz'"
     page.set_input_files("#file", tmp_path / "out.toml")
-    page.wait_for_function("document.querySelectorAll('#machines [role=tab]').length > 1", timeout=30_000)
+    page.wait_for_function("() => document.querySelectorAll('#machines [role=tab]').length > 1", timeout=30_000)
     text = friso.simulate(tmp_path / "out.toml").sentences()[0]
     page.wait_for_function(
         "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=60_000
