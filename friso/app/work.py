@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+import traceback
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -59,15 +60,14 @@ class Work:
             self.put({"kind": "overtaken"})
         except InputError as error:
             self.put({"kind": "refused", "key": error.key, "text": str(error)})
-        except (RuntimeError, OSError, MemoryError, ArithmeticError, ValueError) as error:
-            _LOGGER.debug("a question failed", exc_info=True)
+        except Exception as error:  # a page is answered whatever happens; the terminal has the rest
+            traceback.print_exc()
             self.put({"kind": "failed", "text": f"the computation could not be completed: {error}"})
         finally:
             _AT_WORK.reset(token)
             self.put(None)
 
 
-_LOGGER = logging.getLogger("friso.app")
 _AT_WORK: ContextVar[Work | None] = ContextVar("work", default=None)
 
 
