@@ -15,6 +15,8 @@ import friso.equations.friction  # noqa: F401  the friction laws register themse
 from friso.errors import InputError
 from friso.quantities import as_toml
 from friso.stage import Stage, load, loads, numeric_keys, violations
+from friso.virtual_rig.run import reference
+from friso.virtual_rig.task import own_motion
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 FLOOR = {
@@ -263,3 +265,11 @@ def test_keys_that_need_each_other(built: Stage, changes: dict[str, object], key
 def test_what_is_allowed(built: Stage, changes: dict[str, object]) -> None:
     stage = built.replace(changes)
     assert loads(stage.to_toml()) == stage
+
+
+def test_a_step_is_carried_out(built: Stage) -> None:
+    """The stage stands at 0 when the reference steps."""
+    stepping = built.replace({"motion": {"kind": "step", "size": "1 mm", "duration": "2 s"}})
+    task, sample = own_motion(stepping), stepping.flat()["drive.sample_time"]
+    assert task.displacement == 0
+    assert reference(task, np.array([0.0, sample, 1.0])).tolist() == [0.0, 0.001, 0.001]

@@ -41,10 +41,13 @@ class MoveTask:
 
 
 def own_motion(stage: Stage) -> MoveTask:
-    """The motion of the stage file."""
+    """The motion of the stage file, at whose start the stage stands at 0 (or displaced from there): the reference of a
+    step has been there too, and leaves it after one sample of the drive."""
     flat = stage.flat()
-    displacement = float(motion.initial_displacement(flat))
-    return MoveTask(motion.pieces(flat, 1)[0], flat["motion.duration"], displacement=displacement)
+    pieces, duration = motion.pieces(flat, 1)[0], flat["motion.duration"]
+    if pieces[0, 1]:
+        pieces = np.vstack([np.zeros(4), pieces + [flat["drive.sample_time"], 0.0, 0.0, 0.0]])
+    return MoveTask(pieces, duration, displacement=float(motion.initial_displacement(flat)))
 
 
 def standing(place: float, duration: float) -> MoveTask:
