@@ -61,7 +61,11 @@ class TuneAnswer(Answer):
         return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """The design of leaf springs for an isolator."""
+        """The design of leaf springs for an isolator, where `friso design` knows the controller."""
+        from friso.equations.controllers.van_dijk import CROSSOVER
+
+        if CROSSOVER not in self.result.stage.flat():
+            return []
         isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffix == ".toml"]
         return [f"friso design {file}" for file in isolators]
 

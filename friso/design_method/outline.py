@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from friso.design_method.prepare import check_designable
 from friso.equations.bandwidth import bandwidth
 from friso.intervals import Interval
 from friso.quantities import percent
@@ -22,7 +23,9 @@ SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscou
 
 def outline(stage: Stage) -> str:
     """The text of a specification with comments: the present bandwidth as the machine's limit, ranges from what is
-    uncertain in the stage file (else assumed ones), moves up to its travel, and spring steel in usual gauges."""
+    uncertain in the stage file (else assumed ones), moves up to its travel, and spring steel in usual gauges. Raises
+    InputError for a stage that `friso design` cannot design for."""
+    check_designable(stage)
     flat = stage.flat()
     limit = bandwidth(flat) or LIMIT
     friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]

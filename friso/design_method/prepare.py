@@ -17,7 +17,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     """The stage with a free joint of leaf springs, the largest that the specification allows, to be replaced; masses in
     the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
     ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
-    _can_be_isolated(stage)
+    check_designable(stage)
     stage = with_joint(stage, spec)
     section = spec.leaves
     low, high = (min(map(float, section.thickness)), section.stroke.high)
@@ -71,7 +71,8 @@ def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
     return base.replace({"name": name, "joint.stroke": f"{stroke * 1e3:.6g} mm", **geometry.keys(), **moved})
 
 
-def _can_be_isolated(stage: Stage) -> None:
+def check_designable(stage: Stage) -> None:
+    """Raises InputError for a stage that `friso design` cannot design a friction isolator for."""
     if stage.joint is not None and stage.joint.damping is None:
         expected = "a [joint] with its damping and its limiter, or none; its stiffness follows from the design"
         raise InputError("joint", "no damping", expected, JOINT)
@@ -80,5 +81,8 @@ def _can_be_isolated(stage: Stage) -> None:
             "friction", "none", "friction, without which no isolator is needed", '[friction] model = "lugre" ...'
         )
     if CROSSOVER not in stage.flat():
-        expected = "a controller tuned by van Dijk's rules; its crossover follows from the design"
+        expected = (
+            "a controller tuned by van Dijk's rules, whose crossover follows from the design: put it in the place of "
+            "the gains, and friso export gains tells those that the design has found"
+        )
         raise InputError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

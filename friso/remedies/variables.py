@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth, sped_up
 from friso.frequency.margins import margins
-from friso.frequency.members import member
+from friso.frequency.members import limit_cases
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
@@ -64,13 +64,14 @@ def bandwidth_factor(stage: Stage, limit: float | None) -> Variable:
 
 
 def crossover(stage: Stage) -> float:
-    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1 (NaN:
-    there is none)."""
+    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1 while the
+    stage slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it."""
     flat = stage.flat()
     stated = bandwidth(flat)
     if stated is not None:
         return float(stated)
-    crossings = margins(flat, member()).crossovers
+    sliding = next(case for name, case in limit_cases(flat).items() if not name.startswith("stuck"))
+    crossings = margins(flat, sliding).crossovers
     return float(crossings[-1]) if crossings else float("nan")
 
 

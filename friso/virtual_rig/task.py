@@ -46,7 +46,8 @@ def own_motion(stage: Stage) -> MoveTask:
     flat = stage.flat()
     pieces, duration = motion.pieces(flat, 1)[0], flat["motion.duration"]
     if pieces[0, 1]:
-        pieces = np.vstack([np.zeros(4), pieces + [flat["drive.sample_time"], 0.0, 0.0, 0.0]])
+        pieces = np.vstack([np.zeros(4), pieces])
+        pieces[1:, 0] += flat["drive.sample_time"]
     return MoveTask(pieces, duration, displacement=float(motion.initial_displacement(flat)))
 
 

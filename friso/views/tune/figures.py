@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 
 from friso.engine.simulate import simulate
@@ -22,6 +25,7 @@ from friso.views.drawing.figure import (
     SKY,
     VERMILLION,
     Axis,
+    Dash,
     Figure,
     Panel,
     Series,
@@ -29,7 +33,7 @@ from friso.views.drawing.figure import (
 from friso.views.drawing.prefixes import with_unit
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK, SKY)
-"""Of the remedies, in their order; more than these begin again."""
+"""Of the remedies that have settings, in their order; more than these begin again, dashed."""
 
 SAMPLES = 4000
 """Samples of a time response."""
@@ -40,8 +44,8 @@ RTOL = 1e-7
 
 def figures(tuning: Advice) -> list[Figure]:
     """The response, the settling times and the sensitivities."""
-    stages = shown(tuning)
-    panels = (_response(tuning, stages), _settling(tuning), _sensitivity(stages))
+    lines = shown(tuning)
+    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(lines))
     caption = (
         "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
         f"fresh machines in position within {with_unit(tuning.goal.within, 'm')}; the sensitivity of the loop in its "
@@ -50,64 +54,71 @@ def figures(tuning: Advice) -> list[Figure]:
     return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
 
 
-def shown(tuning: Advice) -> list[tuple[str, Stage, str]]:
-    """The stages that are drawn, with names and colours: as it is, and with each remedy that has a stage."""
-    remedies = [outcome for outcome in tuning.outcomes if outcome.stage is not None]
-    return [
-        ("as it is", tuning.stage, INK),
-        *((_name(outcome), outcome.stage, colour(tuning, outcome)) for outcome in remedies if outcome.stage),
-    ]
+class Line(NamedTuple):
+    """How what is drawn of a stage is named and drawn."""
+
+    label: str
+    colour: str
+    dash: Dash
 
 
-def colour(tuning: Advice, outcome: RemedyOutcome) -> str:
-    """The colour of a remedy."""
-    return COLOURS[tuning.outcomes.index(outcome) % len(COLOURS)]
+def shown(tuning: Advice) -> list[tuple[Stage, RemedyOutcome | None, Line]]:
+    """The stages that are drawn: as it is, and with each remedy that has settings."""
+    lines = [(tuning.stage, None, Line("as it is", INK, "solid"))]
+    for outcome in tuning.outcomes:
+        if outcome.stage is not None:
+            again, number = divmod(len(lines) - 1, len(COLOURS))
+            line = Line(_name(outcome), COLOURS[number], "dashed" if again else "solid")
+            lines.append((outcome.stage, outcome, line))
+    return lines
+
+
+Lines = Sequence[tuple[Stage, RemedyOutcome | None, Line]]
 
 
 def _name(outcome: RemedyOutcome) -> str:
     return outcome.remedy.name if outcome.certainty == "works" else f"{outcome.remedy.name} (not sure)"
 
 
-def _response(tuning: Advice, stages: list[tuple[str, Stage, str]]) -> Panel:
+def _response(tuning: Advice, lines: Lines) -> Panel:
     flat = tuning.stage.flat()
-    corner, series = float(last_corner(flat)), []
-    for name, stage, line in stages:
+    corner, series, shown_to = float(last_corner(flat)), [], 20 * tuning.goal.within
+    for stage, outcome, line in lines:
         trace = simulate(stage, RTOL, flat["motion.duration"] / SAMPLES)
         after = np.asarray(trace["time"]) >= corner
         off = np.asarray(trace["position"] - trace["reference"])[after]
-        series.append(Series(np.asarray(trace["time"])[after] - corner, off, name, line))
-    y = Axis("Deviation", "m", (-20 * tuning.goal.within, 20 * tuning.goal.within))
+        series.append(Series(np.asarray(trace["time"])[after] - corner, off, *line))
+        if outcome is None:  # what it does in the end is to be seen
+            shown_to = max(shown_to, 1.2 * float(np.abs(off[len(off) // 2 :]).max()))
+    y = Axis("Deviation", "m", (-shown_to, shown_to))
     return Panel("The same move", Axis("Time after the move", "s"), y, tuple(series))
 
 
-def _settling(tuning: Advice) -> Panel:
+def _settling(tuning: Advice, lines: Lines) -> Panel:
     flat = tuning.stage.flat()
     end = flat["motion.duration"] - float(last_corner(flat))
-    rows = [("as it is", tuning.present.moves.settling[0], INK)]
-    rows += [
-        (_name(outcome), outcome.measured.moves.settling[0], colour(tuning, outcome))
-        for outcome in tuning.outcomes
-        if outcome.measured is not None
-    ]
     start = 1e-3 * end
     series = []
-    for name, times, line in rows:
-        ordered = np.maximum(np.sort(times[np.isfinite(times)]), start)
-        x = np.concatenate([[start], np.repeat(ordered, 2), [end]])
-        series.append(Series(x, np.repeat(100 * np.arange(len(ordered) + 1) / len(times), 2), name, line))
+    for _, outcome, line in lines:
+        measured = tuning.present if outcome is None else outcome.measured
+        if measured is not None:
+            times = measured.moves.settling[0]
+            ordered = np.maximum(np.sort(times[np.isfinite(times)]), start)
+            x = np.concatenate([[start], np.repeat(ordered, 2), [end]])
+            series.append(Series(x, np.repeat(100 * np.arange(len(ordered) + 1) / len(times), 2), *line))
     axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
     return Panel("In position for good", axis, Axis("Share of machines", "%", (-3.0, 103.0)), tuple(series))
 
 
-def _sensitivity(stages: list[tuple[str, Stage, str]]) -> Panel:
+def _sensitivity(lines: Lines) -> Panel:
     omega, series = np.geomspace(1.0, 2e4, 600), []
-    for name, stage, line in stages:
+    for stage, _, line in lines:
         flat = stage.flat()
         worst = np.max(
             [1 / np.abs(1 + response(flat, case, DriveTiming.of(flat))(omega)) for case in limit_cases(flat).values()],
             axis=0,
         )
-        series.append(Series(omega / (2 * np.pi), worst, name, line))
+        series.append(Series(omega / (2 * np.pi), worst, *line))
     limit = Series(np.array([omega[0], omega[-1]]) / (2 * np.pi), np.full(2, 2.0), "margin of 0.5", GREY, "dashed")
     return Panel(
         "Loops: the largest sensitivity of the limit cases",

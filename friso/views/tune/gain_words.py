@@ -15,6 +15,6 @@ def gain_lines(tuning: Advice) -> list[str]:
         gains = [f"{symbol} = {value}{f' ({others})' if others else ''}" for _, (symbol, value, others) in table]
         if gains:
             lines.append(
-                f"Gains of {outcome.remedy.name} in the terms of drives: {', '.join(gains)} (friso export gains)."
+                f'The gains to type in for "{outcome.remedy.name}" are {", ".join(gains)} (friso export gains).'
             )
     return lines
