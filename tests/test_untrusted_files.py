@@ -12,6 +12,7 @@ import pytest
 from inside import friso_inside
 
 import friso
+from friso.answers.inputs import stage_of
 from friso.errors import InputError
 from friso.stage.files import MOST_BYTES
 
@@ -207,3 +208,34 @@ def test_a_quote_that_is_not_closed_is_shown(text: str) -> None:
         friso.export("gains", EXAMPLES / "thesis_rig.toml", set=[text])
     _, line, caret = caught.value.actual.splitlines()
     assert line[caret.index("^")] in "\"'"
+
+
+def test_changes_in_place_of_another_argument_are_pointed_to() -> None:
+    with pytest.raises(InputError, match="set="):
+        friso.check(EXAMPLES / "thesis_rig.toml", {"masses.cart": "1 kg"})  # type: ignore[arg-type]
+
+
+def test_changes_supply_what_a_file_lacks(tmp_path: Path) -> None:
+    text = (EXAMPLES / "thesis_rig.toml").read_text("utf-8")
+    assert 'model = "lugre"' in text
+    (tmp_path / "stage.toml").write_text(text.replace('model = "lugre"', ""), "utf-8")
+    with pytest.raises(InputError, match=r"friction\.model"):
+        friso.export("gains", tmp_path / "stage.toml", to="odrive")
+    assert stage_of(tmp_path / "stage.toml", {"friction.model": "lugre"}) == friso.load(EXAMPLES / "thesis_rig.toml")
+
+
+def test_an_axis_is_chosen_by_its_letter(tmp_path: Path) -> None:
+    source = tmp_path / "axis.ini"
+    text = AXIS.read_text("utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith("COORDINATES")]
+    source.write_text("\n".join(lines).replace("[TRAJ]", "[TRAJ]\nCOORDINATES = X Y"), "utf-8")
+    named = friso.init(tmp_path / "a.toml", from_=source, axis="X", set=MACHINE).read_text("utf-8")
+    assert named == friso.init(tmp_path / "b.toml", from_=source, set=MACHINE).read_text("utf-8")
+
+
+@pytest.mark.parametrize(("name", "hint"), [("axis.ini", "--from"), ("log.csv", "friso logs"), ("no.zarr", "store")])
+def test_files_for_other_commands_are_recognised(name: str, hint: str, tmp_path: Path) -> None:
+    if not name.endswith(".zarr"):
+        (tmp_path / name).write_text("[JOINT_0]\nP = x,y\n", "utf-8")
+    with pytest.raises(InputError, match=hint):
+        friso.load(tmp_path / name)

@@ -9,10 +9,11 @@ from numbers import Integral
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from friso.errors import InputError
+from friso.errors import InputError, StageError
 from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, beside, read_correlations
+from friso.stage.files import load_changed
 from friso.stage.plausible import doubts
 from friso.stage.rig import AS_BUILT
 
@@ -30,13 +31,16 @@ LOGGER = logging.getLogger("friso")
 
 def stage_of(source: StageLike, changes: Changes = None) -> Stage:
     """The stage that is meant, with keys overridden. Raises InputError."""
-    if isinstance(source, Stage):
-        stage = source
-    elif isinstance(source, Mapping):
-        stage = Stage(**source)
-    else:
-        stage = load(source)
     wanted = changes_of(changes)
+    if isinstance(source, Stage | Mapping):
+        stage = source if isinstance(source, Stage) else Stage(**source)
+        return stage.replace(wanted) if wanted else stage
+    try:
+        stage = load(source)
+    except StageError:
+        if not wanted:
+            raise
+        return load_changed(Path(source), wanted)
     return stage.replace(wanted) if wanted else stage
 
 

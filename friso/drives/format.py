@@ -18,12 +18,13 @@ Flat = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class AxisParameters:
-    """The parameters of one axis in a file: its `name` there, texts or numbers by name, and those of the whole machine
-    that matter."""
+    """The parameters of one axis in a file: its `name` there, texts or numbers by name, those of the whole machine
+    that matter, and the `letter` that the machine's users call it by."""
 
     name: str
     values: Mapping[str, Any]
     machine: Mapping[str, Any] = field(default_factory=dict)
+    letter: str = ""
 
     def number(self, name: str, default: float | None = None) -> float:
         """A finite number. Raises InputError where it is something else, or absent without a `default`."""

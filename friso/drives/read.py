@@ -67,11 +67,11 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
 
 def _chosen(axes: tuple[AxisParameters, ...], name: str | None, path: Path) -> AxisParameters:
     """The axis of that name; without one, the only one there is. Raises InputError."""
-    names = ", ".join(axis.name for axis in axes)
+    names = ", ".join(f"{axis.name} ({axis.letter})" if axis.letter else axis.name for axis in axes)
     if name is None and len(axes) == 1:
         return axes[0]
     for axis in axes:
-        if axis.name == name:
+        if name in (axis.name, axis.letter or axis.name):
             return axis
     actual = f"{len(axes)} axes" if name is None else quoted(name)
     raise InputError("--axis", actual, f"one of {names}", f"--axis {axes[0].name}", str(path))

@@ -111,7 +111,8 @@ def checked(function: Callable[Arguments, Returned]) -> Callable[Arguments, Retu
             expected = [_KINDS[part] for part in kinds.get(name, ())]
             if expected and not any(holds(value) for holds, _ in expected):
                 words = [words for _, words in expected if words != "None"]
-                raise InputError(name, quoted(value), " or ".join(dict.fromkeys(words)))
+                meant = 'set={"masses.stage": "0.6 kg"}' if "set" in kinds and isinstance(value, Mapping) else ""
+                raise InputError(name, quoted(value), " or ".join(dict.fromkeys(words)), meant)
         return function(*arguments, **options)
 
     return call

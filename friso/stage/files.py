@@ -11,11 +11,21 @@ from friso.bounded_file import LargeFileError, content_of
 from friso.errors import InputError, StageError
 from friso.escapes import one_line
 from friso.quantities import quoted
-from friso.stage.stage import Stage
+from friso.stage.stage import Stage, changed
 from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
 """Size of a text file at most."""
+
+_HINTS = {
+    ".ini": "friso init stage.toml --from {}",
+    ".json": "friso init stage.toml --from {}",
+    ".csv": "friso logs {}",
+    ".mat": "friso logs {}",
+    ".tdms": "friso logs {}",
+    ".zarr": "a store made by friso map, of which there is none at {}",
+}
+"""What a file is for that is no stage file, by its suffix."""
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -33,7 +43,18 @@ def load(path: str | os.PathLike[str]) -> Stage:
     try:
         return loads(text_of(Path(path), _EXPECTED), origin=str(path))
     except InputError as error:
+        hint = _HINTS.get(Path(path).suffix.lower(), "").format(path)
+        if hint:
+            error = InputError(error.key, error.actual, f"{error.expected}; or {hint}", "", str(path))
         raise StageError.of(error) from None
+
+
+def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
+    """The stage of a file with dotted keys set, which the file may lack. Raises StageError."""
+    try:
+        return changed(parsed(text_of(path, _EXPECTED), _EXPECTED), changes)
+    except InputError as error:
+        raise StageError.of(error).found_in(str(path)) from None
 
 
 def loads(text: str, origin: str = "stage file") -> Stage:

@@ -263,10 +263,7 @@ class Stage(Section):
         if not (isinstance(changes, Mapping) and all(isinstance(key, str) for key in changes)):
             expected = "a dictionary of keys to new values"
             raise StageError("", quoted(changes), expected, 'stage.replace({"masses.stage": "0.6 kg"})')
-        tables = self.as_written()
-        for key, value in changes.items():
-            _put(tables, key, getattr(value, "text", value))
-        return Stage(**tables)
+        return changed(self.as_written(), changes)
 
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
         """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
@@ -294,6 +291,13 @@ class Stage(Section):
             if isinstance(table, dict):
                 lines += _table_lines(name, table)
         return "\n".join(lines).lstrip() + "\n"
+
+
+def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> Stage:
+    """The stage of tables in which dotted keys are set, or removed by None. Raises StageError."""
+    for key, value in changes.items():
+        _put(tables, key, getattr(value, "text", value))
+    return Stage(**tables)
 
 
 def _axis_written(tables: Mapping[str, Any]) -> AxisKind:

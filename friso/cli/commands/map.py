@@ -60,6 +60,7 @@ def map_cells(
     """Where does it hunt: two (or more) keys swept; a Zarr store, a figure, and a page whose cells can be clicked.
 
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
+
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
     if check:

@@ -31,6 +31,7 @@ def simulate(
     """What does one run do: time response of the stage to its motion, as NetCDF, CSV and a plot.
 
     Example: friso simulate examples/lugre_stick_slip.toml --sample-time "1 ms" --out response
+
     A cell of a map: friso simulate --cell rig_map.zarr 3 4
     """
     from friso.answers.simulate import simulate as question

@@ -84,7 +84,16 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     joints = [axis for axis in with_gains if axis.name.startswith("[JOINT")]
     if not with_gains:
         raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", "an axis whose loop LinuxCNC closes", "P = 50")
-    return tuple(replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains)
+    letters = re.sub(r"\s", "", sections.get("TRAJ", {}).get("COORDINATES", "")).upper()
+    named = [replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains]
+    return tuple(replace(axis, letter=_letter(axis.name, letters)) for axis in named)
+
+
+def _letter(name: str, letters: str) -> str:
+    """The letter of a joint, where each letter of the machine has one joint."""
+    number = int(name.partition("_")[2])
+    is_named = name.startswith("JOINT") and number < len(letters) and letters.count(letters[number]) == 1
+    return letters[number] if is_named else ""
 
 
 def _sections(text: str) -> dict[str, dict[str, str]]:

@@ -99,7 +99,7 @@ def _windows(kick: Kick, unit: str, searched: str) -> str:
         return f"all that were tried, {searched}"
     texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
     more = len(kick.windows) - len(texts)
-    text = ", ".join([*texts, *([f"and {more} more ranges"] if more else [])])
+    text = ", ".join([*texts, *([f"and {more} more range{'s' * (more > 1)}"] if more else [])])
     open_ended = kick.windows[0][0] == kick.searched[0] or kick.windows[-1][1] == kick.searched[1]
     return f"{text} (tried: {searched})" if open_ended else text
 
