@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 from variants import VARIANTS
 
 import friso
-from friso.equations.model import assemble
+from friso.equations.model import REFERENCE, assemble
 from friso.equations.roles import Role
 from friso.equations.structure import structure
 from friso.errors import InputError
@@ -105,6 +105,7 @@ def jacobian(flat: dict, one: Members) -> np.ndarray:
     model = assemble(structure(flat))
     speed = float(one.speed[0])
     here = {symbol: speed if str(symbol).endswith("velocity") else 0.0 for symbol in model.symbols}
+    here |= dict.fromkeys(REFERENCE, 0.0)  # it stands
     modes = {"forward": 1.0, "stroke_ahead": float(one.touched[0])}
     modes |= dict.fromkeys(("plastic_ahead", "slipping_ahead"), float(speed > 0))
     modes |= {switch.name: float(not one.stuck[0]) for switch in model.switches}

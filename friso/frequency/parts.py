@@ -14,6 +14,7 @@ from friso.equations.blocks import Controller, Loop
 from friso.equations.component import Component
 from friso.equations.continuous import continuous_controller
 from friso.equations.joint import touching
+from friso.equations.model import REFERENCE as REFERENCE_COURSE
 from friso.equations.model import assemble
 from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
@@ -49,6 +50,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
     values |= {**_limiter(members.touched), **_on_flank()}
+    values |= {str(symbol): 0.0 for symbol in REFERENCE_COURSE}  # a reference that neither moves nor accelerates
     bodies = {form.cart: law_of(flat)}
     if form.motor:
         bodies[form.motor] = motor_law_of(flat)
