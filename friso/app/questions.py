@@ -142,7 +142,7 @@ def map_study(asked: Asked, work: Work) -> Iterator[Part]:
     stands = [("this machine", asked.machine.stage)]
     stands += [("pinned", asked.pinned.stage)] if asked.pinned else []
     for count in COARSE_TO_FINE:
-        ranges = {name: f"{text}:{count}" for name, text in axes.items()}
+        ranges: dict[str, Any] = {name: f"{text}:{count}" for name, text in axes.items()}
         answer = friso.sweep(asked.machine.stage, **ranges, metric=metric, progress=work.progress)
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, "metric": metric}, "sweep")}

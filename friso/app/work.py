@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -106,7 +107,7 @@ class Workshop:
             self.lanes[place].overtake()
         self.lanes[place] = work
         try:
-            loop.run_in_executor(self.pool, copy_context().run, work.run, job)
+            loop.run_in_executor(self.pool, partial(copy_context().run, work.run, job))
             while (part := await parts.get()) is not None:
                 yield frame(part)
         finally:

@@ -46,4 +46,5 @@ class KeptCells:
 def _kept(file: Path, cells: np.ndarray) -> Columns | None:
     """What was kept about just these cells, None if nothing."""
     columns = stored_arrays(file)
-    return columns if columns is not None and np.array_equal(columns.pop("cells", None), cells) else None
+    about = None if columns is None else columns.pop("cells", None)
+    return columns if about is not None and np.array_equal(about, cells) else None

@@ -125,8 +125,8 @@ class LawProblem:
         low, high = self.bounds
         starts = np.clip(starts, low + 2 * STEP, high - 2 * STEP)
         first = starts[np.argmin(np.sum(self._weighed(starts, weights) ** 2, axis=1))]
-        options = {"max_nfev": EVALUATIONS, "xtol": TOLERANCE, "ftol": TOLERANCE}
-        best = least_squares(lambda numbers: at(numbers)[0], first, jac=jacobian, bounds=(low, high), **options).x
+        options: dict[str, Any] = {"max_nfev": EVALUATIONS, "xtol": TOLERANCE, "ftol": TOLERANCE, "jac": jacobian}
+        best = least_squares(lambda numbers: at(numbers)[0], first, bounds=(low, high), **options).x
         return LawFit(self.law, float(np.exp(best[0])), self.keys(best), best)
 
     def everywhere(self) -> np.ndarray:

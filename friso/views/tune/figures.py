@@ -64,7 +64,7 @@ class Line(NamedTuple):
 
 def shown(tuning: Advice) -> list[tuple[Stage, RemedyOutcome | None, Line]]:
     """The stages that are drawn: as it is, and with each remedy that has settings."""
-    lines = [(tuning.stage, None, Line("as it is", INK, "solid"))]
+    lines: list[tuple[Stage, RemedyOutcome | None, Line]] = [(tuning.stage, None, Line("as it is", INK, "solid"))]
     for outcome in tuning.outcomes:
         if outcome.stage is not None:
             again, number = divmod(len(lines) - 1, len(COLOURS))
