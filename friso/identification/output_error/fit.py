@@ -23,8 +23,8 @@ STARTS, KEPT = 1024, 6
 NARROW = 0.3
 """Share by which the starts of core parameters are off the inverse model's values, each way."""
 
-SCREENED = 1e7
-"""Samples that the starts are simulated over, all together: long records are cut for them."""
+SCREENED, STRETCHES = 1e7, 8
+"""Samples that the starts are simulated over, all together: long records are cut for them, into so many stretches."""
 
 ROUGH, FINE = 12, 30
 """Iterations of the refinement of the starts kept, and most evaluations of lmfit times the parameters."""
@@ -124,8 +124,18 @@ def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
     """The best starts, shape (kept, parameters), the first one always among them."""
     if len(starts) <= KEPT:
         return starts
-    screened = costs(problem.beginning(min(len(problem.target), int(SCREENED / len(starts)))), starts[1:])
+    screened = np.sum([costs(problem.part(part), starts[1:]) for part in _parts(problem, len(starts))], axis=0)
     return np.vstack([starts[0], starts[1:][np.argsort(screened)[: KEPT - 1]]])
+
+
+def _parts(problem: Problem, starts: int) -> list[slice]:
+    """What of a record the starts are simulated over: all of a short one; of a long one its beginning in closed loop,
+    whose state is not known later on, and else stretches from all over it: slow motion may come last."""
+    count, most = len(problem.target), int(SCREENED / starts)
+    if count <= most or problem.closed:
+        return [slice(0, min(count, most))]
+    firsts = np.linspace(0, count - most // STRETCHES, STRETCHES).astype(int)
+    return [slice(int(first), int(first) + most // STRETCHES) for first in firsts]
 
 
 def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:

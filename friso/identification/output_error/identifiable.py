@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from friso.identification.output_error.coverage import Coverage
+from friso.identification.output_error.coverage import NEAR, Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, bends
 from friso.identification.output_error.problem import Problem
@@ -185,9 +185,11 @@ def reason(name: str, covered: Coverage) -> str:
         low, high = covered.gap
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"
-        return (
-            f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would show"
-        )
+        if high > NEAR**2 * low:
+            return (
+                f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would "
+                "show"
+            )
     if name in BRISTLES:
         return (
             "the record passes too quickly, for its sampling, through the first micrometres of every motion, where the "

@@ -95,11 +95,16 @@ class Problem:
         omega = 2 * self.flat[KP] / self.flat[KD]
         return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
 
-    def beginning(self, count: int) -> Problem:
-        """The same with the first so many samples alone."""
-        inputs = replace(self.inputs, reference=self.inputs.reference[:count], force=self.inputs.force[:count])
-        counted = self.counted[:count]
-        return replace(self, inputs=inputs, target=self.target[:count], counted=counted, unsettled=())
+    def part(self, samples: slice) -> Problem:
+        """The same with a stretch of the samples alone; one that does not begin with the first begins on the reference,
+        as a stage does that follows a log."""
+        reference = self.inputs.reference[samples]
+        inputs = replace(self.inputs, reference=reference, force=self.inputs.force[samples])
+        start = self.start
+        if samples.start:
+            start = float(reference[0]), float((reference[1] - reference[0]) / self.inputs.sample_time)
+        target, counted = self.target[samples], self.counted[samples]
+        return replace(self, inputs=inputs, target=target, counted=counted, start=start, unsettled=())
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
