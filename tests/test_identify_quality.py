@@ -24,6 +24,7 @@ from friso.identification.model_error import (
     with_halves,
     with_model_error,
 )
+from friso.identification.output_error import fit as fitting
 from friso.identification.output_error.changes import changes_beside, inverse_reaching
 from friso.identification.output_error.fit import OutputErrorFit, first_values
 from friso.identification.output_error.parameters import FitParameter, parameters_of
@@ -400,6 +401,19 @@ def test_a_fit_is_no_surer_than_fits_of_simulated_logs_are_off() -> None:
     coulomb = [parameter.name for parameter in problem.parameters].index("friction.coulomb")
     assert noisy[coulomb] > 2 * quiet[coulomb]
     assert noisy[coulomb] > 0.5 * 30.0 / math.sqrt(len(log.time)) / COULOMB
+
+
+def test_starts_are_tried_all_over_a_long_record() -> None:
+    log = axis(seconds=20.0)
+    flat = made_up(log, inverse_model(log, 5.0)).flat()
+    problem = tracking(flat, log, log.segments[0], _parameters(flat), 5.0)
+    parts = fitting._parts(problem, fitting.STARTS)
+    assert parts[0].start == 0
+    assert parts[-1].stop == len(log.time)
+    assert sum(part.stop - part.start for part in parts) <= fitting.SCREENED / fitting.STARTS
+    later = problem.part(parts[-1])
+    assert later.start[0] == later.inputs.reference[0] == problem.inputs.reference[parts[-1].start]
+    assert len(later.target) == len(later.counted) == parts[-1].stop - parts[-1].start
 
 
 def _parameters(flat: dict[str, Any]) -> list[FitParameter]:

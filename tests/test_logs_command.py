@@ -107,3 +107,19 @@ def test_one_bad_file_does_not_hide_the_others(bare: Path, tmp_path: Path) -> No
     assert done.returncode == 2
     assert "bare.csv" in done.stdout
     assert "empty.csv" in done.stderr
+
+
+def test_a_channel_of_times_is_proposed_for_its_unit(tmp_path: Path) -> None:
+    names = ["Sekunde [ms]", "pos [mm]", "force [N]"]
+    path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
+    content = content_of(path, Mapping())
+    assert "--map time=Sekunde" in next_command(content)
+    assert content_of(path, from_options(["time=Sekunde"])).kind == "moves"
+
+
+def test_a_german_clock_is_known_by_its_name(tmp_path: Path) -> None:
+    names = ["Uhrzeit [ms]", "pos [mm]", "force [N]"]
+    path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
+    content = content_of(path, Mapping())
+    assert content.kind == "moves"
+    assert content.channels[0].role == "time"

@@ -473,6 +473,17 @@ def test_mapping_in_another_folder(tmp_path: Path) -> None:
     assert mappings.load(log, tmp_path) == Mapping({"position": "x"})
 
 
+def test_what_is_said_now_silences_what_was_kept() -> None:
+    kept = Mapping({"force": "u"}, {}, {"force": "25 N/A"}, 1e-3)
+    assert from_options(["time=Uhrzeit"]).over(kept).sample_time is None
+    assert from_options(units=["time=ms"]).over(kept).sample_time is None
+    assert from_options(units=["u=A"]).over(kept).sample_time == 1e-3
+    assert "time" not in from_options(dt="2 ms").over(Mapping({"time": "t"})).roles
+    assert from_options(["force=w"]).over(kept).scales == {}
+    assert from_options(["force=u"]).over(kept) == kept
+    assert kept.beside(from_options(["time=Uhrzeit"])).words == "force is u, force by 25 N/A"
+
+
 @pytest.mark.parametrize(
     "text", ["rubbish", "[roles]\nstage = 'x'\n", "[roles]\nposition = 3\n", "nonsense = 1\n", "sample_time = 1\n"]
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from collections.abc import Mapping as Keyed
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -189,6 +190,8 @@ def identify(
     result = identification(sources, assumed, settings, progress)
     if laws:
         result = with_laws(result, [source for source, _ in sources], assumed, progress)
+    reused = tuple(file.reused for file in inputs if file.reused)
+    result = replace(result, warnings=(*reused, *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
     return IdentifyAnswer(result, inputs, predictions, axis_kind)
 

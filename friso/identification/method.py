@@ -89,7 +89,8 @@ def identify(
     estimates, warnings = combined(_every_estimate(experiments))
     doubts = tuple(doubt for experiment in experiments for doubt in KINDS[experiment.kind].doubts(experiment.result))
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
-    if stage is None or (failed and not any(estimate.determined for estimate in estimates)):
+    nothing = not any(estimate.determined for estimate in estimates)
+    if stage is None or (nothing and (failed or estimates)):
         return Identification(
             None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings), doubts, failed
         )

@@ -23,8 +23,8 @@ MOVED = ("position", "force")
 
 @dataclass(frozen=True)
 class LogFile:
-    """A file with what it holds, its kind of experiment and why it counts as one, how it was mapped, and where that is
-    kept (None: not yet, or nothing had to be said about it)."""
+    """A file with what it holds, its kind of experiment and why it counts as one, how it was mapped, where that is kept
+    (None: not yet, or nothing had to be said about it), and what of it was kept from an `earlier` time."""
 
     path: Path
     source: Source
@@ -32,6 +32,13 @@ class LogFile:
     reason: str
     mapping: Mapping = Mapping()  # noqa: RUF009 (frozen)
     mapping_file: Path | None = None
+    earlier: Mapping = Mapping()  # noqa: RUF009 (frozen)
+
+    @property
+    def reused(self) -> str:
+        """A sentence on what nobody said this time; "" for nothing."""
+        words = self.earlier.words
+        return f"{self.path.name}: read as kept in {self.path.name}{SUFFIX}: {words}" if words else ""
 
 
 class OpenQuestions(GapsError):
@@ -104,9 +111,9 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         KINDS.checked(mapping.experiment, "--as", "--as {}")
         log = named(path, mapping, mapping.experiment)
         before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
-        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping)
+        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping, earlier=stored.beside(options))
     log, kind, reason = unnamed(path, mapping)
-    return LogFile(path, log, kind, reason, mapping)
+    return LogFile(path, log, kind, reason, mapping, earlier=stored.beside(options))
 
 
 def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:

@@ -15,6 +15,7 @@ from typing import Any
 from friso.axis import KINDS, LINEAR, ROTARY, AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
+from friso.identification.logs.roles import role_of
 from friso.quantities import Bound, Quantity, as_toml, quoted
 from friso.stage.files import parsed, text_of
 
@@ -47,15 +48,45 @@ class Mapping:
 
     def over(self, older: Mapping) -> Mapping:
         """This mapping, and what an older one says where this one is silent."""
+        rest = older.beside(self)
         return Mapping(
-            {**older.roles, **self.roles},
-            {**older.units, **self.units},
-            {**older.scales, **self.scales},
-            older.sample_time if self.sample_time is None else self.sample_time,
-            older.experiment if self.experiment is None else self.experiment,
-            older.axis if self.axis is None else self.axis,
-            {**older.setup, **self.setup},
+            {**rest.roles, **self.roles},
+            {**rest.units, **self.units},
+            {**rest.scales, **self.scales},
+            rest.sample_time if self.sample_time is None else self.sample_time,
+            rest.experiment if self.experiment is None else self.experiment,
+            rest.axis if self.axis is None else self.axis,
+            {**rest.setup, **self.setup},
         )
+
+    def beside(self, newer: Mapping) -> Mapping:
+        """What this mapping says about which a newer one is silent: a sample time is silenced by a channel of times
+        or the unit of one, a channel of times by a sample time, and a scale by another channel for its role."""
+        timed = "time" in newer.roles or any((role_of(name) or ("",))[0] == "time" for name in newer.units)
+        roles = {role: name for role, name in self.roles.items() if role not in newer.roles}
+        if newer.sample_time is not None:
+            roles.pop("time", None)
+        other = {role for role, name in newer.roles.items() if self.roles.get(role, name) != name}
+        return Mapping(
+            roles,
+            {name: unit for name, unit in self.units.items() if name not in newer.units},
+            {role: scale for role, scale in self.scales.items() if role not in {*newer.scales, *other}},
+            self.sample_time if newer.sample_time is None and not timed else None,
+            self.experiment if newer.experiment is None else None,
+            self.axis if newer.axis is None else None,
+            {key: text for key, text in self.setup.items() if key not in newer.setup},
+        )
+
+    @property
+    def words(self) -> str:
+        """What it says, in words; "" for nothing."""
+        time = [] if self.sample_time is None else [f"one sample every {self.sample_time:.6g} s"]
+        kinds = [text for text in (self.experiment, self.axis) if text is not None]
+        roles = [f"{role} is {name}" for role, name in self.roles.items()]
+        scales = [f"{role} by {scale}" for role, scale in self.scales.items()]
+        units = [f"{name} in {unit}" for name, unit in self.units.items()]
+        setup = [f"{key} = {text}" for key, text in self.setup.items()]
+        return ", ".join([*time, *roles, *units, *scales, *kinds, *setup])
 
 
 def from_options(

@@ -22,7 +22,23 @@ _NOT_MEASURED = frozenset(
 _CART = frozenset(["cart", "carriage", "slider"])
 _RELATIVE = frozenset(["rel", "relative"])
 _KEYS = {
-    "time": frozenset(["t", "time", "timestamp", "tout", "zeit", "tempo", "temps", "tiempo", "tijd"]),
+    "time": frozenset(
+        [
+            "t",
+            "time",
+            "timestamp",
+            "tout",
+            "zeit",
+            "uhrzeit",
+            "zeitstempel",
+            "tempo",
+            "temps",
+            "heure",
+            "tiempo",
+            "hora",
+            "tijd",
+        ]
+    ),
     "position": frozenset(
         [
             "pos",

@@ -207,11 +207,16 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
     """The error for a channel without instants."""
     offers = _offers(reading.table)
     expected = "; or ".join(text for text in ("a time channel or a sample time", offers) if text)
-    example = re.match(r'--dt "[^"]*"', offers)
-    return LogError(
-        "time", f"no time stamps for {quoted(channel.name)}", expected, example[0] if example else '--dt "1 ms"',
-        reading.origin,
-    )  # fmt: skip
+    offer = re.match(r'--dt "[^"]*"', offers)
+    clock = next((other for other in reading.table.channels if other is not channel and _is_clock(other)), None)
+    example = offer[0] if offer else '--dt "1 ms"' if clock is None else option("--map", "time", clock.name)
+    return LogError("time", f"no time stamps for {quoted(channel.name)}", expected, example, reading.origin)
+
+
+def _is_clock(channel: Channel) -> bool:
+    """Whether a channel is in a unit of time and always rises."""
+    of_time = bool(channel.unit) and factor(channel.unit, "s") is not None
+    return of_time and channel.values.size > 1 and bool((np.diff(channel.values) > 0).all())
 
 
 def _offers(table: ChannelTable) -> str:

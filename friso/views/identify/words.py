@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -86,12 +88,14 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
         lines.append((ORANGE, _why_no_stage(identification)))
     if len(visible) < len(estimates):
         lines.append((ORANGE, f"Not identified: {missing(estimates)}."))
-        lines += [(ORANGE, f"What would show it: {ways}.") for ways in [_ways(estimates)] if ways]
+        done = {experiment.kind for experiment in identification.experiments}
+        lines += [(ORANGE, f"What would show it: {ways}.") for ways in [_ways(estimates, done)] if ways]
     return lines
 
 
 def _why_no_stage(identification: Identification) -> str:
-    if identification.failed:
+    estimates = identification.estimates
+    if identification.failed or (estimates and not any(estimate.determined for estimate in estimates)):
         return NOTHING_HOLDS
     logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
     around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
@@ -123,12 +127,13 @@ def _none_found(estimates: Sequence[Estimate]) -> str:
     return ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in estimates if _absent(one))
 
 
-def _ways(estimates: Sequence[Estimate]) -> str:
-    """The experiments that would show what is not identified."""
+def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
+    """The experiments that would show what is not identified, but for the kinds that were `done`: what these lacked is
+    in the reasons."""
     names: dict[str, list[str]] = {}
     for estimate in estimates:
         way = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0])
-        if way and not estimate.determined:
+        if way and not estimate.determined and done.isdisjoint(re.findall(r"--as ([\w-]+)", way)):
             names.setdefault(way, []).append(within(estimate.name))
     return "; ".join(f"{', '.join(group)}: {way}" for way, group in names.items())
 
