@@ -89,8 +89,7 @@ def identify(
     estimates, warnings = combined(_every_estimate(experiments))
     doubts = tuple(doubt for experiment in experiments for doubt in KINDS[experiment.kind].doubts(experiment.result))
     failed = any(KINDS[experiment.kind].failed(experiment.result) for experiment in experiments)
-    nothing = not any(estimate.determined for estimate in estimates)
-    if stage is None or (nothing and (failed or estimates)):
+    if stage is None or nothing_learnt(estimates, failed):
         return Identification(
             None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings), doubts, failed
         )
@@ -123,6 +122,13 @@ def with_laws(
     times = [log for log in logs if isinstance(log, Log)]
     laws = compare_laws(times, identification.stage or base, Prior(base, True, estimates), progress)
     return replace(identification, laws=laws)
+
+
+def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:
+    """Whether there are estimates none of which is determined, nor bounds anything unless the analysis `failed`."""
+    ends = [end for estimate in estimates for end in (estimate.low, estimate.high)]
+    none_determined = not any(estimate.determined for estimate in estimates)
+    return none_determined and (failed or (bool(estimates) and not np.isfinite(ends).any()))
 
 
 def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from friso.axis import axis_shown, unit_shown
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
+from friso.identification.method import nothing_learnt
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.identify.kind_view import Facts, PredictionView, view_of
 from friso.views.identify.laws import TITLE, how, law_facts, law_sentence
@@ -94,8 +95,7 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
 
 
 def _why_no_stage(identification: Identification) -> str:
-    estimates = identification.estimates
-    if identification.failed or (estimates and not any(estimate.determined for estimate in estimates)):
+    if identification.failed or nothing_learnt(identification.estimates, False):
         return NOTHING_HOLDS
     logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
     around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
@@ -128,12 +128,12 @@ def _none_found(estimates: Sequence[Estimate]) -> str:
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:
-    """The experiments that would show what is not identified, but for the kinds that were `done`: what these lacked is
-    in the reasons."""
+    """The experiments that would show what is not identified, but for a kind that alone was `done`: what that lacked
+    is in the reasons."""
     names: dict[str, list[str]] = {}
     for estimate in estimates:
         way = SHOWN_BY.get(estimate.name) or SHOWN_BY.get(estimate.name.split(".")[0])
-        if way and not estimate.determined and done.isdisjoint(re.findall(r"--as ([\w-]+)", way)):
+        if way and not estimate.determined and done != {*re.findall(r"--as ([\w-]+)", way)}:
             names.setdefault(way, []).append(within(estimate.name))
     return "; ".join(f"{', '.join(group)}: {way}" for way, group in names.items())
 
