@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import http.client
+import io
 import json
 import struct
 import threading
 import time
+import zipfile
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -22,6 +25,7 @@ from friso.app.gate import Access
 from friso.app.machine import Machine, shown
 from friso.app.server import application
 from friso.engine.overtaken import Overtaken, ended_by, go_on
+from friso.views.drawing import matplotlib_renderer
 from friso.views.drawing.drawable import drawable
 
 RIG = Path(friso.example("thesis_rig"))
@@ -251,6 +255,14 @@ def test_a_run_is_that_of_friso(served: Served) -> None:
     assert lines[0]["y"].dtype == np.float32
     expected = drawable(answer.figures()[0]).panels[0].series[1].y
     assert np.array_equal(lines[0]["y"], expected.astype(np.float32))
+
+
+def test_a_report_has_page_figures_document_and_stage_file(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+    part = served.ask("check.zip", STICK_SLIP)[-1]
+    names = set(zipfile.ZipFile(io.BytesIO(base64.b64decode(part["base64"]))).namelist())
+    assert {"report.html", "check.json", "lugre_stick_slip.toml"} <= names
+    assert {f"settled.{form}" for form in ("png", "svg", "pdf")} <= names
 
 
 def test_changes_become_the_command_that_gives_the_same(served: Served) -> None:

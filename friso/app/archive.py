@@ -9,19 +9,27 @@ import zipfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from friso.axis import speaking_of
 from friso.stage import Stage
+from friso.views.files import pictures
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
 
 
 def archive(answer: Answer, stage: Stage, stem: str) -> bytes:
-    """A ZIP file of the files of an answer, its document as JSON, and the stage file."""
+    """A ZIP file of the files of an answer, its figures in all forms, its document as JSON, and the stage file."""
     held = io.BytesIO()
     packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)
     with tempfile.TemporaryDirectory(prefix="friso-app-") as folder, packing as file:
-        for path in answer.report(Path(folder) / "out"):
-            file.write(path, path.name)
+        out = Path(folder) / "out"
+        written = answer.report(out)
+        with speaking_of(answer.axis_kind):
+            for name, save in pictures(answer.figures()).items():  # some commands write figures in their page alone
+                if out / name not in written and callable(save):
+                    save(out / name)
+        for path in sorted(out.rglob("*")):
+            file.write(path, path.relative_to(out))
         file.writestr(f"{answer.command}.json", json.dumps(answer.to_dict(), indent=1, allow_nan=False))
         file.writestr(f"{stem}.toml", stage.to_toml())
     return held.getvalue()
