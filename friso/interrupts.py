@@ -11,8 +11,9 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from types import FrameType
 from typing import Any
 
@@ -41,7 +42,8 @@ def raising() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = _install()
+    before, ignored = _install(), sys.unraisablehook
+    sys.unraisablehook = partial(_lost, ignored)
     _raising = True
     try:
         if came():
@@ -50,6 +52,7 @@ def raising() -> Iterator[None]:
     finally:
         _raising = False
         no_signal_later()
+        sys.unraisablehook = ignored
         if not _IS_COMMAND:  # which ends now, and is not to be interrupted in that
             _came.clear()
             for number, handler in before.items():
@@ -92,6 +95,15 @@ def _arrived(number: int, frame: FrameType | None) -> None:
         signal_later(_AGAIN, _arrived)
         return
     raise KeyboardInterrupt
+
+
+def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
+    """Python ignores what is raised while an object goes (a finalizer, the callback of a weak reference), and prints a
+    traceback: a KeyboardInterrupt is raised again instead."""
+    if _raising and isinstance(what.exc_value, KeyboardInterrupt):
+        signal_later(_AGAIN, _arrived)
+    else:
+        otherwise(what)
 
 
 def _imports(frame: FrameType | None) -> bool:

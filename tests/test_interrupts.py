@@ -74,6 +74,26 @@ def _import_and_wait() -> None:
     time.sleep(10)
 
 
+class Going:
+    """Is struck by Ctrl-C while it goes, where Python ignores what is raised."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ctrl_c_while_an_object_goes_is_not_lost(capsys: pytest.CaptureFixture[str]) -> None:
+    hook = sys.unraisablehook
+    with pytest.raises(KeyboardInterrupt), interrupts.raising():
+        _let_go_and_wait()
+    assert capsys.readouterr().err == ""
+    assert sys.unraisablehook is hook
+
+
+def _let_go_and_wait() -> None:
+    Going()
+    time.sleep(10)
+
+
 class Builder:
     """Stands in for a process that builds: it ends, with nothing built, when it is killed."""
 

@@ -56,12 +56,18 @@ def _are_numbers(value: Any) -> bool:
     return True
 
 
+MOST_INT = 10**18
+"""Whole numbers are smaller, whatever they count."""
+
 _ALTERNATIVES = re.compile(r" \| (?![^\[]*\])")
 
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "None": (lambda value: value is None, "None"),
     "str": (_is_text, "a text"),
-    "int": (lambda value: isinstance(value, Integral) and not isinstance(value, bool), "a whole number"),
+    "int": (
+        lambda value: isinstance(value, Integral) and not isinstance(value, bool) and abs(int(value)) < MOST_INT,
+        "a whole number",
+    ),
     "float": (_is_number, "a number"),
     "bool": (lambda value: isinstance(value, bool | np.bool_), "True or False"),
     "os.PathLike[str]": (_is_path, "a path"),
