@@ -27,7 +27,10 @@ HEADERS = {
 }
 """What goes with every response."""
 
-REFUSED = "friso app answers only the browser that was opened with the address it printed: open that address.\n"
+REFUSED = (
+    "friso app answers only the browser that was opened with the address it printed: open that address. "
+    "One that was started anew has printed a new one.\n"
+)
 
 
 @dataclass(frozen=True)
@@ -38,13 +41,22 @@ class Access:
     cookie: str
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
+    once: set[str] = field(default_factory=set)
+    """Tokens that are taken once."""
 
     @classmethod
     def at(cls, host: str, port: int) -> Access:
         """The access to a server at this host and port; one on all addresses of the machine has any name."""
         named = f"[{host}]" if ":" in host else host
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
-        return cls(frozenset(f"{name}:{port}" for name in names), f"friso-{port}")
+        hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP else set())
+        return cls(frozenset(hosts), f"friso-{port}")
+
+    def token_for_once(self) -> str:
+        """A token that is taken once: commands that are running, and the addresses in them, can be seen by others."""
+        token = secrets.token_urlsafe(32)
+        self.once.add(token)
+        return token
 
     def is_host(self, host: str) -> bool:
         """Whether the server goes by this name: another one was made to lead here."""
@@ -55,9 +67,13 @@ class Access:
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
     def has_token(self, query: bytes) -> bool:
-        """Whether an address has the token."""
+        """Whether an address has the token, or one that is taken once and now was."""
         tokens = parse_qs(query.decode("latin-1")).get("token", [])
-        return len(tokens) == 1 and _same(tokens[0], self.token)
+        if len(tokens) != 1:
+            return False
+        taken = {token for token in self.once if _same(tokens[0], token)}
+        self.once.difference_update(taken)
+        return bool(taken) or _same(tokens[0], self.token)
 
     def has_cookie(self, header: str) -> bool:
         """Whether a request has the cookie."""
@@ -67,6 +83,9 @@ class Access:
             return False
         return self.cookie in cookies and _same(cookies[self.cookie].value, self.session)
 
+
+HTTP = 80
+"""The port that browsers leave out of names."""
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 """The names of this machine that no other machine can reach."""

@@ -12,7 +12,7 @@ from friso.quantities import as_toml
 
 def command_line(command: str, machine: Machine, options: Mapping[str, Any]) -> str:
     """The command, as a POSIX shell takes it."""
-    sets = [("set", f"{key}={_bare(value)}") for key, value in machine.changes.items() if value is not None]
+    sets = [("set", f"{key}={_bare(value)}") for key, value in _set(machine).items()]
     words = ["friso", command, machine.name]
     for name, value in [*sets, *options.items()]:
         option = f"--{name.strip('_').replace('_', '-')}"
@@ -22,9 +22,14 @@ def command_line(command: str, machine: Machine, options: Mapping[str, Any]) -> 
 
 def python_line(function: str, machine: Machine, options: Mapping[str, Any]) -> str:
     """The same in Python."""
-    changed = {"set": machine.changes} if machine.changes else {}
+    changed = {"set": _set(machine)} if _set(machine) else {}
     arguments = [repr(machine.name), *(f"{name}={value!r}" for name, value in {**changed, **options}.items())]
     return f"friso.{function}({', '.join(arguments)})"
+
+
+def _set(machine: Machine) -> dict[str, Any]:
+    """The keys to be set: none in the stage file that the page saves, which has them."""
+    return {} if machine.is_of_page else machine.changes
 
 
 def _bare(value: Any) -> str:

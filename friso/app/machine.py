@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from typing import Any
 
 from friso.answers.schema import stage_schema
+from friso.app.names import plain_name
 from friso.errors import InputError
 from friso.quantities import Number, Quantity
 from friso.stage import Stage, loads, numeric_keys
@@ -19,11 +20,13 @@ REACH = 10.0
 
 @dataclass(frozen=True)
 class Machine:
-    """A stage file by its `text` and its `name`, and the keys `changed`, as JSON; null removes one."""
+    """A stage file by its `text` and its `name`, and the keys `changed`, as JSON; null removes one. `made` on the page:
+    no file has this text."""
 
     text: str
     name: str
     changed: str = "{}"
+    made: bool = False
 
     @classmethod
     def of(cls, data: Any) -> Machine:
@@ -33,12 +36,18 @@ class Machine:
         changes = data.get("changes") or {}
         if not isinstance(changes, Mapping) or not all(isinstance(value, _VALUES) for value in changes.values()):
             raise InputError("changes", "other values", "texts, numbers, true or false, by key")
-        return cls(data["text"], str(data.get("name") or "stage.toml"), json.dumps(changes))
+        name = plain_name(str(data.get("name") or ""), "stage.toml")
+        return cls(data["text"], name, json.dumps(changes), data.get("made") is True)
 
     @property
     def changes(self) -> dict[str, Any]:
         """The keys changed."""
         return json.loads(self.changed)
+
+    @property
+    def is_of_page(self) -> bool:
+        """Whether only the stage file that the page saves is this machine: no command says to take a key away."""
+        return self.made or None in self.changes.values()
 
     @property
     def stage(self) -> Stage:
@@ -75,7 +84,7 @@ def shown(machine: Machine) -> dict[str, Any]:
         row = {"name": name, "description": node.get("description", ""), "present": present is not None, "keys": []}
         if present is not None:
             row["keys"] = [
-                _key(f"{name}.{key}", item, present, flat, fields)
+                _key(f"{name}.{key}", item, present, flat, fields, uncertain)
                 for key, item in _variant(node, present)["properties"].items()
             ]
         tables.append(row)
@@ -108,12 +117,15 @@ def _key(
     present: Mapping[str, Any],
     flat: Mapping[str, Any],
     fields: Mapping[str, Quantity | Number],
+    uncertain: Container[str],
 ) -> dict[str, Any]:
-    """A key as the page shows it: its value as written, what it takes, and the range of its slider in SI."""
+    """A key as the page shows it: its value as written, whether that is `plain` (certain), what it takes, and the range
+    of its slider in SI."""
     key = path.partition(".")[2]
     value, field = present.get(key), fields.get(path)
     about = {"path": path, "value": value, "description": node.get("description", ""), "kind": _kind(node)}
     about |= {"options": node.get("enum", []), "example": (node.get("examples") or [""])[0]}
+    about["plain"] = path not in uncertain
     if field is not None:
         about |= {"unit": field.unit, "si": flat.get(path), "example": field.example}
         if isinstance(flat.get(path), float):
@@ -144,9 +156,3 @@ def _range(field: Quantity | Number, value: float) -> dict[str, Any]:
 @cache
 def _schema() -> dict[str, Any]:
     return stage_schema()
-
-
-def keys_to_vary(stage: Stage) -> Iterator[str]:
-    """The keys of a stage over which a map can be drawn."""
-    flat = stage.flat()
-    return (key for key in numeric_keys(flat) if isinstance(flat.get(key), float))

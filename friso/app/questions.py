@@ -88,7 +88,8 @@ def run(asked: Asked, work: Work) -> Iterator[Part]:
     """What the run does."""
     asked.chosen()
     pinned = None if asked.pinned is None else _run(asked.pinned)
-    yield parts_of(asked, _run(asked.machine), ghosts_of(pinned), **_lines("simulate", asked))
+    work.notes.clear()  # those on the pinned machine
+    yield parts_of(asked, friso.simulate(asked.machine.stage), ghosts_of(pinned), **_lines("simulate", asked))
 
 
 def verdict(asked: Asked, work: Work) -> Iterator[Part]:
@@ -104,8 +105,9 @@ def verdict(asked: Asked, work: Work) -> Iterator[Part]:
 def check(asked: Asked, work: Work) -> Iterator[Part]:
     """Does it hunt: every case, with its margin."""
     options = asked.chosen("draws")
-    answer = friso.check(asked.machine.stage, **options, progress=work.progress)
     pinned = None if asked.pinned is None else _check(asked.pinned)
+    work.notes.clear()
+    answer = friso.check(asked.machine.stage, **options, progress=work.progress)
     cases = {name: case.verdict for name, case in answer.result.items()}
     more = {"cases": _labelled(asked.machine.stage, cases), **_lines("check", asked, options)}
     yield parts_of(asked, answer, ghosts_of(pinned), **more)
@@ -115,6 +117,7 @@ def bode(asked: Asked, work: Work) -> Iterator[Part]:
     """The loop in the limit cases."""
     asked.chosen()
     pinned = None if asked.pinned is None else friso.bode(asked.pinned.stage)
+    work.notes.clear()
     answer = friso.bode(asked.machine.stage, progress=work.progress)
     yield parts_of(asked, answer, ghosts_of(pinned), **_lines("bode", asked))
 
@@ -124,6 +127,7 @@ def flexure(asked: Asked, work: Work) -> Iterator[Part]:
     asked.chosen()
     pinned = asked.pinned and asked.pinned.stage
     ghost = friso.flexure(pinned) if pinned and pinned.flexure else None
+    work.notes.clear()
     answer = friso.flexure(asked.machine.stage, progress=work.progress)
     drawing = answer.files()["flexure_drawing.svg"]
     yield parts_of(asked, answer, ghosts_of(ghost), drawing=drawing, **_lines("flexure", asked))
@@ -185,7 +189,8 @@ def identify(asked: Asked, work: Work) -> Iterator[Part]:
     """The machine that dropped logs show, with its uncertainties; with `assumed`, the one shown is what is known."""
     files, assigned = _dropped(asked)
     stage = asked.machine.stage if asked.options.get("assumed") is True else None
-    answer = friso.identify(files, stage=stage, **assigned, progress=work.progress)
+    beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
+    answer = friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
     stages = [] if answer.stage is None else [{"name": "identified", "toml": answer.stage.to_toml()}]
     yield parts_of(asked, answer, ways=stages)
 
@@ -221,6 +226,9 @@ QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[Part]]] = {
 }
 """The questions by name."""
 
+QUICK = frozenset({"machine"})
+"""The questions that compute nothing."""
+
 REPORTS: Mapping[str, Callable[..., Answer]] = {
     "check.zip": friso.check,
     "bode.zip": friso.bode,
@@ -246,7 +254,8 @@ def report(function: Callable[..., Answer], asked: Asked, work: Work) -> Iterato
 def _lines(command: str, asked: Asked, options: Mapping[str, Any] | None = None, function: str = "") -> Part:
     chosen = options or {}
     line = python_line(function or command, asked.machine, chosen)
-    return {"command": command_line(command, asked.machine, chosen), "python": line}
+    of = "the stage file saved here" if asked.machine.is_of_page else f"{asked.machine.name} as it was opened"
+    return {"command": command_line(command, asked.machine, chosen), "python": line, "of": of}
 
 
 @lru_cache(8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import webbrowser
 from pathlib import Path
@@ -36,23 +37,29 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
     own = listener.getsockname()[1]
     access = Access.at(host, own)
     named = f"[{host}]" if ":" in host else host
-    address = f"http://{named}:{own}/?token={access.token}"
-    print(f"friso app: {address}\nCtrl-C ends it.", flush=True)
+    address = f"http://{named}:{own}/?token="
+    print(f"friso app: {address}{access.token}\nCtrl-C ends it.", flush=True)
     if browser:
-        webbrowser.open(address)
-    config = uvicorn.Config(application(access, begin), log_level="warning", ws="none", lifespan="on")
+        webbrowser.open(f"{address}{access.token_for_once()}")
+    config = uvicorn.Config(
+        application(access, begin), log_level="warning", ws="none", lifespan="on", timeout_graceful_shutdown=1
+    )
     uvicorn.Server(config).run([listener])
 
 
 def _listener(host: str, port: int | None) -> socket.socket:
-    """A socket at a port that is free: the one asked for, or the next from the usual one on. Raises InputError."""
+    """A socket that listens at a port that is free: the one asked for, or the next from the usual one on. Raises
+    InputError."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     wanted = [port] if port is not None else [*range(PORT, PORT + TRIES)]
     problem = ""
     for number in wanted:
         listener = socket.socket(family)
         try:
+            if os.name == "posix":  # else the port stays taken for a minute after a server has ended
+                listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             listener.bind((host, number))
+            listener.listen()
             return listener
         except OSError as error:
             problem = str(error.strerror or error).lower()

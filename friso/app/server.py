@@ -16,8 +16,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import QUESTIONS, REPORTS, Asked, report
-from friso.app.uploads import MOST_BYTES as UPLOADED
+from friso.app.questions import QUESTIONS, QUICK, REPORTS, Asked, report
 from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
@@ -46,16 +45,19 @@ def application(access: Access, begin: dict[str, Any]) -> ASGIApp:
         except InputError as error:
             return _refused(str(error), 422)
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
-        return StreamingResponse(workshop.answer(page, lane, partial(job, asked)), media_type=BINARY)
+        frames = workshop.answer(page, lane, partial(job, asked), name in QUICK)
+        return StreamingResponse(frames, media_type=BINARY)
 
     async def started_with(request: Request) -> Response:
-        return JSONResponse({**begin, "most_bytes": UPLOADED})
+        return JSONResponse(begin)
 
     async def upload(request: Request) -> Response:
         try:
             return JSONResponse({"file": await uploads.keep(request.path_params["name"], request.stream())})
         except InputError as error:
             return _refused(str(error), 413)
+        except OSError as error:
+            return _refused(f"the file could not be kept: {str(error.strerror or error).lower()}", 507)
 
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import re
+import itertools
 import shutil
 import tempfile
 from collections.abc import AsyncIterable
 from pathlib import Path
 
+from friso.app.names import plain_name
 from friso.errors import InputError
 
 MOST_BYTES = 64_000_000
@@ -16,8 +17,6 @@ MOST_BYTES = 64_000_000
 MOST_FILES = 50
 """Files that are kept at most."""
 
-_OUTSIDE = re.compile(r"[^\w.+ -]")
-
 
 class Uploads:
     """The files by the names under which the page knows them. The page names no other file."""
@@ -25,13 +24,15 @@ class Uploads:
     def __init__(self) -> None:
         self.folder = Path(tempfile.mkdtemp(prefix="friso-app-"))
         self.files: dict[str, Path] = {}
+        self.numbers = itertools.count(1)
 
     async def keep(self, name: str, chunks: AsyncIterable[bytes]) -> str:
-        """Keep a file as it comes; the name by which it is asked for. Raises InputError for one that is too large."""
-        if len(self.files) >= MOST_FILES:
+        """Keep a file as it comes; the name by which it is asked for. Raises InputError for one that is too large, and
+        OSError for one that cannot be written."""
+        place = self.folder / str(next(self.numbers))  # several may come at the same time
+        if len([*self.folder.iterdir()]) >= MOST_FILES:
             raise InputError("file", f"more than {MOST_FILES} files", "a server that is started anew")
-        plain = _OUTSIDE.sub("_", Path(name.replace("\\", "/")).name).lstrip(".")[-100:] or "log"
-        place = self.folder / str(len(self.files) + 1)
+        plain = plain_name(name, "log")
         place.mkdir()
         size = 0
         try:

@@ -26,8 +26,8 @@ Job = Callable[["Work"], Iterator[dict[str, Any]]]
 OFTEN = 0.1
 """Seconds between two reports of progress."""
 
-THREADS = 4
-"""Questions at work at the same time."""
+THREADS = 16
+"""Questions at work at the same time: many of them wait, for a kernel or for what computes before them."""
 
 
 @dataclass(eq=False)
@@ -37,6 +37,8 @@ class Work:
     put: Callable[[dict[str, Any] | None], object]
     flag: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     last: float = 0.0
+    notes: list[str] = field(default_factory=list)
+    """Warnings so far, each once; they go with the answer."""
 
     def overtake(self) -> None:
         """End it, from another thread."""
@@ -55,15 +57,16 @@ class Work:
         token = _AT_WORK.set(self)
         try:
             with ended_by(self.flag):
+                go_on()
                 for part in job(self):
-                    self.put(part)
+                    self.put({**part, "notes": [*dict.fromkeys(self.notes)]})
         except Overtaken:
             self.put({"kind": "overtaken"})
         except InputError as error:
             self.put({"kind": "refused", "key": error.key, "text": str(error)})
         except Exception as error:  # a page is answered whatever happens; the terminal has the rest
             traceback.print_exc()
-            self.put({"kind": "failed", "text": f"the computation could not be completed: {error}"})
+            self.put({"kind": "failed", "key": "", "text": f"the computation could not be completed: {error}"})
         finally:
             _AT_WORK.reset(token)
             self.put(None)
@@ -73,8 +76,8 @@ _AT_WORK: ContextVar[Work | None] = ContextVar("work", default=None)
 
 
 class Messages(logging.Handler):
-    """Hands what friso logs to the question that is at work; what its helpers say in threads of theirs (a kernel that
-    is compiled) to all questions."""
+    """Hands what friso logs to the question that is at work: it stands below the answer; what is said in other threads,
+    and of kernels that are compiled, is passing, and is shown in all questions meanwhile."""
 
     def __init__(self, works: Workshop) -> None:
         super().__init__(logging.INFO)
@@ -83,6 +86,8 @@ class Messages(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Hand a message on."""
         work = _AT_WORK.get()
+        if work is not None and not record.name.startswith("friso.engine"):
+            work.notes.append(record.getMessage())
         for listener in [work] if work is not None else [*self.works.lanes.values()]:
             listener.put({"kind": "message", "text": record.getMessage()})
 
@@ -92,10 +97,12 @@ class Workshop:
 
     def __init__(self) -> None:
         self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app")
+        self.quick = ThreadPoolExecutor(2, thread_name_prefix="friso-app-quick")
         self.lanes: dict[tuple[str, str], Work] = {}
 
-    async def answer(self, page: str, lane: str, job: Job) -> AsyncIterator[bytes]:
-        """The frames of an answer, as they come. Whoever stops reading ends the work."""
+    async def answer(self, page: str, lane: str, job: Job, quick: bool = False) -> AsyncIterator[bytes]:
+        """The frames of an answer, as they come. Whoever stops reading ends the work. A `quick` question computes
+        nothing, and does not wait for those that do."""
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 
         def put(part: dict[str, Any] | None) -> None:
@@ -107,7 +114,7 @@ class Workshop:
             self.lanes[place].overtake()
         self.lanes[place] = work
         try:
-            loop.run_in_executor(self.pool, partial(copy_context().run, work.run, job))
+            loop.run_in_executor(self.quick if quick else self.pool, partial(copy_context().run, work.run, job))
             while (part := await parts.get()) is not None:
                 yield frame(part)
         finally:
@@ -129,4 +136,5 @@ class Workshop:
         """End everything."""
         for work in [*self.lanes.values()]:
             work.overtake()
-        self.pool.shutdown(wait=False, cancel_futures=True)
+        for pool in (self.pool, self.quick):
+            pool.shutdown(wait=False, cancel_futures=True)

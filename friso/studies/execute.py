@@ -10,6 +10,7 @@ from typing import Any, Self
 
 import numpy as np
 
+from friso.engine.overtaken import go_on
 from friso.studies.cells import Columns, run_cells
 from friso.studies.study import Block, Study
 
@@ -18,6 +19,9 @@ LARGEST_BLOCK = 2048
 
 CYCLES_BLOCK = 256
 """Cells of a block where cycles are wanted, for each of which a hundred runs are needed."""
+
+LOOK = 0.05
+"""How often [s] it is looked whether anybody still waits for blocks in flight."""
 
 PATIENCE = 10.0
 """How long [s] blocks in flight are waited for that have been told to end."""
@@ -48,18 +52,19 @@ class Crew:
         """The measures of blocks of studies, in the order in which they are done.
 
         No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends
-        this early (Ctrl-C among it) cancels the blocks in flight.
+        this early (Ctrl-C among it) cancels the blocks in flight. Raises Overtaken once nobody waits for them.
         """
         self.cancel[0] = 0
         upcoming = iter(jobs)
         flying: dict[Future[Columns], tuple[Study, Block]] = {}
         try:
             while True:
+                go_on()
                 while len(flying) < 2 * self.size and (job := next(upcoming, None)):
                     flying[self._submit(*job)] = job
                 if not flying:
                     return
-                for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                for future in wait(flying, LOOK, FIRST_COMPLETED).done:
                     yield *flying.pop(future), self._result(future)
         finally:
             self.cancel[0] = 1
