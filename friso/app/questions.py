@@ -192,7 +192,15 @@ def identify(asked: Asked, work: Work) -> Iterator[Part]:
     beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
     answer = friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
     stages = [] if answer.stage is None else [{"name": "identified", "toml": answer.stage.to_toml()}]
+    if stages and answer.result.correlations.keys:
+        work.notes.append(CORRELATED)
     yield parts_of(asked, answer, ways=stages)
+
+
+CORRELATED = (
+    "The correlations of the estimates are left out here, and of a machine that is taken over: "
+    "friso identify on the command line writes them beside its stage file."
+)
 
 
 def _dropped(asked: Asked) -> tuple[list[Path], dict[str, Any]]:

@@ -1,5 +1,6 @@
 // The answer: a sentence per case, with its margin as soon as that is there; progress; and the history of answers.
 import { $, el } from "./dom.js";
+import { paragraphs } from "./tables.js";
 
 const history = [];
 const MOST = 200;
@@ -24,6 +25,7 @@ export function whole(answer) {
     if (word) cases.push(sentence(text, word));
     else rest.append(el("p", { class: "note" }, text));
   }
+  rest.append(...paragraphs(answer.notes));
   $("answer").replaceChildren(...cases, rest, line());
 }
 

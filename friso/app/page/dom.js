@@ -22,6 +22,9 @@ function filled(element, attributes, children) {
   return element;
 }
 
+/** A random text. Pages that come unencrypted from another machine have no crypto.randomUUID. */
+export const token = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (number) => number.toString(36)).join("");
+
 /** "limiter_stiffness" as words. */
 export const words = (key) => {
   const text = key.slice(key.lastIndexOf(".") + 1).replaceAll("_", " ");

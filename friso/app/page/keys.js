@@ -6,6 +6,20 @@ const QUANTITY = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(\S.*)?$/i;
 const STEPS = 1000;
 const ranges = new Map();
 
+/** A value as it is written: its unit, and how large that is in SI; of an uncertain one, whose centre is used, in SI. */
+function written(key) {
+  const parts = key.plain ? QUANTITY.exec(String(key.value)) : null;
+  const number = Number(parts?.[1]);
+  return number ? { unit: parts[2] ?? "", factor: key.si / number } : { unit: key.unit ?? "", factor: 1 };
+}
+
+/** A value [SI] of a key in the unit in which it is written. */
+export function worded(key, si, digits = 6) {
+  const { unit, factor } = written(key);
+  const number = Number((si / factor).toPrecision(digits));
+  return typeof key.value === "number" ? number : `${number} ${unit}`.trim();
+}
+
 /** Where sliders go is settled when a machine is opened: they do not move under the hand. */
 export const forgetRanges = () => ranges.clear();
 
@@ -63,28 +77,20 @@ function row(key, machine, changed, wrong, tell) {
 }
 
 function field(key, id, tell) {
-  const bare = typeof key.value === "number";
   const value = key.value === undefined || key.value === null ? "" : String(key.value);
   const read = (text) => (text.trim() === "" ? null : !key.unit && Number.isFinite(Number(text)) ? Number(text) : text.trim());
   const input = el("input", { id, type: "text", value, placeholder: `e.g. ${key.example}`, autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-help` });
   input.addEventListener("change", () => tell.set(key.path, read(input.value)));
-  const parts = QUANTITY.exec(value);
-  if (!parts || !key.range || (!bare && !parts[2])) return [input];
+  if (!key.plain || !key.range || !QUANTITY.test(value)) return [input];
   if (!ranges.has(key.path) || !inside(ranges.get(key.path), key.si)) ranges.set(key.path, key.range);
   const range = ranges.get(key.path);
-  const number = Number(parts[1]);
-  const factor = number === 0 ? 1 : key.si / number;
-  const unit = number === 0 && key.unit ? key.unit : parts[2];
   const slider = el("input", { type: "range", min: 0, max: STEPS, value: place(range, key.si), "aria-label": `${words(key.path)}, slider` });
-  const now = () => {
-    const rounded = Number((at(range, slider.value) / factor).toPrecision(4));
-    return bare ? rounded : `${rounded} ${unit}`;
-  };
+  slider.addEventListener("pointerdown", tell.hold);
   slider.addEventListener("input", () => {
-    input.value = now();
-    tell.set(key.path, now(), true);
+    input.value = worded(key, at(range, slider.value), 4);
+    tell.set(key.path, worded(key, at(range, slider.value), 4), true);
   });
-  slider.addEventListener("change", () => tell.set(key.path, now()));
+  slider.addEventListener("change", tell.release);
   return [input, slider];
 }
 

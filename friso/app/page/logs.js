@@ -1,6 +1,8 @@
 // Logs: dropped files, their channels with roles, and the machine that they show.
 import { el } from "./dom.js";
 import { shownAnswer } from "./long.js";
+import { paragraphs } from "./tables.js";
+import { hand } from "./wire.js";
 
 const LARGEST = 64e6;
 
@@ -8,28 +10,29 @@ export class Logs {
   constructor(sent, tell) {
     Object.assign(this, { sent, tell, files: [], roles: new Map() });
     this.input = el("input", { type: "file", id: "log-files", multiple: true, "aria-label": "Logs", onchange: () => this.add([...this.input.files]) });
-    this.status = el("p", { class: "status", role: "status" });
+    this.status = el("div", { class: "status", role: "status" });
     this.form = el("div", { class: "form" });
     this.result = el("div", {});
     this.place = el("div", {}, el("div", { class: "drop" }, "Drop logs here (CSV, TwinCAT, MAT, TDMS, UFF58, LVM), or choose them: ", this.input), this.status, this.form, this.result);
   }
 
   async add(files) {
+    const problems = [];
     for (const file of files) {
-      if (file.size > LARGEST) {
-        this.status.textContent = `${file.name} has ${Math.round(file.size / 1e6)} MB, at most ${LARGEST / 1e6} MB are taken here: friso identify on the command line takes larger ones.`;
-        return;
+      try {
+        this.files.push({ name: file.name, id: await this.kept(file) });
+      } catch (error) {
+        problems.push(`${file.name}: ${error.message}.`);
       }
-      const response = await fetch(`logs/${encodeURIComponent(file.name)}`, { method: "POST", body: file });
-      const said = await response.json();
-      if (!response.ok) {
-        this.status.textContent = said.text;
-        return;
-      }
-      this.files.push({ name: file.name, id: said.file });
     }
-    this.status.textContent = this.files.map((file) => file.name).join(", ");
-    this.look();
+    this.status.replaceChildren(...paragraphs([this.files.map((file) => file.name).join(", "), ...problems]));
+    if (this.files.length) this.look();
+  }
+
+  kept(file) {
+    if (file.size <= LARGEST) return hand(file);
+    const size = `${Math.round(file.size / 1e6)} MB, at most ${LARGEST / 1e6} MB are taken here`;
+    throw new Error(`${size}: friso identify on the command line takes larger ones`);
   }
 
   options(more = {}) {
@@ -37,7 +40,7 @@ export class Logs {
   }
 
   async look() {
-    const answer = await shownAnswer(this.result, "logs", () => this.options(), this.tell);
+    const answer = await shownAnswer(this.result, "logs", "logs", () => this.options(), this.tell);
     if (answer) this.fields(answer);
   }
 
@@ -53,7 +56,7 @@ export class Logs {
     };
     this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
     this.assumed = el("input", { type: "checkbox", id: "assumed" });
-    const start = () => shownAnswer(this.result, "identify", () => this.options({ assumed: this.assumed.checked }), this.tell);
+    const start = () => shownAnswer(this.result, "logs", "identify", () => this.options({ assumed: this.assumed.checked }), this.tell);
     this.form.replaceChildren(
       ...roles.map(choice),
       el("label", {}, "sample time", this.dt),

@@ -4,12 +4,12 @@ import { draw } from "./plot.js";
 import { paragraphs, table } from "./tables.js";
 import { ask, end } from "./wire.js";
 
-/** Ask, and show progress and answer in a place; resolves to the answer, or null. */
-export async function shownAnswer(place, question, body, tell) {
+/** Ask on a lane, and show progress and answer in a place; resolves to the answer, or null. */
+export async function shownAnswer(place, lane, question, body, tell) {
   const status = el("p", { class: "status", role: "status" }, "…");
-  const stop = el("button", { type: "button", onclick: () => { end("long"); place.replaceChildren(); } }, "Stop");
+  const stop = el("button", { type: "button", onclick: () => { end(lane); place.replaceChildren(); } }, "Stop");
   place.replaceChildren(status, stop);
-  const answer = await ask(question, body(), "long", (part) => {
+  const answer = await ask(question, body(), lane, (part) => {
     if (part.kind === "progress") {
       const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
       status.replaceChildren(bar, part.label);
@@ -23,7 +23,7 @@ export async function shownAnswer(place, question, body, tell) {
   const take = ({ name, toml }) => el("button", { type: "button", class: "take", onclick: () => tell.take(name, toml) }, `Take over: ${name}`);
   const plots = el("div", {});
   place.replaceChildren(
-    ...paragraphs([...answer.sentences, answer.failure].filter(Boolean)),
+    ...paragraphs([...answer.sentences, answer.failure, ...answer.notes].filter(Boolean)),
     el("div", { class: "form" }, ...(answer.ways ?? []).map(take)),
     ...answer.tables.map(table),
     plots,

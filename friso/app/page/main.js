@@ -2,12 +2,12 @@
 import * as answers from "./answer.js";
 import { $, el } from "./dom.js";
 import { drawing } from "./drawing.js";
-import { edit, forgetRanges, keys } from "./keys.js";
+import { edit, forgetRanges, keys, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
 import * as machines from "./state.js";
 import { tour } from "./tour.js";
-import { ask, end, Live, onReach } from "./wire.js";
+import { ask, end, first, Live, onReach } from "./wire.js";
 
 const CHECKED_AFTER = 500;
 let shown = null; // the machine as the server describes it
@@ -16,6 +16,7 @@ let wrong = null;
 let answer = null;
 let timer = 0;
 let held = "";
+let begun = false;
 
 const sent = () => ({ machine: machines.sent(), pinned: machines.pinned() });
 const set = (values, dragged = false) => machines.set(values, dragged);
@@ -24,7 +25,7 @@ const pictures = new Pictures(sent, {
   set: (values) => set(withUnits(values)),
   progress: answers.progress,
   shown: (part) => (answer = part),
-  take: (name, toml) => machines.add(`${name.replaceAll(" ", "_")}.toml`, toml),
+  take: (name, toml) => machines.add(`${name.replaceAll(" ", "_")}.toml`, toml, true),
   check,
 });
 
@@ -41,9 +42,7 @@ function withUnits(values) {
   return Object.fromEntries(
     Object.entries(values).map(([path, si]) => {
       const key = all.find((item) => item.path === path);
-      const [, number, unit] = /^\s*(\S+)\s+(.*)$/.exec(key.value) ?? [];
-      const factor = Number(number) ? key.si / Number(number) : 1;
-      return [path, Number(number) ? `${Number((si / factor).toPrecision(6))} ${unit}` : `${si} ${key.unit}`];
+      return [path, worded(key, si)];
     }),
   );
 }
@@ -54,6 +53,7 @@ function changed(dragged) {
   if (!machine) return;
   clearTimeout(timer);
   end("check");
+  answer = null;
   answers.progress(null);
   if (shown && held === machine.text && !wrong) {
     follow(dragged);
@@ -83,7 +83,7 @@ function described(part) {
     return;
   }
   if (part.kind !== "answer") return;
-  const first = wrong !== null || held !== machines.current().text;
+  const another = wrong !== null || held !== machines.current().text;
   wrong = null;
   shown = part;
   if (held !== machines.current().text) {
@@ -94,9 +94,9 @@ function described(part) {
   left();
   pictures.machine = part;
   pictures.bar();
-  if (first) follow(false);
+  if (another) follow(machines.dragging());
   clearTimeout(timer);
-  timer = setTimeout(check, CHECKED_AFTER);
+  if (!machines.dragging()) timer = setTimeout(check, CHECKED_AFTER);
 }
 
 async function check() {
@@ -118,9 +118,12 @@ function redraw() {
 
 function left() {
   redraw();
+  if (machines.dragging()) return; // the slider would go from under the hand; letting go asks again
   keys($("keys"), shown, chosen, machines.changes(), wrong, {
     set: (path, value, dragged = false) => set({ [path]: value }, dragged),
-    edit: () => edit(shown.toml, (text) => machines.add(machines.current().name, text)),
+    hold: machines.hold,
+    release: machines.release,
+    edit: () => edit(shown.toml, (text) => machines.add(machines.current().name, text, true)),
   });
 }
 
@@ -147,12 +150,13 @@ function bar() {
 const undo = () => machines.go(machines.current().step - 1);
 const redo = () => machines.go(machines.current().step + 1);
 
-async function opened(file) {
-  if (file.name.endsWith(".toml") && file.size < 4e6) machines.add(file.name, await file.text());
-  else {
-    pictures.show("logs");
-    pictures.own.logs.add([file]);
-  }
+async function opened(files) {
+  const isStage = (file) => file.name.endsWith(".toml") && file.size < 4e6;
+  for (const file of files.filter(isStage)) machines.add(file.name, await file.text());
+  const logs = files.filter((file) => !isStage(file));
+  if (!logs.length) return;
+  pictures.show("logs");
+  pictures.own.logs.add(logs);
 }
 
 function trouble(text) {
@@ -165,7 +169,7 @@ function wire() {
   $("redo").addEventListener("click", redo);
   $("pin").addEventListener("click", () => machines.pin());
   $("open").addEventListener("click", () => $("file").click());
-  $("file").addEventListener("change", () => [...$("file").files].forEach(opened));
+  $("file").addEventListener("change", () => opened([...$("file").files]));
   $("tour").addEventListener("click", () => tour());
   $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer, link: machines.link, files: report }));
   document.addEventListener("keydown", (event) => {
@@ -181,11 +185,14 @@ function wire() {
   document.addEventListener("drop", (event) => {
     event.preventDefault();
     trouble("");
-    [...event.dataTransfer.files].forEach(opened);
+    opened([...event.dataTransfer.files]);
   });
+  for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, machines.release);
+  window.addEventListener("hashchange", linked);
   onReach((there, text) => {
     trouble(there ? "" : text);
-    if (there) changed(false);
+    if (there && begun) changed(false);
+    else if (there) begin();
   });
   machines.onChange(changed);
 }
@@ -200,18 +207,27 @@ async function report(part) {
   return "Saved.";
 }
 
+/** The machine of a link, if there is one. */
+async function linked() {
+  if (!location.hash) return false;
+  const is = await machines.fromLink(location.hash);
+  history.replaceState(null, "", location.pathname);
+  trouble(is ? "" : "The link does not hold a machine; perhaps a part of it is missing.");
+  return is;
+}
+
 async function begin() {
-  wire();
-  machines.restore();
-  const linked = await machines.fromLink(location.hash);
-  if (linked) history.replaceState(null, "", location.pathname);
-  const given = await (await fetch("begin")).json();
+  const given = await first();
+  if (!given) return;
+  begun = true;
   const there = machines.state.machines;
   const known = there.findIndex((item) => item.name === given.name && item.text === given.text);
-  const wanted = !linked && (given.asked || !there.length);
+  const wanted = !(await linked()) && (given.asked || !there.length);
   if (wanted && known < 0) machines.add(given.name, given.text);
   else if (wanted) machines.show(known);
   else changed(false);
 }
 
+wire();
+machines.restore();
 begin();

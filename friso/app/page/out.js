@@ -10,21 +10,22 @@ export function save(name, content, type) {
 /** The dialog; `machine` with its TOML, `answer` what is shown, `link` makes a link, `files` asks for a report. */
 export function out({ machine, answer, link, files }) {
   const name = machine.name.replace(/\.toml$/, "");
-  const copy = (text) => el("button", { type: "button", onclick: () => navigator.clipboard.writeText(text) }, "Copy");
+  const status = el("p", { class: "status", role: "status" });
+  const copied = async (text) => {
+    // a page that comes unencrypted from another machine has no clipboard
+    const done = await navigator.clipboard?.writeText(text).then(() => true, () => false);
+    status.textContent = `${done ? "Copied" : "To be copied"}: ${text}`;
+  };
+  const copy = (text) => el("button", { type: "button", onclick: () => copied(text) }, "Copy");
   const stage = el("button", { type: "button", onclick: () => save(`${name}.toml`, machine.toml, "application/toml") }, "Stage file");
   const share = el("button", { type: "button" }, "Link that holds the machine");
-  const status = el("p", { class: "status" });
-  share.addEventListener("click", async () => {
-    const text = await link();
-    await navigator.clipboard.writeText(text).catch(() => {});
-    status.textContent = `Copied: ${text}`;
-  });
+  share.addEventListener("click", async () => copied(await link()));
   const report = el("button", { type: "button" }, "Report, figures and data (ZIP)");
   report.addEventListener("click", async () => {
     status.textContent = "The report is being made …";
     const made = await files((part) => (status.textContent = part.label ?? part.text ?? ""));
     status.textContent = made ?? "";
   });
-  const lines = answer?.command ? [el("h3", {}, "The same on the command line"), el("pre", {}, answer.command), copy(answer.command), el("h3", {}, "and in Python"), el("pre", {}, answer.python), copy(answer.python)] : [];
+  const lines = answer?.command ? [el("h3", {}, `The same on the command line, of ${answer.of}`), el("pre", {}, answer.command), copy(answer.command), el("h3", {}, "and in Python"), el("pre", {}, answer.python), copy(answer.python)] : [];
   dialog("Out", el("div", { class: "row" }, stage, share, report), status, ...lines);
 }

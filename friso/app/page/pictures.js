@@ -1,5 +1,6 @@
 // The pictures of the answer, in tabs: each asks its own question.
 import { $, el, words } from "./dom.js";
+import { worded } from "./keys.js";
 import { Logs } from "./logs.js";
 import { clear, draw, stale } from "./plot.js";
 import { Remedies } from "./remedies.js";
@@ -116,10 +117,10 @@ export class Pictures {
     }
     if (answer.kind !== "partly") this.tell.progress(null);
     this.answer = answer;
-    draw(this.plots, answer.figures, (what, name, point) => this.pointed(what, name, point));
+    draw(this.plots, answer.figures, (point) => this.clicked(point));
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = answer.drawing ? [this.drawn(answer.drawing)] : [];
-    this.below.replaceChildren(...paragraphs(words), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
+    this.below.replaceChildren(...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
     this.tell.shown(answer);
   }
 
@@ -157,12 +158,8 @@ export class Pictures {
     const [low, high] = ["from", "to"].map((end) => el("input", { id: `${name}-${end}`, type: "text" }));
     const fill = () => {
       const item = numeric.find((one) => one.path === key.value);
-      const [, number, unit] = /^\s*(\S+)\s+(.*)$/.exec(item.value) ?? [];
-      const value = Number(number);
-      if (Number.isFinite(value)) {
-        low.value = `${Number((value / 4).toPrecision(3))} ${unit}`;
-        high.value = `${Number((value * 4).toPrecision(3))} ${unit}`;
-      }
+      low.value = worded(item, item.si / 4, 3);
+      high.value = worded(item, item.si * 4, 3);
     };
     key.addEventListener("change", fill);
     fill();
@@ -171,8 +168,8 @@ export class Pictures {
   }
 
   /** A cell was clicked: the machine is set there. */
-  pointed(what, name, point) {
-    if (what !== "click" || this.shown !== "map" || !this.answer?.places || !point.data.z) return;
+  clicked(point) {
+    if (this.shown !== "map" || !this.answer?.places || !point.data.z) return;
     const [row, column] = point.pointIndex;
     const { axes, places } = this.answer;
     this.tell.set({ [axes.x]: places.x[column], [axes.y]: places.y[row] });

@@ -40,10 +40,7 @@ function plot(place, figure, tell) {
   place.style.height = `${layout.height}px`;
   const [data, shown] = dark.matches ? [themed(figure.data), themed(layout)] : [figure.data, layout];
   Plotly.react(place, data, shown, CONFIG);
-  if (fresh) {
-    place.on("plotly_click", (event) => tell("click", figure.name, event.points[0]));
-    place.on("plotly_hover", (event) => tell("hover", figure.name, event.points[0]));
-  }
+  if (fresh) place.on("plotly_click", (event) => tell(event.points[0]));
 }
 
 function remove(child) {

@@ -8,7 +8,7 @@ export class Remedies {
     const only = el("select", { id: "only" }, ...["", "controller", "joint"].map((word) => el("option", { value: word }, word || "anything")));
     this.result = el("div", {});
     const start = (question, options) =>
-      shownAnswer(this.result, question, () => ({ ...sent(), options: options() }), tell);
+      shownAnswer(this.result, "remedies", question, () => ({ ...sent(), options: options() }), tell);
     const tune = el("button", { type: "button", id: "tune", onclick: () => start("tune", () => ({ within: within.value, only: only.value })) }, "Find the least change");
     const design = el("button", { type: "button", id: "design", onclick: () => start("design", () => ({})) }, "Design an isolator");
     this.place = el(

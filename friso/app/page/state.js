@@ -1,5 +1,9 @@
 // The machines of the page: several in tabs, each with its history. All state lives here, and survives a server.
-const STORE = "friso-machines";
+// Tabs of the browser keep theirs each; a new one begins with what was kept last.
+import { token } from "./dom.js";
+
+const STORE = "friso-machines-";
+const MOST_KEPT = 10;
 const listeners = [];
 
 export const state = { machines: [], shown: 0, pinned: null };
@@ -15,65 +19,65 @@ function changed(dragged = false) {
 export const current = () => state.machines[state.shown];
 export const changes = (machine = current()) => machine.steps[machine.step];
 /** What is sent of a machine. */
-export const sent = (machine = current()) => ({ name: machine.name, text: machine.text, changes: changes(machine) });
+export const sent = (machine = current()) => ({ name: machine.name, text: machine.text, made: machine.made, changes: changes(machine) });
 export const pinned = () => state.pinned;
 
-export function add(name, text, given = {}) {
-  state.machines.push({ name, text, steps: [given], step: 0 });
+/** Add a machine; `made`: on the page, there is no file of it. */
+export function add(name, text, made = false, given = {}) {
+  drag = null;
+  state.machines.push({ name, text, made, steps: [given], step: 0 });
   state.shown = state.machines.length - 1;
   changed();
 }
 
 export function show(number) {
+  drag = null;
   state.shown = number;
   changed();
 }
 
 export function close(number) {
+  drag = null;
   state.machines.splice(number, 1);
   state.shown = Math.max(0, Math.min(state.shown - (number < state.shown ? 1 : 0), state.machines.length - 1));
   changed();
 }
 
+/** While a slider is held: the keys before, and whether it has moved; until it is let go, all is one step. */
 let drag = null;
+
+export const dragging = () => drag !== null;
+
+/** A slider is taken hold of. */
+export function hold() {
+  drag ??= { before: changes(), moved: false };
+}
+
+/** It is let go, wherever that is. */
+export function release() {
+  if (!drag) return;
+  drag = null;
+  changed();
+}
 
 /** Set keys; `dragged`: not yet for good. */
 export function set(values, dragged = false) {
   const machine = current();
-  const before = drag?.machine === machine ? drag.before : changes(machine);
-  const next = { ...before, ...values };
-  if (dragged) {
-    if (!drag) {
-      machine.steps.length = machine.step + 1;
-      machine.steps.push(next);
-      machine.step += 1;
-      drag = { machine, before };
-    }
-    machine.steps[machine.step] = next;
-  } else {
-    if (drag?.machine === machine) machine.steps[machine.step] = next;
-    else {
-      machine.steps.length = machine.step + 1;
-      machine.steps.push(next);
-      machine.step += 1;
-    }
-    drag = null;
+  if (dragged) hold();
+  const next = { ...(drag?.before ?? changes(machine)), ...values };
+  if (drag?.moved) machine.steps[machine.step] = next;
+  else {
+    machine.steps.length = machine.step + 1;
+    machine.steps.push(next);
+    machine.step += 1;
   }
+  if (dragged) drag.moved = true;
+  else drag = null;
   changed(dragged);
 }
 
-/** Take back the last step for good: what was refused. */
-export function drop() {
-  const machine = current();
-  if (machine.step > 0) {
-    machine.steps.splice(machine.step, 1);
-    machine.step -= 1;
-    drag = null;
-    changed();
-  }
-}
-
 export function go(step) {
+  drag = null;
   const machine = current();
   machine.step = Math.max(0, Math.min(step, machine.steps.length - 1));
   changed();
@@ -88,7 +92,8 @@ export function pin() {
 
 function save() {
   try {
-    localStorage.setItem(STORE, JSON.stringify(state));
+    sessionStorage.friso ??= token();
+    localStorage.setItem(STORE + sessionStorage.friso, JSON.stringify({ ...state, at: Date.now() }));
   } catch {
     // a browser that keeps nothing
   }
@@ -96,12 +101,21 @@ function save() {
 
 export function restore() {
   try {
-    const kept = JSON.parse(localStorage.getItem(STORE));
-    if (kept?.machines?.length) Object.assign(state, kept);
+    const names = Object.keys(localStorage).filter((name) => name.startsWith(STORE));
+    const all = names.map((name) => ({ name, kept: JSON.parse(localStorage.getItem(name)) })).sort((one, other) => other.kept.at - one.kept.at);
+    for (const { name } of all.slice(MOST_KEPT)) localStorage.removeItem(name);
+    const own = all.find(({ name }) => name === STORE + sessionStorage.friso) ?? all[0];
+    if (!own) return;
+    const { machines, shown, pinned: kept } = own.kept;
+    if (!machines.length || !machines.every(isMachine)) return;
+    Object.assign(state, { machines, pinned: kept, shown: machines[shown] ? shown : 0 });
   } catch {
     // nothing is kept
   }
 }
+
+const isChanges = (value) => value !== null && typeof value === "object" && !Array.isArray(value) && Object.values(value).every((item) => item === null || typeof item !== "object");
+const isMachine = ({ name, text, steps, step }) => typeof name === "string" && typeof text === "string" && steps.every(isChanges) && isChanges(steps[step]);
 
 /** A link that holds the machine: behind #, which browsers send nowhere. */
 export async function link() {
@@ -116,7 +130,8 @@ export async function fromLink(hash) {
     const text = atob(hash.slice(1).replaceAll("-", "+").replaceAll("_", "/"));
     const bytes = await through(new DecompressionStream("deflate-raw"), Uint8Array.from(text, (c) => c.charCodeAt(0)));
     const { name, text: toml, changes: given } = JSON.parse(new TextDecoder().decode(bytes));
-    add(String(name), String(toml), given);
+    if (typeof toml !== "string" || !isChanges(given ?? {})) return false;
+    add(String(name), toml, true, given ?? {});
     return true;
   } catch {
     return false;

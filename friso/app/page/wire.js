@@ -1,5 +1,7 @@
 // Questions to the server. A newer question on a lane overtakes the one before it; answers come in frames, see frames.py.
-const page = crypto.randomUUID();
+import { token } from "./dom.js";
+
+const page = token();
 const lanes = new Map();
 
 /** Ask a question; `part` is called with every part of the answer. Resolves to the last part, or null if overtaken. */
@@ -37,11 +39,38 @@ export const end = (lane) => lanes.get(lane)?.abort();
 
 async function refusal(response) {
   if (response.status === 403) {
-    reached(false, "The server was started anew: open the address that it printed. What is on this page is kept.");
+    reached(false, ANEW);
     return null;
   }
-  const { text } = await response.json();
-  return { kind: "refused", key: "", text };
+  return { kind: "refused", key: "", text: await reason(response) };
+}
+
+/** Why the server refused something. */
+async function reason(response) {
+  return (await response.json().catch(() => ({}))).text ?? `The server answered ${response.status}.`;
+}
+
+/** Hand a file to the server; resolves to the name it has there, or throws what is wrong. */
+export async function hand(file) {
+  const response = await fetch(`logs/${encodeURIComponent(file.name)}`, { method: "POST", body: file }).catch((error) => {
+    reached(false);
+    throw error;
+  });
+  if (response.status === 403) reached(false, ANEW);
+  if (!response.ok) throw new Error(await reason(response));
+  return (await response.json()).file;
+}
+
+/** The stage file that the server begins with; null while it cannot be reached. */
+export async function first() {
+  try {
+    const response = await fetch("begin");
+    if (response.ok) return await response.json();
+    reached(false, response.status === 403 ? ANEW : GONE);
+  } catch {
+    reached(false);
+  }
+  return null;
 }
 
 async function* frames(reader) {
@@ -85,7 +114,10 @@ let looking = null;
 /** Be told when the server goes and comes back: with whether it is there, and a text. */
 export const onReach = (listener) => listeners.push(listener);
 
-function reached(now, text = "The server does not answer. What is on this page is kept; it goes on when the server is back.") {
+const GONE = "The server does not answer. What is on this page is kept; it goes on when the server is back.";
+const ANEW = "The server was started anew: open the address that it printed. What is on this page is kept.";
+
+function reached(now, text = GONE) {
   if (now === there && now) return;
   there = now;
   listeners.forEach((listener) => listener(now, text));
@@ -95,6 +127,7 @@ function reached(now, text = "The server does not answer. What is on this page i
 async function look() {
   try {
     const response = await fetch("begin");
+    if (response.status === 403) return reached(false, ANEW);
     if (!response.ok) return;
     clearInterval(looking);
     looking = null;

@@ -1,0 +1,16 @@
+"""Names that a page gives to files, as this machine takes them."""
+
+from __future__ import annotations
+
+import re
+
+_OUTSIDE = re.compile(r"[^\w.+ -]")
+
+LONGEST = 150
+"""Bytes of a name at most; file systems take 255, and files beside this one get longer names."""
+
+
+def plain_name(name: str, otherwise: str) -> str:
+    """The last part of a name without what leads elsewhere, hides a file, or reads as an option of a command."""
+    last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
+    return last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ") or otherwise
