@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
 import base64
+import errno
 import http.client
 import io
 import json
@@ -10,10 +12,11 @@ import struct
 import threading
 import time
 import zipfile
-from collections.abc import Iterator
+from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -22,9 +25,15 @@ import uvicorn
 import friso
 from friso.app import uploads
 from friso.app.gate import Access
+from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, shown
 from friso.app.server import application
+from friso.app.work import Workshop
 from friso.engine.overtaken import Overtaken, ended_by, go_on
+from friso.errors import LogError
+from friso.studies.execute import local_crew
+from friso.studies.request import Request
+from friso.studies.sweep import run_in_memory
 from friso.views.drawing import matplotlib_renderer
 from friso.views.drawing.drawable import drawable
 
@@ -125,6 +134,18 @@ def test_a_rebound_name_is_refused(served: Served, host: str | None) -> None:
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
+def test_a_token_for_once_is_taken_once(served: Served) -> None:
+    path = f"/?token={served.access.token_for_once()}"
+    assert [served.request("GET", path, Cookie=None)[0] for _ in range(2)] == [303, 403]
+
+
+def test_at_the_usual_port_browsers_leave_it_out() -> None:
+    access = Access.at("127.0.0.1", 80)
+    assert access.is_host("localhost")
+    assert access.is_origin("http://127.0.0.1")
+    assert not Access.at("127.0.0.1", 8741).is_host("localhost")
+
+
 def test_a_foreign_page_is_refused(served: Served, origin: str) -> None:
     assert served.request("POST", "/ask/machine", b"{}", Origin=origin)[0] == 403
     assert served.request("GET", "/begin", Sec_Fetch_Site="cross-site")[0] == 403
@@ -203,6 +224,63 @@ def test_logs_are_kept_under_names_of_the_server_and_no_others_are_read(served: 
     assert served.request("POST", "/logs/x.csv", log, Origin="http://evil.example")[0] == 403
 
 
+def test_no_mapping_of_the_user_s_has_a_say_in_what_was_dropped(
+    served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A mapping is kept beside a log of the same name, in the folder where the server was started."""
+    (tmp_path / "mine.csv.friso.toml").write_text('not = "a mapping"', encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    log = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
+    with pytest.raises(LogError, match=r"mine\.csv\.friso\.toml"):
+        identify_logs(tmp_path, log)
+    kept = json.loads(served.request("POST", "/logs/mine.csv", log)[2])["file"]
+    for question in ("logs", "identify"):
+        assert "friso.toml" not in str(served.ask(question, RIG, files=[kept]))
+
+
+def identify_logs(folder: Path, log: bytes) -> None:
+    """What the command line does with a log that is elsewhere."""
+    (folder / "elsewhere").mkdir()
+    (folder / "elsewhere" / "mine.csv").write_bytes(log)
+    friso.identify(folder / "elsewhere" / "mine.csv")
+
+
+def test_logs_that_come_at_the_same_time_are_both_kept() -> None:
+    kept = uploads.Uploads()
+
+    async def half(text: bytes, other: asyncio.Event, own: asyncio.Event) -> AsyncIterator[bytes]:
+        own.set()
+        await other.wait()
+        yield text
+
+    async def both() -> list[str]:
+        one, other = asyncio.Event(), asyncio.Event()
+        return await asyncio.gather(
+            kept.keep("a.csv", half(b"1", other, one)), kept.keep("a.csv", half(b"2", one, other))
+        )
+
+    try:
+        assert [kept.path(name).read_bytes() for name in asyncio.run(both())] == [b"1", b"2"]
+    finally:
+        kept.remove()
+
+
+@pytest.mark.parametrize("name", ["ä" * 300 + ".csv", "x" * 300 + ".csv"])
+def test_a_long_name_is_shortened(served: Served, name: str) -> None:
+    status, _, content = served.request("POST", f"/logs/{quote(name)}", b"1")
+    assert status == 200
+    assert json.loads(content)["file"].endswith(".csv")
+
+
+def test_a_disk_that_is_full_is_said_so(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def full(*_: object) -> str:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(uploads.Uploads, "keep", full)
+    status, _, content = served.request("POST", "/logs/x.csv", b"1")
+    assert (status, "space" in json.loads(content)["text"]) == (507, True)
+
+
 def test_a_log_that_is_too_large_is_refused_and_not_kept(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(uploads, "MOST_BYTES", 100)
     status, _, content = served.request("POST", "/logs/large.csv", 1000 * b"1")
@@ -271,7 +349,63 @@ def test_changes_become_the_command_that_gives_the_same(served: Served) -> None:
     assert part["python"] == "friso.simulate('lugre_stick_slip.toml', set={'masses.stage': '1.1 kg'})"
 
 
+def test_of_a_machine_made_on_the_page_the_lines_are_those_of_the_file_saved_there() -> None:
+    text = STICK_SLIP.read_text(encoding="utf-8")
+    opened = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg"}})
+    assert command_line("check", opened, {}) == "friso check a.toml --set 'masses.stage=2 kg'"
+    made = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg"}, "made": True})
+    without = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg", "motion.jerk": None}})
+    for machine in (made, without):
+        assert command_line("check", machine, {}) == "friso check a.toml"
+        assert python_line("check", machine, {}) == "friso.check('a.toml')"
+
+
+@pytest.mark.parametrize(
+    ("name", "plain"),
+    [
+        ("../../x.toml", "x.toml"),
+        ("--out=x", "out_x"),
+        ("", "stage.toml"),
+        ("..", "stage.toml"),
+        ('a/"b\n.toml', "_b_.toml"),
+    ],
+)
+def test_the_name_of_a_machine_is_that_of_a_file(name: str, plain: str) -> None:
+    assert Machine.of({"text": "", "name": name}).name == plain
+
+
+def test_an_uncertain_value_is_shown_as_one(served: Served) -> None:
+    (part,) = served.ask("machine", STICK_SLIP, {"masses.stage": "1 kg .. 1.2 kg"})
+    key = next(key for table in part["tables"] for key in table["keys"] if key["path"] == "masses.stage")
+    assert (key["plain"], key["si"], key["unit"]) == (False, pytest.approx(1.1), "kg")
+
+
+def test_warnings_go_with_the_answer_every_time(served: Served) -> None:
+    for _ in range(2):
+        part = served.ask("run", STICK_SLIP, {"masses.stage": "1 kg .. 1.2 kg"})[-1]
+        assert any("masses.stage" in note for note in part["notes"])
+    assert served.ask("run", STICK_SLIP)[-1]["notes"] == []
+
+
 # ---------------------------------------------------------------- overtaken
+
+
+def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> None:
+    async def asked() -> list[bytes]:
+        workshop, go = Workshop(), threading.Event()
+        waiting = [
+            asyncio.create_task(anext(workshop.answer("", str(k), lambda _: iter([{}][: go.wait(60)]))))
+            for k in range(20)
+        ]
+        try:
+            return [frame async for frame in workshop.answer("", "quick", lambda _: iter([{"kind": "answer"}]), True)]
+        finally:
+            go.set()
+            await asyncio.gather(*waiting)
+            workshop.close()
+
+    (frame,) = asyncio.run(asked())
+    assert b"answer" in frame
 
 
 def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> None:
@@ -284,3 +418,23 @@ def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> N
         with pytest.raises(Overtaken):
             go_on()
     assert np.array_equal(friso.simulate(STICK_SLIP)["position"].values, before)
+
+
+def test_a_sweep_whose_blocks_are_in_flight_is_overtaken() -> None:
+    """By the flag alone: no progress is reported meanwhile, and the block ends only once it is told to."""
+    flag = np.zeros(1, np.int64)
+    stage = friso.load(STICK_SLIP)
+    study = Request(stage, {"masses.stage": ["1 kg", "1.1 kg"]}).study(None, 1e-6)
+    begun = threading.Event()
+
+    def block(*_: Any, cancel: np.ndarray) -> dict[str, np.ndarray]:
+        begun.set()
+        while not cancel[0]:
+            time.sleep(0.001)
+        return {}
+
+    threading.Thread(target=lambda: begun.wait(60) and flag.fill(1)).start()
+    crew = local_crew()
+    crew.task, crew.arguments = block, {"cancel": crew.cancel}
+    with ended_by(flag), crew, pytest.raises(Overtaken):
+        run_in_memory([study], crew)

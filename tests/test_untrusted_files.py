@@ -127,7 +127,9 @@ QUESTIONS = {name: getattr(friso, name) for name in ("check", "bode", "simulate"
 
 
 @pytest.mark.parametrize("name", QUESTIONS)
-@pytest.mark.parametrize("value", [np.array([1.0, 2.0]), {"a": {}}, object(), b"x", complex(1, 1)], ids=lambda value: type(value).__name__)
+@pytest.mark.parametrize(
+    "value", [np.array([1.0, 2.0]), {"a": {}}, object(), b"x", complex(1, 1)], ids=lambda value: type(value).__name__
+)
 def test_an_argument_of_another_type_is_named(name: str, value: Any) -> None:
     for parameter in ("rtol", "seed", "only", "series", "stroke", "sample_time", "points"):
         if parameter not in inspect.signature(QUESTIONS[name]).parameters:

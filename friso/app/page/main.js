@@ -160,6 +160,7 @@ async function opened(files) {
 }
 
 function trouble(text) {
+  if ($("trouble").textContent === text) return; // it is read out once
   $("trouble").textContent = text;
   $("trouble").hidden = !text;
 }
