@@ -104,6 +104,50 @@ def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
     page.click("#undo")
 
 
+def test_a_slider_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
+    """What is right again does not take the slider from under the hand, and one pull is one step."""
+    page, row = browsed.page, '[data-path="controller.crossover"]'
+    value = "([field, value]) => document.querySelector(field).value === value"
+    before = [f"{row} input[type=text]", "9.7 Hz"]
+    page.wait_for_function(value, arg=before, timeout=30_000)
+    browsed.type("controller.crossover", "3 kg")
+    page.wait_for_selector(f"{row} .wrong", timeout=30_000)
+    slider = page.locator(f"{row} input[type=range]")
+    place, same = slider.bounding_box(), slider.element_handle()
+    assert place is not None
+    height = place["y"] + place["height"] / 2
+    page.mouse.move(place["x"] + 0.5 * place["width"], height)
+    page.mouse.down()
+    with page.expect_response(re.compile("ask/machine")) as answered:
+        page.mouse.move(place["x"] + 0.55 * place["width"], height)
+    answered.value.finished()
+    page.wait_for_timeout(100)
+    assert same.evaluate("slider => slider.isConnected")
+    there = page.input_value(f"{row} input[type=text]")
+    page.mouse.move(place["x"] + 0.7 * place["width"], height, steps=3)
+    assert page.input_value(f"{row} input[type=text]") != there
+    page.mouse.move(place["x"] + 0.7 * place["width"], height + 200)
+    page.mouse.up()
+    page.wait_for_selector(f"{row} .wrong", state="detached", timeout=30_000)
+    page.click("#undo")
+    page.wait_for_selector(f"{row} .wrong", timeout=30_000)
+    page.click("#undo")
+    page.wait_for_selector(f"{row} .wrong", state="detached", timeout=30_000)
+    page.wait_for_function(value, arg=before, timeout=30_000)
+
+
+def test_an_uncertain_value_has_no_slider_and_its_warning_stays(browsed: Browsed) -> None:
+    page, row = browsed.page, '[data-path="masses.stage"]'
+    page.click("[data-part=stage]")
+    browsed.type("masses.stage", "0.5 kg .. 0.7 kg")
+    page.wait_for_selector(f"{row} .uncertain", timeout=30_000)
+    assert page.locator(f"{row} input[type=range]").count() == 0
+    browsed.answered("1 key is uncertain (masses.stage)")
+    page.click("#undo")
+    page.wait_for_selector(f"{row} input[type=range]", timeout=30_000)
+    page.click("[data-part=controller]")
+
+
 def test_what_is_wrong_is_said_in_place(browsed: Browsed) -> None:
     browsed.type("controller.crossover", "3 kg")
     browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', timeout=30_000)
@@ -165,6 +209,40 @@ def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> N
     page.set_input_files("#log-files", log)
     page.wait_for_selector("#role-position", timeout=60_000)
     assert "log.csv" in page.inner_text("#picture")
+
+
+def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:
+    page = browsed.page
+    page.evaluate("""() => {
+        const lines = Array.from({ length: 50 }, (_, k) => `${k / 1000},${k % 7}`);
+        const text = ["time [s],position [m]", ...lines].join("\\n");
+        const dropped = new DataTransfer();
+        for (const name of ["one.csv", "two.csv"]) dropped.items.add(new File([text], name));
+        document.dispatchEvent(new DragEvent("drop", { dataTransfer: dropped, cancelable: true }));
+    }""")
+    page.wait_for_function("() => document.getElementById('picture').innerText.includes('one.csv, two.csv')")
+    page.wait_for_function("() => document.querySelectorAll('#picture .plot, #picture table').length", timeout=30_000)
+
+
+def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> None:
+    page = browsed.page
+    link = """changes => {
+        const [machine] = JSON.parse(localStorage.getItem(`friso-machines-${sessionStorage.friso}`)).machines;
+        const bytes = new TextEncoder().encode(JSON.stringify({ name: "linked.toml", text: machine.text, changes }));
+        const packed = new Blob([bytes]).stream().pipeThrough(new CompressionStream("deflate-raw"));
+        return new Response(packed).arrayBuffer().then((all) => {
+            location.hash = btoa(Array.from(new Uint8Array(all), (byte) => String.fromCharCode(byte)).join(""))
+                .replaceAll("+", "-").replaceAll("/", "_").replaceAll("=", "");
+        });
+    }"""
+    page.evaluate(link, {"masses.cart": [1]})
+    page.wait_for_selector("#trouble:not([hidden])")
+    page.evaluate(link, None)
+    page.wait_for_selector("text=linked")
+    page.wait_for_selector("#trouble", state="hidden")
+    page.reload()
+    page.wait_for_selector("text=linked")
+    page.wait_for_selector("[data-part=controller]")
 
 
 @pytest.mark.parametrize("width", [400, 900, 1600])
