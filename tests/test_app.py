@@ -98,7 +98,7 @@ def served() -> Iterator[Served]:
     listener = config.bind_socket()
     access = Access.at("127.0.0.1", listener.getsockname()[1])
     begin = {"name": RIG.name, "text": RIG.read_text(encoding="utf-8"), "asked": True}
-    server = uvicorn.Server(uvicorn.Config(application(access, begin), log_level="warning", ws="none"))
+    server = uvicorn.Server(uvicorn.Config(application(access, begin, Workshop()), log_level="warning", ws="none"))
     thread = threading.Thread(target=server.run, args=([listener],))
     thread.start()
     while not server.started:

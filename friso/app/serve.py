@@ -12,11 +12,15 @@ import uvicorn
 from friso.answers.starting import example
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
+from friso.app.work import Workshop
 from friso.errors import InputError
 from friso.stage.files import load, text_of
 
 PORT = 8741
 """The port unless another one is asked for: browsers keep what a page holds by its port."""
+
+GRACE = 5
+"""How long [s] the end of questions at work is waited for: a kernel that is compiled is not given up."""
 
 TRIES = 20
 """Ports that are tried beyond it, where it is taken."""
@@ -41,10 +45,23 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
     print(f"friso app: {address}{access.token}\nCtrl-C ends it.", flush=True)
     if browser:
         webbrowser.open(f"{address}{access.token_for_once()}")
-    config = uvicorn.Config(
-        application(access, begin), log_level="warning", ws="none", lifespan="on", timeout_graceful_shutdown=1
-    )
-    uvicorn.Server(config).run([listener])
+    workshop = Workshop()
+    app = application(access, begin, workshop)
+    config = uvicorn.Config(app, log_level="warning", ws="none", lifespan="on", timeout_graceful_shutdown=GRACE)
+    _Server(config, workshop).run([listener])
+
+
+class _Server(uvicorn.Server):
+    """Ends the questions at work before it waits for their answers."""
+
+    def __init__(self, config: uvicorn.Config, workshop: Workshop) -> None:
+        super().__init__(config)
+        self.workshop = workshop
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        """End what is asked, and then the connections."""
+        self.workshop.overtake()
+        await super().shutdown(sockets)
 
 
 def _listener(host: str, port: int | None) -> socket.socket:

@@ -29,10 +29,10 @@ KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".s
 BINARY = "application/octet-stream"
 
 
-def application(access: Access, begin: dict[str, Any]) -> ASGIApp:
+def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> ASGIApp:
     """The server for those who have an access; `begin`: name and text of the stage file that it starts with, and
-    whether it was `asked` for."""
-    workshop, uploads = Workshop(), Uploads()
+    whether it was `asked` for. The workshop is closed at its end."""
+    uploads = Uploads()
 
     async def ask(request: Request) -> Response:
         name = request.path_params["question"]

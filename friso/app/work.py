@@ -132,9 +132,13 @@ class Workshop:
         finally:
             log.removeHandler(messages)
 
-    def close(self) -> None:
-        """End everything."""
+    def overtake(self) -> None:
+        """End all that is asked."""
         for work in [*self.lanes.values()]:
             work.overtake()
+
+    def close(self) -> None:
+        """End everything."""
+        self.overtake()
         for pool in (self.pool, self.quick):
             pool.shutdown(wait=False, cancel_futures=True)
