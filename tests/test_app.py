@@ -8,6 +8,7 @@ import errno
 import http.client
 import io
 import json
+import socket
 import struct
 import threading
 import time
@@ -27,10 +28,11 @@ from friso.app import uploads
 from friso.app.gate import Access
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, shown
+from friso.app.serve import listening
 from friso.app.server import application
 from friso.app.work import Workshop
 from friso.engine.overtaken import Overtaken, ended_by, go_on
-from friso.errors import LogError
+from friso.errors import InputError, LogError
 from friso.studies.execute import local_crew
 from friso.studies.request import Request
 from friso.studies.sweep import run_in_memory
@@ -136,6 +138,17 @@ def test_a_rebound_name_is_refused(served: Served, host: str | None) -> None:
 def test_a_token_for_once_is_taken_once(served: Served) -> None:
     path = f"/?token={served.access.token_for_once()}"
     assert [served.request("GET", path, Cookie=None)[0] for _ in range(2)] == [303, 403]
+
+
+def test_the_port_takes_connections_before_the_browser_opens_and_is_free_again_at_once() -> None:
+    with listening("127.0.0.1", 0) as first:
+        port = first.getsockname()[1]
+        with pytest.raises(InputError, match=f"{port} on 127"):
+            listening("127.0.0.1", port)
+        with socket.create_connection(("127.0.0.1", port), timeout=5) as browser:
+            first.accept()[0].close()
+            assert browser.recv(1) == b""
+    listening("127.0.0.1", port).close()
 
 
 def test_at_the_usual_port_browsers_leave_it_out() -> None:

@@ -37,7 +37,7 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
         raise InputError("--host", host, expected, "--host 127.0.0.1")
     if host in ("0.0.0.0", "::"):
         raise InputError("--host", host, "the name or address by which others reach this machine", "--host rig.local")
-    listener = _listener(host, port)
+    listener = listening(host, port)
     own = listener.getsockname()[1]
     access = Access.at(host, own)
     named = f"[{host}]" if ":" in host else host
@@ -64,7 +64,7 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _listener(host: str, port: int | None) -> socket.socket:
+def listening(host: str, port: int | None) -> socket.socket:
     """A socket that listens at a port that is free: the one asked for, or the next from the usual one on. Raises
     InputError."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
