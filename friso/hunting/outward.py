@@ -4,7 +4,7 @@ nothing attracts just beyond."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import TIGHTER, Kind, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import families, hunting_cycles
+from friso.hunting.cycle.held import held_beside
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import simplest
 
@@ -37,7 +38,8 @@ BEYOND, CHATTERING = 1.01, 1.01
 multipliers rough."""
 
 BETWEEN = np.array([0.1, 0.3, 0.6])
-"""Shares of the way there at which cycles are looked for that attract over less."""
+"""Shares of the way there at which cycles, and motions beside those that repel, are looked for that attract over
+less."""
 
 SPREAD, ENOUGH = 9, 6
 """Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
@@ -127,24 +129,39 @@ class Outward:
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
             survey = self.surveyed(np.array([next_to]), ALONG * distance, at_once=True)
-            closer = None if survey.attracts[0] else self._between(at, next_to, reserve)
-            if not survey.attracts[0] and closer is None:
-                return AttractionEnd(at, next_to, ended and bool(survey.decided[0]), reserve)
-            place.at, place.motions = closer or (next_to, survey.motions)
+            if survey.attracts[0]:
+                place.at, place.motions = next_to, survey.motions
+                continue
+            closer, decided = self._between(at, next_to, reserve)
+            if closer is None:
+                return AttractionEnd(at, next_to, ended and decided and bool(survey.decided[0]), reserve)
+            (place.at, place.motions), place.outside = closer, next_to
         return self._quiet_from(place.at, place.motions)
 
-    def _between(self, at: float, quiet: float, reserve: float) -> tuple[float, tuple[Swinging, ...]] | None:
+    def _between(
+        self, at: float, quiet: float, reserve: float
+    ) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
         """The last factor between the end of an orbit, known up to a share of it, and one at which nothing attracts at
-        which a cycle that the return map suggests does, and that cycle; None if there is none."""
+        which something does, and what: cycles that the return maps suggest, and motions that these maps keep beside
+        those of them that repel. None if there is none; and whether that is decided."""
         factors = at * (quiet / at) ** BETWEEN
         factors = factors[np.abs(np.log(factors / at)) > reserve]
+        if not factors.size:
+            return None, True
         stages = self._stages(factors)
-        suggested = families(stages) if factors.size else ()
+        suggested = families(stages)
         motions = [m for cycles in suggested for m in of_cycles(np.arange(factors.size), cycles, stages.sticking)]
+        held, decided = np.hstack([held_beside(stages, cycles) for cycles in suggested]), True
+        known = max((motion.stage for motion in motions), default=-1)
+        doubtful = np.flatnonzero(np.isfinite(held).any(axis=1) & (np.arange(factors.size) > known))
+        if doubtful.size:
+            survey = self.surveyed(factors[doubtful], held[doubtful], at_once=True)
+            motions += [replace(motion, stage=int(doubtful[motion.stage])) for motion in survey.motions]
+            decided = bool(survey.decided.all())
         if not motions:
-            return None
+            return None, decided
         last = max(motion.stage for motion in motions)
-        return float(factors[last]), tuple(motion for motion in motions if motion.stage == last)
+        return (float(factors[last]), tuple(motion for motion in motions if motion.stage == last)), decided
 
     def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
         """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""
@@ -161,10 +178,10 @@ class Outward:
     def surveyed(
         self, factors: np.ndarray, distances: np.ndarray | None = None, cycles: bool = True, at_once: bool = False
     ) -> Attractors:
-        """What attracts at some factors, tried from distances [m] as well, all starts `at_once` or not. Without
-        `cycles` simulations alone tell: orbits that attract from a narrow range show where they are followed from wider
-        ones."""
-        begins = None if distances is None else np.tile(distances, (len(factors), 1))
+        """What attracts at some factors, tried from distances [m] as well, the same (n,) for all or (factors, n), all
+        starts `at_once` or not. Without `cycles` simulations alone tell: orbits that attract from a narrow range show
+        where they are followed from wider ones."""
+        begins = None if distances is None else np.broadcast_to(distances, (len(factors), np.shape(distances)[-1]))
         return attractors(self._stages(factors), distances=begins, cycles=cycles, at_once=at_once)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
