@@ -37,9 +37,9 @@ BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
 multipliers rough."""
 
-BETWEEN = np.array([0.1, 0.3, 0.6])
-"""Shares of the way there at which cycles, and motions beside those that repel, are looked for that attract over
-less."""
+BETWEEN = np.array([0.1, 0.3, 0.6, 1.0])
+"""Shares of the way there at which cycles, and motions beside those that repel, are looked for that attract over less,
+or from a narrow range."""
 
 SPREAD, ENOUGH = 9, 6
 """Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
@@ -81,6 +81,16 @@ class _Place:
     at: float
     motions: tuple[Swinging, ...]
     outside: float
+
+
+@dataclass(frozen=True)
+class _Suggested:
+    """What return maps suggest at factors: cycles that attract, `motions`, and distances [m], (factors, n), in motions
+    that go on beside those that repel, `held` (NaN: none)."""
+
+    factors: np.ndarray
+    motions: list[Swinging]
+    held: np.ndarray
 
 
 class Beyond(Exception):
@@ -128,40 +138,43 @@ class Outward:
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
-            survey = self.surveyed(np.array([next_to]), ALONG * distance, at_once=True)
+            suggested = self._suggested(at, next_to, reserve)
+            starts = np.append(ALONG * distance, suggested.held[-1])
+            survey = self.surveyed(np.array([next_to]), starts, at_once=True)
             if survey.attracts[0]:
                 place.at, place.motions = next_to, survey.motions
                 continue
-            closer, decided = self._between(at, next_to, reserve)
+            closer, decided = self._between(suggested)
             if closer is None:
                 return AttractionEnd(at, next_to, ended and decided and bool(survey.decided[0]), reserve)
             (place.at, place.motions), place.outside = closer, next_to
         return self._quiet_from(place.at, place.motions)
 
-    def _between(
-        self, at: float, quiet: float, reserve: float
-    ) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
-        """The last factor between the end of an orbit, known up to a share of it, and one at which nothing attracts at
-        which something does, and what: cycles that the return maps suggest, and motions that these maps keep beside
-        those of them that repel. None if there is none; and whether that is decided."""
-        factors = at * (quiet / at) ** BETWEEN
+    def _suggested(self, at: float, next_to: float, reserve: float) -> _Suggested:
+        """What the return maps suggest from the end of an orbit, known up to a share of it, to a factor next to it."""
+        factors = at * (next_to / at) ** BETWEEN
         factors = factors[np.abs(np.log(factors / at)) > reserve]
-        if not factors.size:
-            return None, True
         stages = self._stages(factors)
-        suggested = families(stages)
-        motions = [m for cycles in suggested for m in of_cycles(np.arange(factors.size), cycles, stages.sticking)]
-        held, decided = np.hstack([held_beside(stages, cycles) for cycles in suggested]), True
+        cycles = families(stages)
+        motions = [m for family in cycles for m in of_cycles(np.arange(factors.size), family, stages.sticking)]
+        return _Suggested(factors, motions, np.hstack([held_beside(stages, family) for family in cycles]))
+
+    def _between(self, suggested: _Suggested) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
+        """The last factor but that next to an end, at which nothing attracts, at which something does of what is
+        suggested, and what; None if there is none; and whether that is decided."""
+        last = len(suggested.factors) - 1
+        motions, decided = [motion for motion in suggested.motions if motion.stage < last], True
         known = max((motion.stage for motion in motions), default=-1)
-        doubtful = np.flatnonzero(np.isfinite(held).any(axis=1) & (np.arange(factors.size) > known))
+        doubtful = np.flatnonzero(np.isfinite(suggested.held[:last]).any(axis=1))
+        doubtful = doubtful[doubtful > known]
         if doubtful.size:
-            survey = self.surveyed(factors[doubtful], held[doubtful], at_once=True)
+            survey = self.surveyed(suggested.factors[doubtful], suggested.held[doubtful], at_once=True)
             motions += [replace(motion, stage=int(doubtful[motion.stage])) for motion in survey.motions]
             decided = bool(survey.decided.all())
         if not motions:
             return None, decided
-        last = max(motion.stage for motion in motions)
-        return (float(factors[last]), tuple(motion for motion in motions if motion.stage == last)), decided
+        at = max(motion.stage for motion in motions)
+        return (float(suggested.factors[at]), tuple(motion for motion in motions if motion.stage == at)), decided
 
     def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
         """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""

@@ -85,7 +85,7 @@ def held_by(before: np.ndarray, after: np.ndarray) -> np.ndarray:
     for _ in range(TIMES):
         earlier = place
         for _ in range(2):
-            place = np.interp(place, before[order], after[order], left=np.nan, right=np.nan)
+            place = np.where((place > low) & (place < high), np.interp(place, before[order], after[order]), np.nan)
         shrank |= np.abs(place) < np.abs(earlier)
         if not shrank.any():  # deviations of every size grow
             break

@@ -1,0 +1,57 @@
+"""Motions that a return map keeps beside a cycle that repels."""
+
+import numpy as np
+import pytest
+from beyond_flip import STEEP
+
+from friso.equations.bandwidth import faster
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.held import RANGE, held_by
+from friso.hunting.cycle.rest import stuck
+from friso.hunting.outward import Outward
+
+BEFORE = np.linspace(-RANGE, RANGE, 61)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-8])
+def test_a_flat_subcritical_flip_holds_nothing(noise: float) -> None:
+    """Deviations that grow by 0.03 % a return are still there after a thousand of them."""
+    after = -(1.0003 * BEFORE + 5 * BEFORE**3)
+    assert not held_by(BEFORE, after + noise * np.random.default_rng(0).normal(size=BEFORE.size)).size
+
+
+def test_a_supercritical_flip_holds_a_pair() -> None:
+    """Of -1.01 x + 30 x^3: at the root of 0.01 / 30, on both sides."""
+    held = held_by(BEFORE, -1.01 * BEFORE + 30 * BEFORE**3)
+    assert set(np.sign(held)) == {-1, 1}
+    assert np.abs(held) == pytest.approx(np.sqrt(0.01 / 30), rel=0.02)
+
+
+def test_irregular_motions_are_held_until_the_map_breaks_off_on_their_way() -> None:
+    """A tent: its top, 0.032, is reached, and -0.0512 from there."""
+    tent = np.where(BEFORE > -0.02, -1.6 * BEFORE, 0.064 + 1.6 * BEFORE)
+    held = held_by(BEFORE, tent)
+    assert len(np.unique(held.round(3))) > 10
+    assert -0.0512 <= held.min() < 0 < held.max() <= 0.032
+    assert not held_by(BEFORE, np.where(BEFORE < -0.04, -0.5, tent)).size
+
+
+FLIP = 0.135006
+"""Factor of the bandwidth at which the symmetric cycle of the steep stage begins to repel; subcritical near by."""
+
+
+def test_an_edge_moves_on_to_what_attracts_beyond_a_flip() -> None:
+    """Irregular swings beside the cycle, and others, attract to more than 1 % beyond its end."""
+    outward = Outward(STEEP.flat(), 1.0)
+    below = outward.surveyed(np.array([0.13]))
+    end = outward.end(0.13, below.motions, 0.14)
+    assert 1.0125 * FLIP < end.inside < end.outside < 1.03 * FLIP
+
+
+def test_the_steep_stage_swings_on_beyond_its_flip() -> None:
+    """For 300 periods, 0.1 and 1.25 % above."""
+    distances = np.linspace(112e-6, 128e-6, 24)
+    for share in (1.001, 1.0125):
+        stages = Ensemble.held(faster(STEEP.flat(), np.full(24, share * FLIP)), 24)
+        results = stages.run(stuck(stages, distances), np.full(24, 26 * 300.0), 1e-8, window=0.95)
+        assert np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 200e-6)
