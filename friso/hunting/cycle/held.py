@@ -38,8 +38,10 @@ KEPT = 12
 def held_beside(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> np.ndarray:
     """Distances [m] at which stages stick in motions that their return map keeps within a few per cent of a cycle that
     repels, shape (count, KEPT), NaN where it keeps none. The map is interpolated: a simulation has to decide whether
-    they attract."""
+    they attract. None either where a limiter chatters: the map is too rough there to tell what it keeps."""
     distances = np.full((stages.count, KEPT), np.nan)
+    if stages.chatters:
+        return distances
     which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
     if not which.size:
         return distances
