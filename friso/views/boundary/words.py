@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -80,6 +79,10 @@ class ShownKey:
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 
+SHOWN_CURVES = 3
+"""Curves at most of which the answer says where they run; the figure and the details have all."""
+
+
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """All that is said, in order, the answer first."""
     details = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
@@ -109,15 +112,30 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     if isinstance(traced, Diagram):
         return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
     verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
-    unknown = f" (unknown at {verdicts.count(UNKNOWN)})" if UNKNOWN in verdicts else ""
-    possible = f"Hunting is possible at {verdicts.count(ATTRACTS)} of the 4 corners of the plane{unknown}."
-    kinds = Counter(f"{line.kinds[0]} of {CYCLES[line.shape]}" for line in lines(traced))
-    curves = listed([f"{kind}{f' ({number} curves)' if number > 1 else ''}" for kind, number in kinds.items()], "and")
-    if kinds:
-        return f"{possible} Boundaries: {curves}."
+    if curves := lines(traced):
+        longest = sorted(curves, key=lambda line: -len(line.at))[:SHOWN_CURVES]
+        more = [f"There are {len(curves) - len(longest)} more curves."] if len(curves) > len(longest) else []
+        return " ".join([_hunting_corners(traced, keys), *(_course(line, keys) for line in longest), *more])
     if traced.gaps or UNKNOWN in verdicts:
-        return f"{possible} No curve could be followed."
-    return f"{possible} {_no_boundary(traced.space, keys)}"
+        return f"{_hunting_corners(traced, keys)} No curve could be followed."
+    return f"{_hunting_corners(traced, keys)} {_no_boundary(traced.space, keys)}"
+
+
+def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
+    """At which corners of the plane hunting is possible."""
+    corners = corner_verdicts(traced)
+    hunting = [_place((x, y), keys) for x, y, verdict in corners if verdict == ATTRACTS]
+    unknown = sum(verdict == UNKNOWN for _, _, verdict in corners)
+    others = f" (unknown at {unknown})" if unknown else ""
+    if len(hunting) in (0, len(corners)):
+        return f"Hunting is possible at {'all' if hunting else 'none'} of the corners of the plane{others}."
+    return f"Of the corners of the plane, hunting is possible at {'; '.join(hunting)}{others}."
+
+
+def _course(line: Line, keys: tuple[ShownKey, ...]) -> str:
+    """From where to where a boundary runs."""
+    first, last = (_place(place, keys) for place in line.at[[0, -1]].tolist())
+    return f"A {line.kinds[0]} of {CYCLES[line.shape]} runs from {first} to {last}."
 
 
 def _edges(traced: Diagram, key: ShownKey) -> str:
@@ -130,9 +148,18 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
     also = [f"Cycles also begin or stop attracting at {listed([key.text(value) for value in others], 'and')}."]
     answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
     if changes:
-        places = [f"{'begins' if change.begins else 'ends'} {_between(change, key)}" for change in changes]
+        places = [
+            f"{'begins' if change.begins else 'ends'} {_between(change, key)}{_if_unstable(traced, change)}"
+            for change in changes
+        ]
         answer = f"Hunting {listed(places, 'and')} ({values_tried}{unknown})."
     return " ".join([answer, *(also if others else [])])
+
+
+def _if_unstable(traced: Diagram, change: Change) -> str:
+    """That a change lies where the loop is unstable anyway; "" where it is not."""
+    beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
+    return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
 
 def _between(change: Change, key: ShownKey) -> str:

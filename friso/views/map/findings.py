@@ -90,7 +90,16 @@ def headline(runs: xr.Dataset, metric: str) -> str:
         return " ".join(filter(None, (_answer(runs, _ATTRACTS), doubt)))
     if metric in PEAKS and metric in runs:
         return _answer(runs, Question(metric, "Peaks are counted"))
-    return _answer(runs, _SWINGS) if "outcome" in runs else ""
+    return " ".join([_answer(runs, _SWINGS), *_creeping(runs)]) if "outcome" in runs else ""
+
+
+def _creeping(runs: xr.Dataset) -> list[str]:
+    """What it means that runs creep: the next breakaway may come after their end."""
+    creeping = counts(runs, "outcome").get(CREEPS, 0)
+    if not creeping:
+        return []
+    where = f"in {_percent(creeping, runs['outcome'].size)} of the map"
+    return [f"It still creeps at its end {where}: whether it hunts there, a longer run or --metric verdict tells."]
 
 
 def _answer(runs: xr.Dataset, question: Question) -> str:
