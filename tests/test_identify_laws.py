@@ -69,6 +69,8 @@ def prediction(law: str, *errors: float) -> LawPrediction:
     [
         ((prediction("a", 0.05, 0.06, 0.05), prediction("b", 0.09, 0.11, 0.10)), ["a"]),
         ((prediction("a", 0.05, 0.06, 0.05), prediction("b", 0.05, 0.05, 0.065)), ["a", "b"]),
+        ((prediction("a", 0.05, 0.06, 0.05), prediction("b", 0.052, 0.062, 0.052)), ["a", "b"]),
+        ((prediction("a", 0.05, 0.06, 0.05), prediction("b", 0.05, np.inf, 0.05)), ["a"]),
         ((prediction("a", 0.5, 0.6, 0.5), prediction("b", 0.5, 0.6, 0.5)), []),
     ],
 )
@@ -80,7 +82,11 @@ def test_laws_are_supported_that_predict_as_well_as_the_best(
 
 def test_every_sample_is_left_out_once() -> None:
     whole = DraggedRecord("one", np.zeros(9), LowPass(np.arange(9.0), 1.0), np.zeros(11), np.zeros(11))
-    for records, parts in (([whole], 5), ([whole, replace(whole, name="two")], 2)):
+    for records, parts in (
+        ([whole], 5),
+        ([whole, replace(whole, name="two")], 6),
+        ([replace(whole, name=str(k)) for k in range(5)], 5),
+    ):
         masks = blocks(records, 5)
         assert len(masks) == parts
         assert all(np.sum([part[i] for part in masks], axis=0).tolist() == [1] * 11 for i in range(len(records)))

@@ -234,7 +234,8 @@ class Outward:
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
             if last is not None and kind == "flip":
-                reserve = max(PRECISE, _rough(tracer, last, first, second))
+                rough = _rough(tracer, last, first, second)
+                ended, reserve = bool(np.isfinite(rough)), float(np.fmax(PRECISE, rough))
         elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):
             raise Beyond
         return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), ended, reserve
@@ -299,14 +300,14 @@ def orbit_distance(point: Point, orbit: Swinging) -> float:
 def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> float:
     """Up to what share of its bandwidth a flip is known, between two points: twice by what the multiplier changes at a
     tighter tolerance, over its slope. It is rough where a law turns sharply, as rolling friction at full deflection;
-    where a limiter chatters the slope of the return map decides, and this says nothing."""
+    where a limiter chatters the slope of the return map decides, and this says nothing. Not finite: it is not known."""
     stages = tracer.family(np.zeros(1, np.int64), np.array([last.place]))
     if stages.chatters:
         return PRECISE
     tight = multipliers(stages, last.cycle.orbits, TIGHTER * tracer.rtol).local[0, 0]
     slope = (second.multiplier - first.multiplier) / (second.place - first.place)
     rough = 2 * abs(float(tight.real) - last.multiplier) / abs(slope)
-    return float(rough) if np.isfinite(rough) else PRECISE
+    return float(rough)
 
 
 def _kind(first: Point, second: Point) -> Kind:

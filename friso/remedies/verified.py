@@ -18,6 +18,7 @@ from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
 from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile, timing
+from friso.remedies.variables import crossover
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -139,6 +140,8 @@ def doubts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
         listed.append("given up")
     if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
         listed.append("distance")
+    if goal.bandwidth_limit is not None and not crossover(case.stage) <= goal.bandwidth_limit * (1 + ROUNDED):
+        listed.append("bandwidth")
     if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
         listed.append("window")
     if case.unstable or measured.own_margin < goal.margin * (1 - ROUNDED):
@@ -151,7 +154,8 @@ def doubts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
 
 
 ROUNDED = 2e-3
-"""Share by which a margin may be below its goal because the tuned numbers are rounded."""
+"""Share by which a margin may be below its goal, and a bandwidth above its limit, because the tuned numbers are
+rounded."""
 
 
 def _near(low: object, high: object, distance: float) -> bool:

@@ -1,8 +1,8 @@
 """Which friction laws a record supports: each is fitted without a part of it, and predicts that.
 
 A law with more numbers always fits better; what it predicts of what it was not fitted to need not be better (cross-
-validation). The laws that predict as well as the best within one standard error of the difference are supported
-(Breiman's rule: Hastie, Tibshirani, Friedman, The Elements of Statistical Learning, 2009, sec. 7.10).
+validation). A law is supported unless it clearly predicts worse than the best: by more than chance would have it (a t
+test of the differences by parts, at a level that counts all laws: Bonferroni), and by more than `LEAST_WORSE`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
 from friso.errors import InputError
 from friso.identification.kind import Prior
@@ -21,9 +22,16 @@ from friso.identification.readings.at_bearing import believed_between
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import FRICTION, FrictionSection
+from friso.stage.transmission import MOTOR_FRICTION, moving_mass
 
 PIECES = 5
-"""Pieces in time by which a single record is cut."""
+"""Parts at least into which the records are cut, in time: fewer differences decide nothing."""
+
+LEVEL = 0.05
+"""Probability at most with which a law that predicts as well as the best is called worse."""
+
+LEAST_WORSE = 0.01
+"""Difference of errors, as shares of the friction's standard deviation, up to which laws predict alike."""
 
 EXPLAINED = 0.3
 """Share of the friction's standard deviation up to which a prediction is one."""
@@ -65,18 +73,23 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """The laws that predict as well as the best within a standard error of the difference; none where no law
-        predicts the record."""
+        """The laws that do not clearly predict worse than the best; none where no law predicts the record."""
         best = self.predictions[0]
         if not self.explained:
             return ()
-        return tuple(law for law in self.predictions if law is best or not _worse(law.errors - best.errors))
+        level = LEVEL / max(len(self.predictions) - 1, 1)
+        others = (law for law in self.predictions[1:] if not _worse(law.errors - best.errors, level))
+        return (best, *others)
 
 
-def _worse(differences: np.ndarray) -> bool:
-    """Whether errors are larger, by more than a standard error of the mean."""
-    error = differences.std(ddof=1) / np.sqrt(len(differences))
-    return bool(differences.mean() > error)
+def _worse(differences: np.ndarray, level: float) -> bool:
+    """Whether errors, shape (parts,), are larger than those of another law: by more than parts differ by chance, at a
+    level, and by more than `LEAST_WORSE`. A law that could not be run for a part is."""
+    if not np.isfinite(differences).all():
+        return True
+    count = len(differences)
+    chance = student.ppf(1 - level, count - 1) * differences.std(ddof=1) / np.sqrt(count) if count > 1 else np.inf
+    return bool(differences.mean() > max(chance, LEAST_WORSE))
 
 
 def comparable() -> list[str]:
@@ -96,11 +109,13 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
         reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "no log over time"
         raise InputError("--laws", reasons, "a log of position and force that shows friction", "presliding.csv")
     flat = {**stage.flat(), **{key: estimate.value for key, estimate in prior.estimates.items()}}
+    if f"{MOTOR_FRICTION}.model" in flat:
+        raise InputError("--laws", "a stage with friction at the motor too", "the friction of one bearing", "no --laws")
     before = friction_of(flat) if flat["friction.model"] in comparable() else None
     if before is None:
         actual = f'"{flat["friction.model"]}", from which no fit can begin'
         raise InputError("friction.model", actual, f"one of {', '.join(comparable())}", 'model = "lugre"')
-    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    mass = float(moving_mass(flat))
     laws, parts = comparable(), blocks(records, PIECES)
     predictions = []
     for number, law in enumerate(laws):
@@ -135,5 +150,7 @@ def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> L
         friction = [record.force - fit.mass * record.acceleration for record in problem.records]
         rest, size = (np.concatenate([row[mask] for row, mask in zip(rows, out, strict=True)])
                       for rows in ([row[0] for row in left], friction))  # fmt: skip
-        errors.append(float(np.sqrt(np.mean((rest - rest.mean()) ** 2)) / size.std()))
+        with np.errstate(invalid="ignore"):  # of a run that failed the rest is infinite
+            off = float(np.sqrt(np.mean((rest - rest.mean()) ** 2)) / size.std())
+        errors.append(off if np.isfinite(off) else np.inf)
     return LawPrediction(whole, np.array(errors))

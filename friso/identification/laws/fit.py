@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.equations.friction.measured import Levels, MeasuredFriction
+from friso.equations.friction.measured import MeasuredFriction
 from friso.identification.laws.dragging import DraggedRecord
 from friso.stage.tables import friction_law
 
@@ -83,8 +83,14 @@ class LawProblem:
         """The keys of the law [SI] for some numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
-        exponent = self.before.levels.stribeck_exponent
-        levels = Levels(static, value["coulomb"], value["stribeck_velocity"], exponent, value["viscous"])
+        known = self.before.levels
+        levels = replace(
+            known,
+            static=static,
+            coulomb=value["coulomb"],
+            stribeck_velocity=value["stribeck_velocity"],
+            viscous=value["viscous"],
+        )
         measured = MeasuredFriction(levels, value["stiffness"], value["damping"], np.zeros(1), np.zeros(1))
         law = friction_law(self.law)
         return law.shaped(measured, {name: value[name] for name in law.shape})

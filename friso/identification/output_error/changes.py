@@ -28,11 +28,13 @@ WORTH_TELLING = 0.1
 @dataclass(frozen=True)
 class Changes:
     """How far the fitted numbers would move, shape (free,), if constant force and friction were free to change along
-    the record, and the change of either over it [N]."""
+    the record; the change of either over it [N], and how far it comes from its mean over the record, its reach [N]."""
 
     moved: np.ndarray
     friction: float
     constant: float
+    friction_reach: float
+    constant_reach: float
 
     def sentences(self, coulomb: float, unit: str) -> list[str]:
         """What changes, where that is much beside Coulomb friction [N]; `unit` is that of the force."""
@@ -64,7 +66,7 @@ def changes_of(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
     bends = _bends(np.linspace(0.0, 1.0, len(rest)), problem.counted)
     forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
     effects = [_effect(fit, rest, unit * force) / unit for force in forces]
-    return _fitted(slopes, rest, effects, problem.counted)
+    return _fitted(slopes, rest, effects, bends, problem.counted)
 
 
 def changes_beside(inverse: InverseModel) -> Changes | None:
@@ -72,13 +74,16 @@ def changes_beside(inverse: InverseModel) -> Changes | None:
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
     sign, ones = inverse.columns[:, 2], counted
-    effects = [-base * bend for base in (sign, ones) for bend in _bends(share, counted)]
-    return _fitted(-inverse.columns, inverse.measured - inverse.fitted, effects, counted)
+    bends = _bends(share, counted)
+    effects = [-base * bend for base in (sign, ones) for bend in bends]
+    return _fitted(-inverse.columns, inverse.measured - inverse.fitted, effects, bends, counted)
 
 
-def _fitted(slopes: np.ndarray, rest: np.ndarray, effects: list[np.ndarray], counted: np.ndarray) -> Changes | None:
+def _fitted(
+    slopes: np.ndarray, rest: np.ndarray, effects: list[np.ndarray], bends: list[np.ndarray], counted: np.ndarray
+) -> Changes | None:
     """Least squares of a residual, shape (n,), on its derivatives to fitted numbers, shape (n, numbers), and to changes
-    of friction and constant force, as many of the one as of the other, each of shape (n,)."""
+    of friction and of constant force by the same `bends`, each of shape (n,)."""
     every = np.column_stack([slopes, *effects])
     size = np.linalg.norm(every, axis=0)
     if not (np.isfinite(every).all() and (size > 0).all()):
@@ -89,8 +94,9 @@ def _fitted(slopes: np.ndarray, rest: np.ndarray, effects: list[np.ndarray], cou
     if rest @ rest <= left @ left * (1 + chi2.ppf(SURE, len(effects)) / independent):
         return None
     moved, levels = np.split(solution, [slopes.shape[1]])
-    friction, constant = (float(np.ptp([0.0, *part])) for part in np.split(levels, 2))
-    return Changes(moved, friction, constant)
+    friction, constant = (part @ np.stack(bends) for part in np.split(levels, 2))
+    reaches = (float(np.abs(line).max()) for line in (friction, constant))
+    return Changes(moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
 
 
 def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
@@ -99,9 +105,9 @@ def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
     further = np.abs(changes.moved)
     for i, parameter in enumerate(free):
         if parameter.name == "friction.coulomb":
-            further[i] += changes.friction / 2 / fit.value(parameter.name)
+            further[i] += changes.friction_reach / fit.value(parameter.name)
         elif parameter.name.startswith("bias."):
-            further[i] += changes.constant / 2
+            further[i] += changes.constant_reach
     deviation = np.sqrt(np.diag(fit.covariance))
     usable = np.isfinite(deviation) & (deviation > 0)
     wider = np.divide(further, COVERAGE * deviation, out=np.zeros_like(further), where=usable) + 1
@@ -110,7 +116,7 @@ def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
 
 def inverse_reaching(inverse: InverseModel, changes: Changes) -> InverseModel:
     """The inverse model with intervals that reach as far."""
-    over = {"coulomb": changes.friction / 2, "offset": changes.constant / 2}
+    over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
     answers = []
     for estimate, moved in zip(inverse.estimates, np.abs(changes.moved), strict=True):
         further = moved + over.get(estimate.name, 0.0) if estimate.determined else 0.0

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, sped_up
+from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.settings import SETTINGS, Setting
 from friso.frequency.crossover import WANTED, limits
 from friso.stage import Stage
@@ -141,9 +142,10 @@ def _integrates(stage: Stage) -> bool:
 
 def _feedforward(machines: Machines) -> dict[str, np.ndarray]:
     """Feedforward of Coulomb and viscous friction of each machine, both wrong by the model error."""
-    flat = machines.flat(machines.stage, {})
+    flat = anywhere(machines.flat(machines.stage, {}))
+    coulomb = level_under_conditions(flat, "coulomb") if "friction.coulomb" in flat else 0.0
     off = 1 + MODEL_ERROR * machines.signs
     return {
-        "drive.feedforward_coulomb": off * flat.get("friction.coulomb", 0.0),
+        "drive.feedforward_coulomb": off * coulomb,
         "drive.feedforward_viscous": off * flat.get("friction.viscous", 0.0),
     }

@@ -25,9 +25,9 @@ SPEEDS = np.geomspace(1e-2, 1e3, 201)
 """Speeds, in Stribeck velocities, at which steady friction is compared."""
 
 
-Shown = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous"]
+Shown = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions"]
 """What measurements show: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping
-at rest, viscous damping."""
+at rest, viscous damping; and the conditions under which they were taken."""
 
 
 @dataclass(frozen=True)

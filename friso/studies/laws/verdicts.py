@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
+from friso.errors import InputError
 from friso.hunting.check import LONG, Case, check, needed_kernels
 from friso.hunting.criteria import ATTRACTED
 from friso.hunting.verdict import BANDWIDTHS
@@ -176,7 +177,13 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
     for law in convertible():
         if law == own:
             continue
-        conversion = convert(stage, law, elements)
+        try:
+            conversion = convert(stage, law, elements)
+        except InputError:
+            if stage.conditions is None:
+                raise
+            left_out[law] = ("conditions",)  # that the law cannot follow
+            continue
         lost: tuple[Shown, ...] = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
         if lost:
             left_out[law] = lost

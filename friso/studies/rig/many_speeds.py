@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.conditions import anywhere
 from friso.equations.rail import friction_factors
 from friso.frequency.friction import steady_force
 from friso.identification.readings.friction_velocity import FrictionVelocity, friction_velocity
@@ -105,7 +106,7 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
 
 def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Mean dynamic friction [N] at speeds [m/s], shape (n,), over places [m] on the rail."""
-    flat: Mapping[str, Any] = stage.flat()
+    flat: Mapping[str, Any] = anywhere(stage.flat())
     levels = zip(("friction.static", "friction.coulomb"), friction_factors(flat, places).mean(axis=1), strict=True)
     along = {key: flat[key] * factor for key, factor in levels if key in flat}
     return steady_force({**flat, **along}, speeds, forward=True)

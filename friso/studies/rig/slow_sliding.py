@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.readings.at_bearing import between
@@ -99,5 +100,6 @@ def _analysed(log: RigLog) -> SlowSliding:
 def _true(log: RigLog) -> np.ndarray:
     places = log.true.get("cart_position", log.true["position"])
     places_between = np.linspace(places.min(), places.max(), POINTS) if len(places) else np.full(1, np.nan)
-    levels = [log.stage.flat()[key] for key in ("friction.coulomb", "friction.static")]
-    return levels * friction_factors(log.stage.flat(), places_between).mean(axis=1)[::-1]
+    flat = anywhere(log.stage.flat())
+    levels = [level_under_conditions(flat, name) for name in ("coulomb", "static")]
+    return levels * friction_factors(flat, places_between).mean(axis=1)[::-1]

@@ -17,6 +17,7 @@ SHOWN: Mapping[Shown, str] = {
     "static": "break-away",
     "stiffness": "stiffness before sliding",
     "virgin": "virgin curve",
+    "conditions": "the conditions of the stage",
     "damping": "damping at rest",
     "viscous": "viscous damping",
 }

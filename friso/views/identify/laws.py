@@ -42,10 +42,11 @@ def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
 
 def how(comparison: LawComparison) -> str:
     """How they were compared, in a sentence."""
-    parts = "each of the logs" if len(comparison.logs) > 1 else f"each of {comparison.parts} pieces of the log"
+    whole = comparison.parts == len(comparison.logs)
+    parts = "each of the logs" if whole else f"each of {comparison.parts} pieces of the logs"
     return (
-        f"Left out by turns: {parts}. Errors are RMS, as shares of the standard deviation of the friction; laws within "
-        "a standard error of the best are supported."
+        f"Left out by turns: {parts}. Errors are RMS, as shares of the standard deviation of the friction; a law is "
+        "supported unless it predicts worse than the best by more than 1 % and by more than chance would have it."
     )
 
 

@@ -26,6 +26,7 @@ DOUBTS = {
     "certain": "friso check is not certain that nothing attracts it",
     "given up": "friso check gave up the search for its edge of hunting",
     "distance": "its edge of hunting is closer than wanted",
+    "bandwidth": "its bandwidth is above your limit, or not known",
     "window": "something attracts it at a bandwidth nearby",
     "own margin": "a settled state of the stage itself has less margin than wanted",
     "hunting": "something attracts too many of the machines, or may",

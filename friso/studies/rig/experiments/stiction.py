@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
 from friso.errors import InputError
 from friso.identification.experiments.stick_slip import StickSlip, static_from_stick_slip
@@ -103,6 +104,6 @@ def _log(free: Stage, chunk: Recorded, row: int, number: int, seed: int) -> RigL
 
 def true_range(log: RigLog) -> tuple[float, float]:
     """Least and greatest static friction [N] where the cart went."""
-    flat = log.stage.flat()
-    along = flat["friction.static"] * friction_factors(flat, log.true["cart_position"])[0]
+    flat = anywhere(log.stage.flat())
+    along = level_under_conditions(flat, "static") * friction_factors(flat, log.true["cart_position"])[0]
     return float(along.min()), float(along.max())
