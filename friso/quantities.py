@@ -28,10 +28,15 @@ NOTHING = "–"
 """Stands where there is nothing to say."""
 
 
+ROUNDING = 1e-9
+"""Share that is as good as none."""
+
+
 def percent(share: float, digits: int = 2, signed: bool = False) -> str:
-    """A share in percent, to so many significant digits; a dash where there is none."""
+    """A share in percent, to so many significant digits; a dash for none, 0 where it is mere rounding."""
     if not math.isfinite(share):
         return NOTHING
+    share = share if abs(share) > ROUNDING else 0.0
     number, plus = float(f"{100 * share:.{digits}g}"), "+" if signed else ""
     return f"{number:{plus}.0f} %" if abs(number) >= 10**digits else f"{number:{plus}g} %"
 

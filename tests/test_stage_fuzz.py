@@ -231,7 +231,11 @@ def test_changes(place: tuple[str, str, str], value: object) -> None:
 @given(st.text() | quantities)
 def test_set_values_come_through(text: str) -> None:
     assert parse_set(f"name={as_toml(text)}") == ("name", text)
-    key, value = parse_set(f"name={text}")
+    try:
+        key, value = parse_set(f"name={text}")
+    except InputError:  # a quote that is not closed
+        assert text.strip()[0] in "\"'"
+        return
     assert key == "name"
     assert value == text.strip() or not isinstance(value, str) or as_toml(value)[1:-1] in text
 

@@ -62,9 +62,11 @@ class TuneAnswer(Answer):
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """The design of leaf springs for an isolator, where `friso design` knows the controller."""
-        from friso.equations.controllers.van_dijk import CROSSOVER
+        from friso.design_method.prepare import check_designable
 
-        if CROSSOVER not in self.result.stage.flat():
+        try:
+            check_designable(self.result.stage)
+        except InputError:
             return []
         isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffix == ".toml"]
         return [f"friso design {file}" for file in isolators]

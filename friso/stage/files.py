@@ -204,10 +204,13 @@ _INDENT = " " * 12
 
 def _open_quote(line: str) -> int | None:
     """Where the quote stands that is not closed in a line, None for none."""
-    opened: int | None = None
+    opened, escaped = None, False
     for place, sign in enumerate(line):
-        if opened is not None:
-            opened = None if sign == line[opened] and (sign == "'" or line[place - 1] != "\\") else opened
+        if escaped:
+            escaped = False
+        elif opened is not None:
+            escaped = sign == "\\" and line[opened] == '"'
+            opened = None if sign == line[opened] else opened
         elif sign == "#":
             return None
         elif sign in "\"'":

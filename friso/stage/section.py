@@ -161,9 +161,10 @@ class Variants:
 
     @property
     def classes(self) -> dict[str, type[Section]]:
-        """The variants by name; those of modules of their own alphabetically, whichever is imported first."""
+        """The variants by name; of those of modules of their own first friso's, alphabetically, whichever was imported
+        first."""
         load_own(self.group)
-        return dict(sorted(self._classes.items())) if self.group else self._classes
+        return self._classes
 
     def name_of(self, cls: type[Section]) -> str:
         """The name that a variant declares as `kind: Literal["step"]`."""
@@ -178,6 +179,12 @@ class Variants:
             expected = f"a name that is not taken: {holder.__module__}.{holder.__qualname__} has it"
             raise InputError(self.tag, actual, expected, f'{self.tag}: Literal["my_{name}"]')
         self._classes[name] = cls
+        if self.group:
+            own_first = sorted(
+                self._classes.items(), key=lambda item: (not item[1].__module__.startswith("friso."), item[0])
+            )
+            self._classes.clear()
+            self._classes.update(own_first)
         return cls
 
     def named(self, name: Any) -> type[Section] | None:

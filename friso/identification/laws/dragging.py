@@ -82,9 +82,9 @@ def dragged_record(log: Log, between: Between) -> DraggedRecord | str:
 def blocks(records: Sequence[DraggedRecord], pieces: int) -> list[list[np.ndarray]]:
     """What is left out by turns, by record, as masks of shape (m,): each record as a whole, where there are as many as
     `pieces` are wanted; of fewer, pieces in time, as many of each."""
-    each = -(-pieces // len(records))
+    cuts = -(-pieces // len(records))
     parts = []
     for out in records:
-        piece = np.arange(len(out.force)) * each // len(out.force)
-        parts += [[(piece == k) if r is out else np.zeros(len(r.force), bool) for r in records] for k in range(each)]
+        piece = np.arange(len(out.force)) * cuts // len(out.force)
+        parts += [[(piece == k) if r is out else np.zeros(len(r.force), bool) for r in records] for k in range(cuts)]
     return parts

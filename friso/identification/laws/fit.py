@@ -83,9 +83,9 @@ class LawProblem:
         """The keys of the law [SI] for some numbers, shape (parameters,)."""
         value = dict(zip(self.names, np.exp(numbers), strict=True))
         static = value["coulomb"] + value["gap"]
-        known = self.before.levels
+        before = self.before.levels
         levels = replace(
-            known,
+            before,
             static=static,
             coulomb=value["coulomb"],
             stribeck_velocity=value["stribeck_velocity"],

@@ -26,6 +26,8 @@ def file_format(path: Path) -> str:
         size = path.stat().st_size
         with path.open("rb") as file:
             head = FileHead(path, file.read(520))
+    except LogError:
+        raise
     except (OSError, ValueError) as error:  # a name that no file has
         reason = getattr(error, "strerror", None) or "no name of a file"
         raise LogError("log", f"a file that cannot be opened ({reason})", "a log", "", str(path)) from None

@@ -54,7 +54,7 @@ def figures(tuning: Advice) -> list[Figure]:
     return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
 
 
-class Line(NamedTuple):
+class RemedyLine(NamedTuple):
     """How what is drawn of a stage is named and drawn."""
 
     label: str
@@ -62,18 +62,19 @@ class Line(NamedTuple):
     dash: Dash
 
 
-def shown(tuning: Advice) -> list[tuple[Stage, RemedyOutcome | None, Line]]:
+ShownRemedy = tuple[Stage, RemedyOutcome | None, RemedyLine]
+Lines = Sequence[ShownRemedy]
+
+
+def shown(tuning: Advice) -> list[ShownRemedy]:
     """The stages that are drawn: as it is, and with each remedy that has settings."""
-    lines: list[tuple[Stage, RemedyOutcome | None, Line]] = [(tuning.stage, None, Line("as it is", INK, "solid"))]
+    lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in tuning.outcomes:
         if outcome.stage is not None:
             again, number = divmod(len(lines) - 1, len(COLOURS))
-            line = Line(_name(outcome), COLOURS[number], "dashed" if again else "solid")
+            line = RemedyLine(_name(outcome), COLOURS[number], "dashed" if again else "solid")
             lines.append((outcome.stage, outcome, line))
     return lines
-
-
-Lines = Sequence[tuple[Stage, RemedyOutcome | None, Line]]
 
 
 def _name(outcome: RemedyOutcome) -> str:
