@@ -44,8 +44,8 @@ def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     >>> round(friso.tuning(8.0, 0.1, 2.0, 1.7).true_crossover, 2)
     8.08
     """
-    numbers = {"crossover": crossover, "alpha": alpha, "beta": beta, "mass": mass}
-    for name, value in numbers.items():
+    arguments = {"crossover": crossover, "alpha": alpha, "beta": beta, "mass": mass}
+    for name, value in arguments.items():
         if not 1 / MOST <= value <= MOST:
             raise InputError(name, f"{value:g}", f"a number from {1 / MOST:g} to {MOST:g}", EXAMPLE)
     flat = {"friction.model": "none", "masses.stage": mass, **tuned(crossover, alpha, beta, mass)}

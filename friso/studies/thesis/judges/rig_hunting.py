@@ -176,7 +176,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
             Part(
                 f"there it is less regular from cycle to cycle (period scatters by more than {percent(_IRREGULAR)})",
                 scatter > _IRREGULAR,
-                f"median scatter of the period {number_text(scatter, '.2%')}",
+                f"median scatter of the period {percent(scatter)}",
                 why="friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
                 "the model",
             ),

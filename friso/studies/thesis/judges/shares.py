@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -9,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting import COUNTED_AFTER
+from friso.quantities import percent
 from friso.studies.thesis.claims import Evidence, Finding, Part, Response, judges
 
 if TYPE_CHECKING:
@@ -50,12 +52,12 @@ class Sticking:
         """Whether there is a break-away in both directions."""
         return {1, -1} <= set(self.direction)
 
-    def words(self, values: np.ndarray, form: str, unit: str = "") -> str:
-        """The mean, and the means in the two directions, with their unit."""
+    def words(self, values: np.ndarray, written: Callable[[float], str]) -> str:
+        """The mean, and the means in the two directions, as numbers are `written`."""
         if not self.both:
             return "no cycle"
-        ways = " and ".join(f"{values[self.direction == direction].mean():{form}}{unit}" for direction in (1, -1))
-        return f"{self.mean(values):{form}}{unit} ({ways} in the two directions)"
+        forward, back = (written(float(values[self.direction == direction].mean())) for direction in (1, -1))
+        return f"{written(self.mean(values))} ({forward} and {back} in the two directions)"
 
 
 @judges("F13", figure="13", needs=(WIDE, NARROW))
@@ -73,14 +75,14 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
                 "the mean time from stick (cart slower than the Stribeck velocity) to break-away (faster again) is "
                 "longer with F_c 1.5 N than with 0.5 N",
                 narrow.mean(narrow.time) > wide.mean(wide.time),
-                f"{narrow.words(narrow.time, '.2f', ' s')} against {wide.words(wide.time, '.2f', ' s')}",
+                f"{narrow.words(narrow.time, _seconds)} against {wide.words(wide.time, _seconds)}",
                 why,
             ),
             Part(
                 "the mean share of the integral action in the force at break-away is larger with F_c 1.5 N than with "
                 "0.5 N",
                 narrow.mean(narrow.integral) > wide.mean(wide.integral),
-                f"{narrow.words(narrow.integral, '.0%')} against {wide.words(wide.integral, '.0%')}",
+                f"{narrow.words(narrow.integral, percent)} against {wide.words(wide.integral, percent)}",
                 why,
             ),
         )
@@ -111,3 +113,7 @@ def _slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
     spells = [(int(a) + 1, int(b)) for a, b in pairwise(edges) if slow[a + 1]]
     time = trace["time"].values
     return [(i, k) for i, k in spells if time[k] - time[i] > TURNING]
+
+
+def _seconds(time: float) -> str:
+    return f"{time:.2f} s"
