@@ -11,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -114,7 +113,8 @@ class Workshop:
             self.lanes[place].overtake()
         self.lanes[place] = work
         try:
-            loop.run_in_executor(self.quick if quick else self.pool, partial(copy_context().run, work.run, job))
+            context = copy_context()
+            loop.run_in_executor(self.quick if quick else self.pool, lambda: context.run(work.run, job))
             while (part := await parts.get()) is not None:
                 yield frame(part)
         finally:

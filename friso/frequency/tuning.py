@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friso.equations.controllers.van_dijk import tuned
+from friso.equations.controllers.van_dijk import numbers, tuned
 from friso.errors import InputError
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
