@@ -74,7 +74,8 @@ def factors(flat: Mapping[str, Any]) -> dict[str, Any]:
     loaded = 1 - own["load_share"] + own["load_share"] * own["load"]
     warm = np.exp(-own["running_time"] / own.get("warm_up_time", np.inf))
     common = loaded * (1 + (own["cold"] - 1) * warm)
-    place = _at_place(flat, own["place"]) if "place" in own and "rail.seed" in flat else np.ones(len(LEVELS))
+    varies = "rail.seed" in flat and ("rail.correlation_length" in flat or not _deviates(flat))  # else a rule is broken
+    place = _at_place(flat, own["place"]) if "place" in own and varies else np.ones(len(LEVELS))
     made = {factor_key(name): common * there for name, there in zip(LEVELS, place, strict=True)}
     made[GROWTH] = own["load_share"] * own["load_per_acceleration"] / loaded
     return {key: value if np.ndim(value) else float(value) for key, value in made.items()}
@@ -86,6 +87,11 @@ def anywhere(flat: Mapping[str, Any]) -> dict[str, Any]:
         return dict(flat)
     free = {key: value for key, value in flat.items() if key != f"{CONDITIONS}.place"}
     return free | factors(free)
+
+
+def _deviates(flat: Mapping[str, Any]) -> bool:
+    """Whether levels deviate at random along the rail."""
+    return any(np.any(flat.get(f"rail.{level}_deviation", 0.0)) for level in LEVELS)
 
 
 def _at_place(flat: Mapping[str, Any], place: Any) -> np.ndarray:

@@ -164,9 +164,9 @@ class Outward:
         suggested, and what; None if there is none; and whether that is decided."""
         last = len(suggested.factors) - 1
         motions, decided = [motion for motion in suggested.motions if motion.stage < last], True
-        known = max((motion.stage for motion in motions), default=-1)
+        nearest = max((motion.stage for motion in motions), default=-1)
         doubtful = np.flatnonzero(np.isfinite(suggested.held[:last]).any(axis=1))
-        doubtful = doubtful[doubtful > known]
+        doubtful = doubtful[doubtful > nearest]
         if doubtful.size:
             survey = self.surveyed(suggested.factors[doubtful], suggested.held[doubtful], at_once=True)
             motions += [replace(motion, stage=int(doubtful[motion.stage])) for motion in survey.motions]
