@@ -13,6 +13,7 @@ from benchmarks.truth.swings import FAILED, SWINGS, UNSURE, judge, legs
 from friso.engine.arrays import STATISTICS, Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
+from friso.equations.continuous import slow_gains
 from friso.equations.motion import last_corner
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import structure
@@ -104,24 +105,10 @@ class Bench:
     @cached_property
     def period(self) -> float:
         """About the period of a cycle that sticks at a third of that length [s]: twice the time to wind up, by the
-        actuator's force of a stage that stands still, and an oscillation."""
-        n = self.kernel
-        flat = {**self.held, "motion.size": self.length, "motion.duration": np.inf}
-        values = n.values(flat, 1)
-        stands = n.settled(flat, Steady(-self.length, self.length), 1).T[: len(n.states)]
-        modes = np.zeros((len(n.kinks), 1))
-        rows = n.module.right_hand_side(stands, modes, 0.0, np.zeros(3), values)
-        wound = stands + np.array([np.ravel(row)[:1] for row in rows]) * self._integrals[:, None]
-        number = list(n.outputs).index("force")
-        rise = [np.ravel(n.module.outputs(x, modes, 0.0, np.zeros(3), values)[number])[0] for x in (stands, wound)]
-        wait = self._number("breakaway") / abs(rise[1] - rise[0]) * 3
+        integral gain of the controller, and an oscillation; infinite without an integral."""
+        _, integral = slow_gains(self.flat)
+        wait = 3 * self._number("stiffness") / abs(integral) if integral else np.inf
         return float(2 * (wait + 2 * np.pi / self.omega))
-
-    @property
-    def _integrals(self) -> np.ndarray:
-        mask = np.zeros(len(self.kernel.states))
-        mask[self.kernel.having(Role.INTEGRAL)] = 1.0
-        return mask
 
     @property
     def held(self) -> dict[str, Any]:
