@@ -107,7 +107,9 @@ class FakeCase:
         return self.judgement.verdict
 
 
-def fake_stage(name: str = "Thesis rig", locked: bool | None = None, force_limit: float | None = None) -> Any:
+def fake_stage(
+    name: str = "Thesis rig", locked: bool | None = None, force_limit: float | None = None, duration: float = 20.0
+) -> Any:
     joint = None if locked is None else SimpleNamespace(locked=locked, stroke=1e-3)
     return SimpleNamespace(
         name=name,
@@ -119,6 +121,7 @@ def fake_stage(name: str = "Thesis rig", locked: bool | None = None, force_limit
             bandwidth_name=VanDijk.bandwidth_name,
             speeds_up=PidGains.speeds_up,
         ),
+        motion=SimpleNamespace(duration=duration),
         flat=lambda: {"motion.kind": "hold"},
         to_toml=lambda: f"name = {json.dumps(name)}\n",
     )

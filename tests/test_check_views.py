@@ -401,6 +401,12 @@ def test_a_peak_count_that_contradicts_the_verdict_is_explained(wording: Wording
         wording(changed_rows(tabled(judgement, peaks=6), tabled(judgement, peaks=peaks)))
 
 
+def test_no_peak_counts_in_a_run_that_ends_before() -> None:
+    whole, short = (tabled(hunts(), peaks=0, stage=fake_stage(duration=end)) for end in (10.5, 10.0))
+    assert (whole["Counted peaks"] or "").startswith("0 ")
+    assert not re.search(r"\b0\b", short["Counted peaks"] or "0")
+
+
 def test_conclusion_names_what_the_joint_does(snapshots):
     cases = both_joints()
     hunting, settled = cases["locked"], cases["free"]

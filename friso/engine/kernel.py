@@ -186,13 +186,12 @@ class KernelRequest:
     def title(self) -> str:
         """The form in a few words."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
-        words = ["no friction" if form.friction == "none" else f"{form.friction} friction"]
-        if isinstance(form, Structure):
-            words.insert(0, "rigid stage" if form.joint == "rigid" else f"{form.joint} joint")
-            words += [form.controller.kind] if form.controller else []
+        words = [form.title if isinstance(form, Structure) else f"{form.friction} friction"]
         words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
         words += ["variational equations"] if self.variational else []
-        return ", ".join([*words, *([f"along {len(self.along)} keys"] if self.along else [])])
+        words += [f"along {len(self.along)} keys"] if self.along else []
+        words += [f"{self.lanes} lane{'s' * (self.lanes > 1)}"] if self.lanes != LANES else []
+        return ", ".join(words)
 
 
 _CIRCUMSTANCES = {

@@ -49,6 +49,18 @@ class ControllerForm:
         """The class that declares its blocks."""
         return CONTROLLERS.form(self.kind, self.form)
 
+    @property
+    def title(self) -> str:
+        """What it is, in a few words."""
+        settings = [name for name, present in self.settings._asdict().items() if present]
+        words = [
+            *(["no integral"] if not self.integral else []),
+            *([f"force limit, {self.anti_windup}"] if self.anti_windup else []),
+            *(filter.kind for filter in self.filters),
+            *settings,
+        ]
+        return f"{self.kind} ({', '.join(words)})" if words else self.kind
+
 
 @dataclass(frozen=True)
 class TransmissionForm:
@@ -85,6 +97,22 @@ class Structure:
     def plays(self) -> bool:
         """Whether there is a backlash."""
         return self.transmission is not None and self.transmission.backlash
+
+    @property
+    def title(self) -> str:
+        """What it is, in a few words."""
+        axis = f"rigid {' and '.join(self.masses)}" if self.joint == "rigid" else f"{self.joint} joint"
+        words = {
+            axis: True,
+            "transmission": self.transmission and not self.plays,
+            "transmission with backlash": self.plays,
+            "parasitic mode": self.parasitic,
+            f"constant force on {' and '.join(self.biased)}": self.biased,
+            "no friction" if self.friction == "none" else f"{self.friction} friction": True,
+            "load that follows": self.load_follows,
+            self.controller.title if self.controller else "": self.controller,
+        }
+        return ", ".join(word for word, present in words.items() if present)
 
 
 def structure(flat: Mapping[str, Any]) -> Structure:

@@ -113,7 +113,9 @@ def _moves(case: Case) -> str:
 
 
 def _peaks(case: Case) -> str:
-    """The peak count, and why it contradicts the verdict where it does."""
+    """The peak count, and why it contradicts the verdict where it does; none where the run ends too early."""
+    if case.stage.motion.duration <= COUNTED_AFTER:
+        return f"{NOTHING} (counted only after {COUNTED_AFTER:g} s)"
     remarks = {
         ("hunts", False): f" (counted only after {COUNTED_AFTER:g} s and above {with_unit(COUNTED_ABOVE, 'm')})",
         ("bistable", False): " (another motion hunts)",
