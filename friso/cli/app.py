@@ -136,7 +136,8 @@ def _failed(error: BaseException) -> int:
         return 2
     usage = getattr(error, "format_message", None)
     if usage is not None:
-        say(f"{usage()}\n  try: friso --help")
+        context = getattr(error, "ctx", None)
+        say(f"{usage()}\n  try: {context.command_path if context else 'friso'} --help")
         return 2
     if isinstance(error, RuntimeError | OSError | MemoryError):
         say(f"the computation could not be completed: {error}")
