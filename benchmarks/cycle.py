@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
-from friso.hunting.basin import displacements, moves, pushes
+from friso.hunting.basin import displacements_that_hunt, moves_that_hunt, pushes_that_hunt
 from friso.hunting.boundary import Plane
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
@@ -64,7 +64,7 @@ def run_verdict(repetitions: int) -> list[Goal]:
 def _what_starts(stage: Stage) -> None:
     verdict = hunting(stage)
     if verdict.attracting:
-        for kind in (displacements, pushes, moves):
+        for kind in (displacements_that_hunt, pushes_that_hunt, moves_that_hunt):
             kind(stage, verdict.attracting[0])
     margin(stage, bool(verdict.attracting))
 

@@ -251,7 +251,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join([*QUICK, *LONG])}; or: quick")
     parser.add_argument("--equations", action="store_true", help="compare the equations with the revision on file")
     arguments = parser.parse_args()
-    entries, equations = dict(evidence.entries()), evidence.equations()
+    entries, equations = dict(evidence.findings_on_file()), evidence.equations()
     if arguments.equations and (changed := differ(equations.numbers)):
         print("The equations have changed:", *changed, sep="\n  ")
         equations = Equations(equations.revision + 1, date.today(), reference_numbers())

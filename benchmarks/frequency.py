@@ -14,7 +14,7 @@ import numpy as np
 import friso
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from friso.frequency.bode import bode
-from friso.frequency.family import DENSITY, grid, scan
+from friso.frequency.family import DENSITY, frequency_grid, scan_stability
 from friso.frequency.members import Members, family
 from friso.stage import Stage
 from friso.studies.thesis.studies import thesis_rig
@@ -40,14 +40,14 @@ def run(repetitions: int) -> list[Goal]:
         stage = thesis_rig().replace(changes)
         flat = stage.flat()
         members = family(flat, MEMBERS // 4, MEMBERS // 4)
-        times = [clock(lambda: scan(flat, members)) for _ in range(repetitions + 1)][1:]  # noqa: B023
+        times = [clock(lambda: scan_stability(flat, members)) for _ in range(repetitions + 1)][1:]  # noqa: B023
         analyses = [clock(lambda: bode(stage)) for _ in range(repetitions)]  # noqa: B023
         rows.append([name, len(members), spread(times, digits=2), spread(analyses, digits=2)])
         about = f"worst case over {len(members)} states, {name}"
         goals.append(Goal(about, "< 1 s", f"{min(times):.2f} s", min(times) < 1))
         if name == "continuous":
             few = members[np.linspace(0, len(members) - 1, ONE_BY_ONE).astype(int)]
-            slow = clock(lambda: one_by_one(stage, few, grid(flat, DENSITY))) / ONE_BY_ONE * len(members)  # noqa: B023
+            slow = clock(lambda: one_by_one(stage, few, frequency_grid(flat, DENSITY))) / ONE_BY_ONE * len(members)  # noqa: B023
             ratio = f"{slow / min(times):.0f} times"
             goals.append(Goal("against python-control, state after state", "", ratio, None))
     print_table(("drive", "states", "scan min / median [s]", "friso.bode min / median [s]"), rows)

@@ -72,7 +72,7 @@ def friso_seconds(rig: Rig, rtol: float, runs: int, threads: int, spread_share: 
         flat["controller.crossover"] = flat["controller.crossover"] * np.linspace(
             1 - spread_share, 1 + spread_share, runs
         )
-    options = measures.options(rtol, threads)  # as a sweep runs it
+    options = measures.measuring_options(rtol, threads)  # as a sweep runs it
     return clock(lambda: list(run_chunks(rig.kernel, flat, runs, options))) * threads / runs
 
 

@@ -35,11 +35,11 @@ from friso.stage import Stage, load
 from friso.stage.files import save
 from friso.studies.rig.experiments.frf import plant_log
 from friso.studies.rig.experiments.presliding import presliding_log
-from friso.studies.rig.experiments.stiction import slow_motion
+from friso.studies.rig.experiments.stiction import slow_legs
 from friso.studies.rig.experiments.stiffness import steps
 from friso.studies.rig.many_speeds import many_speeds_logs
 from friso.studies.rig.outcome import RigLog
-from friso.studies.rig.sizes import freed, locked, travel
+from friso.studies.rig.sizes import freed, locked_stage, travel
 from friso.studies.rig.slow_sliding import slow_sliding_logs
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
@@ -66,12 +66,14 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
     def shaken(machine_stage: Stage, name: str) -> list[RigLog]:
         return [plant_log(machine_stage, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
 
-    slow = slow_motion(stage, noise, 1)
-    small = [presliding_log(locked(stage), f"presliding_{n + 1}", place, noise + n) for n, place in enumerate(places)]
-    passes = many_speeds_logs(locked(stage), noise)
-    sliding = slow_sliding_logs(locked(stage), passes, noise)
+    slow = slow_legs(stage, noise, 1)
+    small = [
+        presliding_log(locked_stage(stage), f"presliding_{n + 1}", place, noise + n) for n, place in enumerate(places)
+    ]
+    passes = many_speeds_logs(locked_stage(stage), noise)
+    sliding = slow_sliding_logs(locked_stage(stage), passes, noise)
     return [
-        [*shaken(locked(stage), "locked"), steps(stage, noise), *slow, *small, *passes, *sliding],
+        [*shaken(locked_stage(stage), "locked"), steps(stage, noise), *slow, *small, *passes, *sliding],
         shaken(freed(stage), "free"),
     ]
 

@@ -23,7 +23,7 @@ from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import tune
 from friso.remedies.search import Budget, Search
-from friso.remedies.verified import RemedyOutcome, measure
+from friso.remedies.verified import RemedyOutcome, performance_of
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
 from friso.views.tune.words import changes
@@ -106,7 +106,7 @@ def thesis() -> None:
     begun = perf_counter()
     advice = tune(locked, goal, chosen=["bandwidth", "isolator"])
     print(f"{perf_counter() - begun:.0f} s")
-    listed = {"locked": advice.present, "thesis, Sec. 3.4": measure(free, advice.machines, goal, free)}
+    listed = {"locked": advice.present, "thesis, Sec. 3.4": performance_of(free, advice.machines, goal, free)}
     listed |= {outcome.remedy.name: outcome.measured for outcome in advice.outcomes if outcome.measured}
     head = ("", "meet the goal", "95 % settle in", "median", "force", "margin", "stiffness")
     rows = [
@@ -156,7 +156,7 @@ def main() -> None:
             search = Search(outcome.remedy, goal, machines, stage, Budget(), lambda label: None)
             tuned = float(search.measured(outcome.shares[None]).settling[0])
             best = brute(outcome, stage, goal, machines, options.settings)
-            share = measure(outcome.stage, fresh, goal, stage).share(goal)
+            share = performance_of(outcome.stage, fresh, goal, stage).share(goal)
             worst, least = max(worst, tuned / best), min(least, share.probability)
             cells = (f"{tuned:.4g} s", f"{best:.4g} s", f"{tuned / best:.3f}", f"{100 * share.probability:.1f} %")
             rows.append((name, outcome.remedy.name, "works", *cells, f"{seconds:.0f} s"))

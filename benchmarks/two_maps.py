@@ -14,7 +14,7 @@ from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, Rig
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.hunting.criteria import COUNTED_AFTER, distinct_peaks
-from friso.hunting.measures import RESOLVED, measure, options
+from friso.hunting.measures import RESOLVED, measure_runs, measuring_options
 
 STRICT = 1e-9
 """rtol whose verdicts the others are compared with."""
@@ -78,8 +78,8 @@ def _count(chunk: Runs) -> np.ndarray:
 
 def _measured_map(case: Map, rtol: float) -> None:
     """The same with all measures that `friso.sweep` reports."""
-    for chunk in run_chunks(case.rig.kernel, case.flat, len(case.prototype), options(rtol)):
-        measure(chunk.part(case.flat), chunk)
+    for chunk in run_chunks(case.rig.kernel, case.flat, len(case.prototype), measuring_options(rtol)):
+        measure_runs(chunk.part(case.flat), chunk)
 
 
 def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) -> list[Goal]:

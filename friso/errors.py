@@ -39,8 +39,8 @@ class InputError(ValueError):
 
     def under(self, table: str) -> Self:
         """The same error, its keys seen from one level further out."""
-        also = tuple((_joined(table, key), actual) for key, actual in self.also)
-        return type(self)(_joined(table, self.key), self.actual, self.expected, self.example, self.origin, also)
+        also = tuple((_dotted(table, key), actual) for key, actual in self.also)
+        return type(self)(_dotted(table, self.key), self.actual, self.expected, self.example, self.origin, also)
 
     def found_in(self, origin: str) -> Self:
         """The same error, saying which file or option it comes from."""
@@ -54,7 +54,7 @@ class InputError(ValueError):
         )
 
 
-def _joined(table: str, key: str) -> str:
+def _dotted(table: str, key: str) -> str:
     return ".".join(part for part in (table, key) if part)
 
 

@@ -55,7 +55,7 @@ class Equations:
 
 
 @cache
-def entries() -> Mapping[str, Entry]:
+def findings_on_file() -> Mapping[str, Entry]:
     """All findings on file, by name."""
     return {name: _entry(name, row) for name, row in _file()["finding"].items()}
 
@@ -69,7 +69,7 @@ def equations() -> Equations:
 
 def value(entry: str, name: str) -> float:
     """One number of a finding [SI, or as its unit says]. Raises KeyError for one that is not on file."""
-    return entries()[entry].values[name]
+    return findings_on_file()[entry].values[name]
 
 
 def _entry(name: str, row: dict) -> Entry:

@@ -60,7 +60,7 @@ def raising() -> Iterator[None]:
 
 
 @contextmanager
-def held() -> Iterator[None]:
+def hold_interrupts() -> Iterator[None]:
     """Ctrl-C and a termination wait for the end of the block. In another thread than the main one, which they do not
     reach, nothing is done."""
     if threading.current_thread() is not threading.main_thread():

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from friso.engine.kernel import Kernel
-from friso.engine.machine_code import load, object_code
-from friso.engine.vector_code import written
+from friso.engine.machine_code import load_object, object_code
+from friso.engine.vector_code import vector_llvm
 
 
 @cache
 def function(original: Callable[..., Any], lanes: int, numbers: int) -> Any:
     """The compiled function of a buffer's address and so many numbers."""
-    return at_address(load(object_code(written({"run": original}, lanes)), ["run"])["run"], numbers)
+    return at_address(load_object(object_code(vector_llvm({"run": original}, lanes)), ["run"])["run"], numbers)
 
 
 def at_address(address: int, numbers: int) -> Any:

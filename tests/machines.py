@@ -13,9 +13,9 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 import friso
-from friso.engine.driven import follow
+from friso.engine.driven import run_driven
 from friso.identification.logs.log import Log
-from friso.identification.output_error.problem import RTOL, closed_loop
+from friso.identification.output_error.problem import RTOL, loop_problem
 from friso.identification.readings.common import record
 
 FIXED = 1e9
@@ -88,12 +88,12 @@ class Machine:
         `bare`."""
         step, flat = self.sample_time / FINE, self.flat
         inputs = record(name, step, reference=reference, position=0 * reference, force=0 * reference)
-        problem = closed_loop(flat, inputs, inputs.segments[0], ())
+        problem = loop_problem(flat, inputs, inputs.segments[0], ())
         result = problem.record(np.zeros(0))
         signals = {"reference": reference, "position": result.position, "force": result.force}
         if self.jointed:
             starts = np.zeros((1, len(problem.kernel.full_state)))
-            (runs,) = follow(problem.kernel, flat, 1, problem.inputs, starts, RTOL)
+            (runs,) = run_driven(problem.kernel, flat, 1, problem.inputs, starts, RTOL)
             signals["cart_position"] = runs.states[0, :, problem.kernel.states.index("cart_position")]
         return self.measured(record(name, self.sample_time, **{k: v[::FINE] for k, v in signals.items()}), bare)
 

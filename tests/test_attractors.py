@@ -17,7 +17,7 @@ from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck, wait
-from friso.hunting.margin import margin, searched
+from friso.hunting.margin import margin, search_bandwidths
 from friso.hunting.outward import Beyond, Outward
 from friso.hunting.verdict import WORK, Motions, judge_many, judge_runs
 from friso.stage import Stage
@@ -185,7 +185,7 @@ UPPER = 39.5987
 def test_every_window_in_which_a_stage_hunts_is_searched() -> None:
     """From both windows, and from the gap between them."""
     for crossover, attracting in ((8.0, True), (20.0, False), (60.0, True)):
-        sought = searched(UNWOUND.replace({"controller.crossover": f"{crossover} Hz"}), attracting)
+        sought = search_bandwidths(UNWOUND.replace({"controller.crossover": f"{crossover} Hz"}), attracting)
         ends = [end for window in sought.windows for end in (window.low, window.high) if end is not None]
         if crossover < 60:
             assert sought.margin is not None

@@ -13,7 +13,18 @@ from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 import friso
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Target
-from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, MoveShare, displacements, ends_in, evenly, moves, pushes
+from friso.hunting.basin import (
+    EDGE,
+    MOVES,
+    SHARES,
+    Kick,
+    MoveShare,
+    displacements_that_hunt,
+    ends_in,
+    evenly,
+    moves_that_hunt,
+    pushes_that_hunt,
+)
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
@@ -49,7 +60,7 @@ def target() -> Target:
 
 @cache
 def windows() -> Kick:
-    return displacements(rigid(8), target())
+    return displacements_that_hunt(rigid(8), target())
 
 
 def hunts(chosen: Stage) -> bool:
@@ -109,7 +120,7 @@ def test_mirrored_releases_start_hunting_as_well() -> None:
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
     chosen = rigid(8)
-    result = pushes(chosen, target())
+    result = pushes_that_hunt(chosen, target())
     low, high = result.windows[0]
     velocities = np.array([low * 1.02, high / 1.02, low / 1.02, high * 1.02])
     stages = Ensemble.held(chosen.flat(), 4)
@@ -134,7 +145,7 @@ MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
 @RIGID
 def test_share_of_moves_is_reproducible() -> None:
     """The same draws each time: the same numbers."""
-    first, second = moves(MOVING, target()), moves(MOVING, target())
+    first, second = moves_that_hunt(MOVING, target()), moves_that_hunt(MOVING, target())
     assert first is not None
     assert first == second
     assert first.count == MOVES
@@ -147,7 +158,7 @@ def test_share_of_moves_is_reproducible() -> None:
 @RIGID
 def test_moves_by_single_runs() -> None:
     """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
-    result = moves(MOVING, target())
+    result = moves_that_hunt(MOVING, target())
     assert result is not None
     drawn = qmc.scale(evenly(MOVES).T, *zip(result.accelerations, result.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
@@ -166,7 +177,7 @@ def test_moves_by_single_runs() -> None:
 def test_moves_that_overlap_are_not_drawn() -> None:
     """A move takes twice the acceleration time, and the stage returns after it has arrived."""
     soon = MOVING.replace({"motion.return_at": "0.08 s"})
-    result = moves(soon, target())
+    result = moves_that_hunt(soon, target())
     assert result is not None
     assert result.times == pytest.approx([SHARES[0] * 0.03, 0.04])
 
@@ -174,8 +185,8 @@ def test_moves_that_overlap_are_not_drawn() -> None:
 @RIGID
 def test_motions_without_acceleration_have_no_share() -> None:
     """A release has none, nor does a move that stays where it is."""
-    assert moves(rigid(8), target()) is None
-    assert moves(MOVING.replace({"motion.acceleration": "0 m/s^2"}), target()) is None
+    assert moves_that_hunt(rigid(8), target()) is None
+    assert moves_that_hunt(MOVING.replace({"motion.acceleration": "0 m/s^2"}), target()) is None
 
 
 @given(drawn=st.integers(1, 500), data=st.data())

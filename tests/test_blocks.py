@@ -12,7 +12,7 @@ import sympy as sp
 from variants import limit, lugre, stage, step, van_dijk
 
 import friso
-from friso.equations.blocks import Blocks, Demand, Loop, Measured, Signal, measured
+from friso.equations.blocks import Blocks, Demand, Loop, Measured, Signal, loop_signals
 from friso.equations.component import STEADY, Kink, Role
 from friso.equations.continuous import Continuous, ForceLimit
 from friso.equations.sampled import SAMPLE_TIME, Rest, Sampled
@@ -35,7 +35,7 @@ BLOCKS: dict[str, Callable[[Blocks, Signal], Signal]] = {
 def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
     """What is held becomes at a sample what it is in the same motion a sample later."""
     blocks = Sampled(3)
-    signal = BLOCKS[name](blocks, measured(GOING, sp.S.One, sp.S.One).position)
+    signal = BLOCKS[name](blocks, loop_signals(GOING, sp.S.One, sp.S.One).position)
     _, held = blocks.finished(Demand({}, signal, signal, signal), None, Rest())
     now = {entry.symbol: entry.settled for entry in held}
     later = {POSITION: POSITION + VELOCITY * SAMPLE_TIME}
@@ -46,7 +46,7 @@ def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
 
 def test_a_steady_motion_lasts_in_continuous_time() -> None:
     blocks = Continuous(sp.S.One)
-    signal = BLOCKS["biquad"](blocks, measured(GOING, sp.S.One, sp.S.One).position)
+    signal = BLOCKS["biquad"](blocks, loop_signals(GOING, sp.S.One, sp.S.One).position)
     now = {item.symbol: item.settled for item in blocks.states}
     for state in blocks.states:
         assert sp.simplify(state.derivative.xreplace(now) - sp.diff(state.settled, POSITION) * VELOCITY) == 0
@@ -57,7 +57,7 @@ def test_a_steady_motion_lasts_in_continuous_time() -> None:
 def test_an_integrator_rests_at_each_limit_and_at_both(beyond: tuple[str, ...]) -> None:
     """Wound up further than either limit allows, or both, it stays; it does not run back."""
     blocks = Continuous(sp.S.One)
-    signal = blocks.integral(measured(GOING, sp.S.One, sp.S.One).error, sp.S(2), limit=sp.S(3))
+    signal = blocks.integral(loop_signals(GOING, sp.S.One, sp.S.One).error, sp.S(2), limit=sp.S(3))
     bound = ForceLimit.of(signal, "clamp")
     states, resting = blocks.finished(Demand({}, signal, signal, signal), bound)
     (integral,) = (state for state in states if state.role == Role.INTEGRAL)

@@ -14,7 +14,7 @@ from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
-from friso.studies.boundary_lines import changes_of
+from friso.studies.boundary_lines import stability_changes
 
 pytestmark = pytest.mark.xdist_group("rigid")
 
@@ -189,7 +189,7 @@ def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
     assert not traced.cycles.attracting.any()
     (fold,) = special(traced, symmetric=True)["fold"]
     assert fold[0] == pytest.approx(39.599, abs=0.001)
-    (change,) = changes_of(traced)
+    (change,) = stability_changes(traced)
     assert change.begins
     assert change.low == change.high == pytest.approx(39.599, abs=0.001)
 

@@ -22,7 +22,7 @@ from variants import (
 )
 
 import friso
-from friso.engine.driven import Inputs, follow
+from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.equations.driven import Driven
 from friso.equations.imposed import imposed_form
@@ -34,7 +34,7 @@ from friso.frequency.members import member
 from friso.frequency.parts import plant
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
-from friso.identification.output_error.parameters import parameters_of
+from friso.identification.output_error.parameters import fit_parameters
 from friso.stage.tables import friction_law
 from friso.virtual_rig.run import failures, run
 from friso.virtual_rig.task import own_motion
@@ -79,7 +79,7 @@ def drift(friction: str, periods: int) -> float:
     t = np.arange(periods * per + 1) / per / frequency
     force = (0.4 + 0.25 * np.sin(2 * np.pi * frequency * t)) * np.minimum(1, t * frequency / 4)
     inputs = Inputs(np.zeros(len(t)), force, 1 / per / frequency, held=False)
-    (runs,) = follow(shape, held.flat(), 1, inputs, np.zeros((1, shape.initial_size)), 1e-8)
+    (runs,) = run_driven(shape, held.flat(), 1, inputs, np.zeros((1, shape.initial_size)), 1e-8)
     position = runs.states[0, :, shape.position]
     return float(position[-per - 1 : -1].mean() - position[10 * per : 11 * per].mean())
 
@@ -178,7 +178,7 @@ def test_what_of_them_is_fitted() -> None:
     """Of rolling friction what LuGre has, its exponent as given; elasto-plastic friction is refused, not ignored: its
     stiffness is bounded by its break-away deflection."""
     levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
-    names = {item.name for item in parameters_of(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
+    names = {item.name for item in fit_parameters(HUNTING["rolling"].flat(), levels, 0.1, 0.1, True)}
     assert {"friction.bristle_stiffness", "friction.bristle_damping", "friction.stribeck_velocity"} <= names
     with pytest.raises(InputError, match="elasto_plastic"):
-        parameters_of(HUNTING["elasto_plastic"].flat(), levels, 0.1, 0.1, True)
+        fit_parameters(HUNTING["elasto_plastic"].flat(), levels, 0.1, 0.1, True)

@@ -236,7 +236,7 @@ def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
     monkeypatch.syspath_prepend(tmp_path)
     request = cache.CodeRequest("failing", "what fails", "failing_builder")
     with pytest.raises(RuntimeError, match="could not be compiled") as raised:
-        building.entries([request, request])
+        building.built_entries([request, request])
     assert ("no such stage" in str(raised.value)) == ("no such stage" in crash)
 
 
@@ -250,7 +250,9 @@ def test_a_builder_builds_again_unless_it_has_ended(tmp_path: Path, monkeypatch:
     processes: list[int] = []
     for number in range(3):
         with pytest.raises(RuntimeError, match="is not in"):  # it keeps nothing
-            building.entries([cache.CodeRequest(f"telling {number}", "what tells its process", "telling_builder")])
+            building.built_entries(
+                [cache.CodeRequest(f"telling {number}", "what tells its process", "telling_builder")]
+            )
         if number == 1:
             os.kill(processes[-1], signal.SIGTERM)
     assert processes[0] == processes[1] != processes[2]
@@ -269,7 +271,7 @@ def test_a_full_disk_is_said_in_a_line(tmp_path: Path, monkeypatch: pytest.Monke
     (tmp_path / "full_builder.py").write_text("def build(folder, task):\n    raise OSError(28, 'No space left')\n")
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(RuntimeError, match="No space left") as raised:
-        building.entries([cache.CodeRequest("full", "what needs room", "full_builder")])
+        building.built_entries([cache.CodeRequest("full", "what needs room", "full_builder")])
     assert "Traceback" not in str(raised.value)
 
 

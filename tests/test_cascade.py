@@ -31,7 +31,7 @@ from friso.frequency.members import limit_cases
 from friso.hunting.cycle.hunting import Hunting
 from friso.hunting.cycle.hunting import hunting as hunting_of
 from friso.identification.experiments.moves import identify_moves
-from friso.identification.output_error.problem import closed_loop
+from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.progress import silent
 from friso.stage import Stage
@@ -368,7 +368,7 @@ def test_identify_in_its_own_loop(whole: Stage) -> None:
     flat, time = one.flat(), np.arange(4000) * 1e-3
     reference = 0.02 * (1 - np.cos(2 * np.pi * time))
     blank = record("given", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
-    truth = closed_loop(flat, blank, blank.segments[0], ()).record(np.zeros(0))
+    truth = loop_problem(flat, blank, blank.segments[0], ()).record(np.zeros(0))
     log = record("moves", 1e-3, reference=reference, position=truth.position, force=truth.force)
     estimates = {estimate.name: estimate.value for estimate in identify_moves(log, flat, own_loop=True).estimates}
     assert sum(estimates[key] for key in flat if key.startswith("masses.")) == pytest.approx(1.7, rel=0.01)
@@ -387,7 +387,7 @@ def test_emps_is_a_cascade(tmp_path: Path) -> None:
     log = emps_log(tmp_path)
     part = slice(log.segments[0].start, log.segments[0].start + 4000)
     errors = [
-        closed_loop(machine.flat(), log, part, ()).residuals(np.zeros((1, 0)))[0]
+        loop_problem(machine.flat(), log, part, ()).residuals(np.zeros((1, 0)))[0]
         for machine in (axis, axis.replace({"controller": table}))
     ]
     assert np.sqrt(np.mean(errors[0] ** 2)) > 1.0  # newtons: the model is not perfect

@@ -33,8 +33,8 @@ from friso.hunting.criteria import (
     verdicts,
 )
 from friso.hunting.criteria.peak_count import DISTINCT
-from friso.hunting.measures import measure, measured_run, options
-from friso.hunting.turns import scan
+from friso.hunting.measures import measure_runs, measured_run, measuring_options
+from friso.hunting.turns import scan_turning_points
 from friso.hunting.verdict import judge, judge_many
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import turning_points
@@ -171,16 +171,16 @@ def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
     """The statistics and turning points of the kernel against samples of the same runs; each alone and together."""
     crossovers = np.array([2.0, 5.0, 8.0, 9.5, 12.0, 16.0])
     flat = rig.replace({"joint.locked": True}).flat({"controller.crossover": crossovers})
-    (runs,) = run_chunks(kernel(structure({**flat, "controller.crossover": 8.0})), flat, 6, options(1e-6))
-    words = measure(runs.part(flat), runs).outcome
+    (runs,) = run_chunks(kernel(structure({**flat, "controller.crossover": 8.0})), flat, 6, measuring_options(1e-6))
+    words = measure_runs(runs.part(flat), runs).outcome
     assert set(words) > {"swings", "rests"}
     for k, crossover in enumerate(crossovers):
         stage = rig.replace({"joint.locked": True, "controller.crossover": f"{crossover} Hz"})
         trace = friso.simulate(stage, rtol=1e-6, sample_time=1e-3)
         deviation = (trace.position - trace.reference).values[None]
         assert outcomes(end_of_traces(trace.time.values, deviation, BAND), BAND)[0] == words[k]
-        (alone,) = run_chunks(kernel(structure(stage.flat())), stage.flat(), 1, options(1e-6))
-        assert measure(stage.flat(), alone).outcome[0] == words[k]
+        (alone,) = run_chunks(kernel(structure(stage.flat())), stage.flat(), 1, measuring_options(1e-6))
+        assert measure_runs(stage.flat(), alone).outcome[0] == words[k]
 
 
 # ---------------------------------------------------------------- the peak count
@@ -265,9 +265,9 @@ def test_a_batch_of_turning_points_is_all_of_its_runs(gaps: list[tuple[float, fl
     pad[:, : len(times)] = both
     at = np.tile(np.pad(times, (0, 3)), (3, 1))
     swing, ended, counts = np.ptp(both, axis=1), np.full(3, 1.1 * times[-1]), np.full(3, len(times))
-    together = scan(at, pad, counts, swing, ended)
+    together = scan_turning_points(at, pad, counts, swing, ended)
     for k in range(3):
-        alone = scan(at[[k]], pad[[k]], counts[[k]], swing[[k]], ended[[k]])
+        alone = scan_turning_points(at[[k]], pad[[k]], counts[[k]], swing[[k]], ended[[k]])
         for item in fields(together):
             whole, single = getattr(together, item.name)[k], getattr(alone, item.name)[0]
             assert np.array_equal(whole, single, equal_nan=item.name in ("period", "earlier"))

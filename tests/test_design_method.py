@@ -12,15 +12,15 @@ import friso
 from friso.design_method import front as front_module
 from friso.design_method import relax as relax_module
 from friso.design_method.choice import chosen, confirmed
-from friso.design_method.controller import comfortable_below, controller, dampings
+from friso.design_method.controller import choose_controller, comfortable_below, dampings
 from friso.design_method.edges import Corners, edges_over, rigid
 from friso.design_method.front import Candidate, front, judged
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
-from friso.design_method.method import NoDesign, fitted, leaves
+from friso.design_method.method import NoDesign, fit_leaves, leaves
 from friso.design_method.modal import Modal
 from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
-from friso.design_method.relax import relaxations
+from friso.design_method.relax import relaxed_requirements
 from friso.design_method.requirements import PARASITIC, RESERVE, LeafTask, requirements
 from friso.design_method.spec import Spec, load_spec
 from friso.design_method.verification import RTOL, MachineOutcomes, tried, verification
@@ -32,7 +32,7 @@ from friso.hunting.measures import measured_run
 from friso.leaf_springs import beams as beams_module
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import BeamFailure
-from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
 from friso.stage import Stage
@@ -96,7 +96,7 @@ def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> No
 def test_better_than_the_thesis_in_both(task: LeafTask, candidates: list[Candidate]) -> None:
     """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and in parasitic frequency."""
     thesis = Geometry(70e-3, 45e-3, 60e-3, Sheet(2.0, 0.35e-3, "stainless 1.4310"))
-    own = closed(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).member(0), 1e-3)
+    own = closed_form_model(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).member(0), 1e-3)
     choice = chosen(replace(task, crossover=40.0), candidates)
     assert choice is not None
     assert choice.beams.drive[0] <= own.drive[0]
@@ -110,7 +110,7 @@ def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     """The requirements, written for arrays, against the figures of one mechanism."""
     geometry = Geometry(60e-3, 20e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
     item = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0)
-    result = closed(item, task.stroke)
+    result = closed_form_model(item, task.stroke)
     excess = {requirement.keys[0].key: float(requirement.excess(item)) for requirement in requirements(task)}
     weight = 9.80665 * 0.525  # of the heaviest stage
     assert excess["friction.static"] == pytest.approx(1.1 * 1.1 * result.forces[-1])
@@ -163,7 +163,7 @@ def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: py
     monkeypatch.setattr(relax_module, "GENERATIONS", 60)
     task = LeafTask(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
     assert not front(task)
-    result = {relaxation.key: relaxation for relaxation in relaxations(task)}
+    result = {relaxation.key: relaxation for relaxation in relaxed_requirements(task)}
     assert {"load.force_x", "friction.static"} <= result.keys()
     for share, enough in ((1.02, True), (0.9, False)):
         friction = 1 + (result["friction.static"].needed - 1) * share
@@ -270,7 +270,7 @@ def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
     loop_limits = limits(stage.flat())
     assert comfortable_below(loop_limits.comfortable, 43.0) == pytest.approx(43.0)
     assert comfortable_below(loop_limits.comfortable, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
-    expected = controller(
+    expected = choose_controller(
         stage, beams_module.beams(Mechanism.of(stage.flat()), 1e-3), loop_limits, corners(SPEC, stage.flat())
     )
     assert expected.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
@@ -293,7 +293,7 @@ def test_without_a_comfortable_crossover_there_is_no_design(
 
     monkeypatch.setattr(method, "comfortable_below", lambda ranges, highest: None)
     with pytest.raises(NoDesign, match="modulus margin"):
-        fitted(base, replace(task, crossover=40.0), candidates, corners(SPEC, base.flat()))
+        fit_leaves(base, replace(task, crossover=40.0), candidates, corners(SPEC, base.flat()))
 
 
 # --- verification -----------------------------------------------------------------------------------------------------

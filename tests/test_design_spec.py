@@ -10,9 +10,9 @@ import pytest
 from refusals import Refused
 
 import friso
-from friso.design_method.geometry import Geometry, Sheet, box, rounded, sheets
+from friso.design_method.geometry import Geometry, Sheet, box, round_geometries, sheets
 from friso.design_method.outline import outline
-from friso.design_method.population import corners, sampled, typical_move
+from friso.design_method.population import corners, random_machines, typical_move
 from friso.design_method.prepare import assumed, prepared, with_leaves
 from friso.design_method.spec import Spec, load_spec, read_spec
 
@@ -105,19 +105,19 @@ def test_corners_hold_the_ends_of_all_ranges(rig: friso.Stage) -> None:
 def test_drawn_machines_lie_in_all_ranges(rig: friso.Stage) -> None:
     spec = load_spec(SPEC)
     flat = rig.flat()
-    samples = sampled(spec, flat, 500, 0.3)
+    samples = random_machines(spec, flat, 500, 0.3)
     factors = samples.keys["joint.stiffness"] / flat["joint.stiffness"]
     assert (factors.min(), factors.max()) == pytest.approx((0.9 * 0.7, 1.1), abs=5e-3)
     travel = samples.keys["motion.acceleration"] * samples.keys["motion.acceleration_time"] ** 2
     assert travel.min() >= 1e-3 * (1 - 1e-9)
     assert travel.max() <= 0.1 * (1 + 1e-9)
     assert np.all(samples.keys["friction.coulomb"] < samples.keys["friction.static"])
-    again = sampled(spec, flat, 500, 0.3)
+    again = random_machines(spec, flat, 500, 0.3)
     assert all(np.array_equal(samples.keys[key], again.keys[key]) for key in samples.keys)
 
 
 def test_coulomb_friction_never_exceeds_the_static_one(rig: friso.Stage) -> None:
-    samples = sampled(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
+    samples = random_machines(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
     assert np.all(samples.keys["friction.coulomb"] <= samples.keys["friction.static"])
 
 
@@ -185,7 +185,7 @@ def test_a_prepared_stage_takes_leaves(rig: friso.Stage) -> None:
 
 def test_rounded_sizes_stay_in_the_space() -> None:
     spec = load_spec(SPEC)
-    near = rounded(spec, Geometry(69.97e-3, 15.02e-3, 40.04e-3, sheets(spec)[0]), 1e-4)
+    near = round_geometries(spec, Geometry(69.97e-3, 15.02e-3, 40.04e-3, sheets(spec)[0]), 1e-4)
     assert {round(item.length * 1e3, 3) for item in near} == {69.9, 70.0}
     assert {round(entry.width * 1e3, 3) for entry in near} == {15.0, 15.1}
     assert len(near) == 8

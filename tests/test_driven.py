@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from plain_axis import DRAG, KI, KP, MASS, TIME, plain_axis
 
-from friso.engine.driven import Inputs, follow
+from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.engine.simulate import simulate
 from friso.equations.driven import Driven
@@ -23,7 +23,7 @@ def run(stage: Stage, inputs: Inputs, samples: int, rtol: float = 1e-9):
     flat = stage.flat()
     shape = kernel(Driven(structure(flat), samples))
     starts = np.zeros((1, len(shape.full_state)))
-    (runs,) = follow(shape, flat, 1, inputs, starts, rtol)
+    (runs,) = run_driven(shape, flat, 1, inputs, starts, rtol)
     assert runs.statuses[0] == 1
     return shape, runs
 

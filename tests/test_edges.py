@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.identification.logs import mapping
 from friso.identification.logs.read import read_frequency_response
 from friso.stage import Stage, loads, numeric_keys, parse_set
-from friso.stage.plausible import doubts
+from friso.stage.plausible import implausible_values
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
@@ -155,7 +155,7 @@ def test_a_mapping_that_is_kept_is_checked_like_an_option(tmp_path: Path, text: 
     log = tmp_path / "log.csv"
     mapping.sidecar(log).write_text(text, encoding="utf-8")
     with refused():
-        mapping.load(log)
+        mapping.load_mapping(log)
 
 
 @pytest.mark.parametrize("time", ["1e300 s", "1e-300 s", "2 h"])
@@ -174,7 +174,7 @@ def test_a_sample_time_beyond_all_measure_is_refused(time: str) -> None:
     ],
 )
 def test_a_value_that_is_hardly_meant_is_questioned(key: str, value: str, meant: str) -> None:
-    (doubt,) = doubts(loads(RIG).replace({key: value}))
+    (doubt,) = implausible_values(loads(RIG).replace({key: value}))
     assert key in doubt
     assert value in doubt
     assert doubt.endswith(f"was {meant} meant?")
@@ -187,7 +187,7 @@ def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("path", [*EXAMPLES.glob("*.toml"), EXAMPLES.parent / "friso" / "templates" / "stage.toml"])
 def test_usual_stages_raise_no_doubts(path: Path) -> None:
-    assert not [*doubts(friso.load(path))]
+    assert not [*implausible_values(friso.load(path))]
 
 
 @pytest.mark.parametrize("empty", [(3,), (9,), (7, 8, 9), (0, 4)])

@@ -10,7 +10,7 @@ from benchmarks import evidence as command
 from benchmarks.canonical import differ, reference_numbers
 from benchmarks.code import DIGITS, code_digest
 from benchmarks.code import computed as syntax
-from friso.evidence import entries, equations, value
+from friso.evidence import equations, findings_on_file, value
 from friso.studies.guideline.parasitic import ParasiticLimits
 from friso.views.guideline.words import parasitic_sentences
 
@@ -26,12 +26,12 @@ def test_the_equations_are_those_on_file() -> None:
 
 
 def test_no_finding_is_older_than_the_equations() -> None:
-    outdated = command.old(entries())
+    outdated = command.old(findings_on_file())
     assert not outdated, f"compute again by python -m benchmarks.evidence {' '.join(outdated)}"
 
 
 def test_every_finding_names_the_code_it_rests_on() -> None:
-    assert [name for name, entry in entries().items() if not entry.rests_on] == []
+    assert [name for name, entry in findings_on_file().items() if not entry.rests_on] == []
 
 
 def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
@@ -39,9 +39,9 @@ def test_a_finding_older_than_its_code_is_dated_where_it_stands() -> None:
     `python -m benchmarks.evidence` computes it again."""
     undated = [
         (name, document)
-        for name in command.older_than_code(entries())
-        for document in entries()[name].stated
-        if entries()[name].day not in " ".join((ROOT / document).read_text(encoding="utf-8").split())
+        for name in command.older_than_code(findings_on_file())
+        for document in findings_on_file()[name].stated
+        if findings_on_file()[name].day not in " ".join((ROOT / document).read_text(encoding="utf-8").split())
     ]
     assert undated == []
 
@@ -59,8 +59,8 @@ def test_a_digest_holds_what_is_computed_and_not_its_words() -> None:
 def test_a_finding_of_an_earlier_revision_is_outdated(monkeypatch: pytest.MonkeyPatch) -> None:
     later = command.Equations(equations().revision + 1, equations().since, equations().numbers)
     monkeypatch.setattr(command.evidence, "equations", lambda: later)
-    assert command.old(entries()) == list(entries())
-    again = command.renewed(entries()["hunting.locked-rig"], {"edge_hz": 9.7, "fold_hz": 16.0})
+    assert command.old(findings_on_file()) == list(findings_on_file())
+    again = command.renewed(findings_on_file()["hunting.locked-rig"], {"edge_hz": 9.7, "fold_hz": 16.0})
     assert command.old({"hunting.locked-rig": again}) == []
     assert again.note == ""
 
@@ -74,16 +74,16 @@ def test_other_physics_differ_and_rounding_does_not() -> None:
     assert differ(numbers) == ["touching: force"]
 
 
-@pytest.mark.parametrize("name", entries())
+@pytest.mark.parametrize("name", findings_on_file())
 def test_documents_state_what_is_on_file(name: str) -> None:
-    for document, phrases in entries()[name].stated.items():
+    for document, phrases in findings_on_file()[name].stated.items():
         text = " ".join((ROOT / document).read_text(encoding="utf-8").split())
         assert [phrase for phrase in phrases if " ".join(phrase.split()) not in text] == []
 
 
 def test_findings_on_few_machines_say_so() -> None:
     """A share that was measured on machines drawn at random says on how many; of fewer than 20, wherever it stands."""
-    drawn = [entry for entry in entries().values() if "drawn" in entry.about]
+    drawn = [entry for entry in findings_on_file().values() if "drawn" in entry.about]
     assert drawn
     for entry in drawn:
         count = f"{entry.values['machines']:g} machines"
@@ -92,12 +92,12 @@ def test_findings_on_few_machines_say_so() -> None:
 
 
 def test_the_file_is_as_the_command_writes_it() -> None:
-    assert command.FILE.read_text(encoding="utf-8") == command.written(entries(), equations())
+    assert command.FILE.read_text(encoding="utf-8") == command.written(findings_on_file(), equations())
 
 
 def test_every_finding_has_a_way_to_be_computed_again() -> None:
-    assert {*command.QUICK, *command.LONG, *command.BY_HAND} == set(entries())
-    assert all(entry.command and entry.values for entry in entries().values())
+    assert {*command.QUICK, *command.LONG, *command.BY_HAND} == set(findings_on_file())
+    assert all(entry.command and entry.values for entry in findings_on_file().values())
 
 
 def test_findings_say_what_their_values_say() -> None:

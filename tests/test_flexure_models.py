@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from friso.leaf_springs import closed_forms, curved, plate
 from friso.leaf_springs.beam_system import BeamFailure, Configuration, LeafBeams
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import VISIBLE
 from friso.leaf_springs.joint import first_interfering, parasitic_mode
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
@@ -118,7 +118,7 @@ def test_published_leaf_by_closed_forms() -> None:
     )
 
 
-@pytest.mark.parametrize("model", [closed, beams])
+@pytest.mark.parametrize("model", [closed_form_model, beams])
 def test_published_leaf_by_both_models(model: Any) -> None:
     evaluation = model(THESIS, 1e-3)
     named = {mode.name: mode.frequency for mode in evaluation.modes}
@@ -218,7 +218,13 @@ def test_twist_of_a_deflected_leaf(springs: Mechanism, share: float) -> None:
     )
     nodes, weights = np.polynomial.legendre.leggauss(60)
     twisted = half * np.sum(weights * solution.sol(half * nodes)[0] * torque(half * nodes))
-    shear = 5 / 6 * springs.shear * springs.area * plate.edgewise_shear(springs.length, springs.width, springs.poisson)
+    shear = (
+        5
+        / 6
+        * springs.shear
+        * springs.area
+        * plate.edgewise_shear_factor(springs.length, springs.width, springs.poisson)
+    )
     flat = springs.length**3 / (12 * springs.young * springs.edgewise) + springs.length / shear
     assert closed_forms.support_y(springs, delta) == pytest.approx(springs.leaves / (flat + twisted), rel=1e-5)
 
@@ -304,7 +310,7 @@ def test_first_interfering_mode_of_both_models(
     actuation, sensor = ((share * springs.length, 0.0, 0.0) for share in (places[0], places[0 if together else 1]))
     body = replace(springs.body, centre=((1 + centre) * springs.length, 0.0, 0.0))
     springs = replace(springs, body=body, actuation=actuation, sensor=sensor)
-    by_beams, by_closed = beams(springs, springs.length / 300), closed(springs, springs.length / 300)
+    by_beams, by_closed = beams(springs, springs.length / 300), closed_form_model(springs, springs.length / 300)
     assume(not any(VISIBLE / 1.5 < mode.peak < VISIBLE * 1.5 for mode in by_beams.modes[1:]))  # seen by one alone
     assert (by_closed.interfering is None) == (by_beams.interfering is None)
     if by_closed.interfering and by_beams.interfering:
@@ -380,7 +386,7 @@ def test_numbers_that_make_no_mechanism_are_nan() -> None:
 def test_drive_mode_of_a_heavy_stage() -> None:
     """On narrow leaves a long stage turns about z more slowly than it is driven."""
     springs = mechanism(0.06, 0.01, 0.3e-3, spacing=0.03, mass=3.0)
-    by_beams, by_closed = beams(springs, 1e-3).modes[0], closed(springs, 1e-3).modes[0]
+    by_beams, by_closed = beams(springs, 1e-3).modes[0], closed_form_model(springs, 1e-3).modes[0]
     assert by_beams.name == by_closed.name == "drive"
     assert by_closed.frequency == pytest.approx(by_beams.frequency, rel=0.01)
     assert first_interfering(springs) != pytest.approx(by_beams.frequency, rel=0.01)
@@ -398,7 +404,7 @@ def test_no_lateral_contraction() -> None:
 @given(springs=mechanisms(), share=st.floats(0.002, 0.02))
 def test_beams_agree_with_closed_forms(springs: Mechanism, share: float) -> None:
     stroke = share * springs.length
-    by_closed, by_beams = closed(springs, stroke), beams(springs, stroke)
+    by_closed, by_beams = closed_form_model(springs, stroke), beams(springs, stroke)
     assert by_beams.drive[0] == pytest.approx(by_closed.drive[0], rel=0.01)  # the stage may turn
     assert by_beams.forces == pytest.approx(by_closed.forces, rel=0.03)
     assert by_beams.support_x == pytest.approx(by_closed.support_x, rel=0.05)

@@ -12,12 +12,12 @@ import pytest
 import shells
 
 from friso.leaf_springs.beams import beams
-from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation, Model
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 
-MODELS: dict[str, Model] = {"closed forms": closed, "beams": beams}
+MODELS: dict[str, Model] = {"closed forms": closed_form_model, "beams": beams}
 MECHANISMS = {
     # leaves, length, width, thickness, spacing [mm], material, mass [kg], x of its centre beyond the leaf ends [mm]
     "the thesis's": (2, 70, 45, 0.35, 60, "stainless 1.4310", 0.5, 0),

@@ -15,7 +15,7 @@ from friso.leaf_springs.joint import parasitic_mode
 from friso.leaf_springs.mechanism import Mechanism
 from friso.materials import materials
 from friso.stage import Stage, load, loads, save, violations
-from friso.studies.cells import allowed, flat_cells
+from friso.studies.cells import allowed_cells, flat_cells
 from friso.studies.sweep import sweep
 
 RIG = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
@@ -153,7 +153,7 @@ def test_leaves_that_buckle(stage: Stage, refused: Refused) -> None:
     with refused("flexure.load"):
         stage.replace({"flexure.load": "140 N"})
     loads_along = np.array([0.0, 130.0, 140.0])
-    assert allowed(stage, {}, {"flexure.load": loads_along}).tolist() == [True, True, False]
+    assert allowed_cells(stage, {}, {"flexure.load": loads_along}).tolist() == [True, True, False]
 
 
 def test_saved_and_loaded_again(stage: Stage, tmp_path: Path) -> None:
@@ -199,7 +199,7 @@ def test_numbers_that_make_no_mechanism_are_marked(stage: Stage) -> None:
     broken = np.any(np.broadcast_arrays(*(where for where, _ in violations(flat)), lengths)[:-1], axis=0)
     assert broken.tolist() == [False, True, True, True, True]
     assert np.isfinite(np.broadcast_to(flat["joint.stiffness"], lengths.shape)[0])
-    assert allowed(stage, {}, {"flexure.length": lengths}).tolist() == [True, False, False, False, False]
+    assert allowed_cells(stage, {}, {"flexure.length": lengths}).tolist() == [True, False, False, False, False]
     assert flat_cells(stage, {}, {"flexure.length": lengths})["joint.stiffness"][0] == pytest.approx(
         stage.flat()["joint.stiffness"], rel=1e-12
     )
@@ -214,13 +214,13 @@ def test_bad_cells_are_found_in_every_number(stage: Stage) -> None:
         "masses.stage": [0.5, -1.0, -0.5, np.nan],
     }
     for key, values in bad.items():
-        assert allowed(stage, {}, {key: np.array(values)}).tolist() == [True, False, False, False], key
+        assert allowed_cells(stage, {}, {key: np.array(values)}).tolist() == [True, False, False, False], key
 
 
 @pytest.mark.parametrize("key", ["flexure.width", "flexure.spacing", "flexure.leaves"])
 def test_zeros_are_marked_in_silence(stage: Stage, key: str) -> None:
     bad = 1.0 if key == "flexure.leaves" else 0.0
-    assert allowed(stage, {}, {key: np.array([stage.flat()[key], bad])}).tolist() == [True, False]
+    assert allowed_cells(stage, {}, {key: np.array([stage.flat()[key], bad])}).tolist() == [True, False]
 
 
 def test_numbers_that_follow_are_plain_floats(stage: Stage) -> None:

@@ -19,13 +19,13 @@ from friso.errors import InputError
 from friso.frequency.bode import bode
 from friso.frequency.crossover import WANTED, limits, settled_members
 from friso.frequency.drive import DriveTiming, exponentials
-from friso.frequency.family import impedance, loops, plants, scan, spectral_abscissa
+from friso.frequency.family import impedance, loops, plants, scan_stability, spectral_abscissa
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop, poles, response
 from friso.frequency.margins import margins, of_loop, with_resonances
 from friso.frequency.members import Members, family, limit_cases, member
 from friso.frequency.parts import mechanics, plant
-from friso.frequency.stiffness import in_series, sensitivity
+from friso.frequency.stiffness import in_series, series_sensitivity
 from friso.stage import Stage
 
 HZ = 2 * np.pi
@@ -183,7 +183,7 @@ LIGHT = {
 def test_scan_finds_what_exact_margins_find(rig: Stage, stage: dict, drive: dict) -> None:
     flat = rig.replace({**stage, **drive}).flat()
     members = family(flat, 21, 9)
-    scanned = scan(flat, members)
+    scanned = scan_stability(flat, members)
     exact = [margins(flat, members[k]) for k in range(len(members))]
     assert scanned.stable.tolist() == [item.stable for item in exact]
     distance = np.array([entry.modulus_margin for entry in exact])
@@ -514,7 +514,7 @@ def test_two_springs_in_a_row_and_their_sensitivity() -> None:
     k_f, k_j = sp.symbols("k_f k_j", positive=True)
     derived = sp.solve(sp.Symbol("F") / k_f + sp.Symbol("F") / k_j - sp.Symbol("F") / sp.Symbol("k"), sp.Symbol("k"))
     assert sp.simplify(derived[0] - in_series(k_f, k_j)) == 0
-    assert sp.simplify(sp.diff(in_series(k_f, k_j), k_f) - sensitivity(k_f, k_j)) == 0
+    assert sp.simplify(sp.diff(in_series(k_f, k_j), k_f) - series_sensitivity(k_f, k_j)) == 0
 
 
 # --- the public function ---

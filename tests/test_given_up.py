@@ -13,9 +13,9 @@ from variants import VARIANTS
 from friso.engine.arrays import Status
 from friso.hunting import basin, verdict
 from friso.hunting.attractors import Attractors, Target
-from friso.hunting.basin import Kick, MoveShare, displacements
+from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt
 from friso.hunting.margin import NOT_SOUGHT
-from friso.hunting.measures import options
+from friso.hunting.measures import measuring_options
 from friso.hunting.verdict import LEFT_OVER, STARTS, SWINGS_ON, Judgement, judge
 
 STAGE = VARIANTS["rigid"]
@@ -32,7 +32,7 @@ def displaced(hunts: Any, completed: Any) -> Kick:
         return hunts(kicks) & completed(kicks), completed(kicks), np.zeros(count)
 
     with patched({basin: {"ends_in": ends_in}}):
-        return displacements(STAGE, TARGET)
+        return displacements_that_hunt(STAGE, TARGET)
 
 
 def beyond(size: float) -> Any:
@@ -84,10 +84,10 @@ def judged(
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "ends_in": lambda *_: (np.array([ends]), np.array([completed]), np.array([swing])),
-        "searched": lambda *_: NOT_SOUGHT,
-        "displacements": lambda *_: starts[0],
-        "pushes": lambda *_: starts[1],
-        "moves": lambda *_: starts[2],
+        "search_bandwidths": lambda *_: NOT_SOUGHT,
+        "displacements_that_hunt": lambda *_: starts[0],
+        "pushes_that_hunt": lambda *_: starts[1],
+        "moves_that_hunt": lambda *_: starts[2],
     }
     with patched({verdict: made_up}):
         return judge(STAGE, run_to(settling), 1e-6)
@@ -138,8 +138,8 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling() -> None:
     attraction = replace(resting, surveyed=surveyed(complete=True))
     made_up = {
         "hunting": lambda *_, **__: attraction,
-        "searched": lambda *_: NOT_SOUGHT,
-        "options": lambda *_: replace(options(1e-6), budget=100),
+        "search_bandwidths": lambda *_: NOT_SOUGHT,
+        "measuring_options": lambda *_: replace(measuring_options(1e-6), budget=100),
     }
     with patched({verdict: made_up}):
         judgement = judge(STAGE, run_to(np.nan, swing=1e-3), 1e-6)

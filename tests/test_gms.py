@@ -19,7 +19,7 @@ from friso.frequency.members import member
 from friso.frequency.parts import plant
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
-from friso.studies.laws.conversion import measured
+from friso.studies.laws.conversion import measure_friction
 
 pytestmark = pytest.mark.xdist_group("gms")
 
@@ -191,7 +191,7 @@ def test_it_may_give_energy_back_where_friction_falls() -> None:
 
 def test_many_elements_come_near_a_smooth_curve() -> None:
     """With the square of their number."""
-    curve = measured(VARIANTS["rigid"].flat())
+    curve = measure_friction(VARIANTS["rigid"].flat())
     off = []
     for count in (4, 8, 16, 32):
         stiffness, slips = polygon(curve, count)

@@ -29,18 +29,18 @@ from friso.hunting.persistence import swings_from_any_distance
 from friso.progress import Tally, silent
 from friso.stage import Stage
 from friso.studies.guideline import checks, compute, parasitic, sweeps, worked
-from friso.studies.guideline.claims import claims, least_gap
+from friso.studies.guideline.claims import judged_claims, least_gap
 from friso.studies.guideline.groups import (
     GROUPS,
     PARAMETERS,
     GroupScale,
-    counted,
     dimensions,
     flat_of,
-    parameters_of,
+    group_count,
+    group_parameters,
     values_of,
 )
-from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fitted, rates_in_series
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fit_law, rates_in_series
 from friso.studies.guideline.parasitic import holding
 from friso.studies.guideline.thesis_rig import plain
 from friso.studies.thesis.studies import thesis_rig
@@ -82,9 +82,9 @@ def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, A
     """As many groups as parameters less the rank of their dimensions, none with a dimension, none made of others."""
     if "parasitic.frequency" in flat:
         flat |= {"parasitic.mass": 0.25, "parasitic.damping_ratio": 0.01}
-    names = parameters_of(flat)
+    names = group_parameters(flat)
     groups = [GROUPS[name] for name in values_of(flat) if set(GROUPS[name].powers) <= set(names)]
-    count = counted(flat)
+    count = group_count(flat)
     assert count.rank == 3
     assert len(groups) == count.groups == {11: 8, 17: 14, 20: 17}[count.parameters]
     powers = np.array([[group.powers.get(name, 0.0) for name in names] for group in groups])
@@ -96,7 +96,7 @@ def test_parameters_are_all_that_the_equations_contain() -> None:
     """Every key in the equations of the rig is in a parameter; rigid masses enter as their sum alone."""
     model = assemble(structure(plain()))
     keys = {str(symbol) for symbol in model.parameters} - {"motion.size", "motion.duration"}
-    assert keys == {key for name in parameters_of(plain()) for key in PARAMETERS[name].keys}
+    assert keys == {key for name in group_parameters(plain()) for key in PARAMETERS[name].keys}
     cart, part = sp.Symbol("masses.cart", real=True), sp.Symbol("masses.stage", real=True)
     whole = [rhs.subs(cart, sp.Symbol("m") - part) for rhs in model.rhs]
     assert all(part not in sp.expand(sp.simplify(rhs)).free_symbols for rhs in whole)
@@ -248,7 +248,7 @@ def test_jump_is_told_apart_and_followed() -> None:
 
 def made(count: int, seed: int, noise: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Samples of the locked law with known numbers."""
-    values = sweeps.sampled(sweeps.LOCKED_BOX, count, seed)
+    values = sweeps.sobol_samples(sweeps.LOCKED_BOX, count, seed)
     slip = 1.5 * values["stribeck"] * values["gap"] * (values["alpha"] / 0.1) ** -0.4
     drop = 0.4 / values["stribeck"] * values["tuned_mass"] ** -0.9
     off = noise * np.random.default_rng(seed).normal(size=count)
@@ -257,7 +257,7 @@ def made(count: int, seed: int, noise: float) -> tuple[dict[str, np.ndarray], np
 
 def test_law_finds_known_numbers_and_leaves_out_the_rest() -> None:
     values, edges = made(256, 1, 0.02)
-    law = fitted(LOCKED_LAW, values, edges)
+    law = fit_law(LOCKED_LAW, values, edges)
     assert law.factors == pytest.approx((1.5, 0.4), rel=0.02)
     assert set(law.exponents) == {(0, "alpha"), (1, "tuned_mass")}
     assert law.of(0)["alpha"] == pytest.approx(-0.4, abs=0.02)
@@ -273,22 +273,22 @@ def test_law_finds_known_numbers_and_leaves_out_the_rest() -> None:
 def test_law_is_not_led_astray_by_outliers() -> None:
     values, edges = made(256, 1, 0.02)
     edges[::40] *= 5
-    assert fitted(LOCKED_LAW, values, edges).factors == pytest.approx((1.5, 0.4), rel=0.05)
+    assert fit_law(LOCKED_LAW, values, edges).factors == pytest.approx((1.5, 0.4), rel=0.05)
 
 
 def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
     values, edges = made(256, 1, 0.0)
-    wrong = fitted(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(rates_in_series, 1.0)), values, edges)
+    wrong = fit_law(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(rates_in_series, 1.0)), values, edges)
     others, held_out = made(256, 2, 0.0)
     assert Errors.between(wrong.edge(others), held_out).rms > 0.5
 
 
 def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
-    values = sweeps.sampled({**sweeps.LOCKED_BOX, **sweeps.JOINT_BOX, "joint": (1e-4, 0.1)}, 200, 3)
+    values = sweeps.sobol_samples({**sweeps.LOCKED_BOX, **sweeps.JOINT_BOX, "joint": (1e-4, 0.1)}, 200, 3)
     locked = made(200, 3, 0.0)[1]
     joint = 1.3 * np.sqrt(values["joint"]) * values["gap"] ** 0.66
     largest = np.maximum(joint, 0.9 * np.sqrt(values["joint"] / values["stroke"]))
-    law = fitted(FREE_LAW, values, 1 / np.sqrt(locked**-2 + largest**-2), locked)
+    law = fit_law(FREE_LAW, values, 1 / np.sqrt(locked**-2 + largest**-2), locked)
     assert law.factors == pytest.approx((1.3, 0.9), rel=0.02)
     assert law.of(0)["gap"] == pytest.approx(0.66, abs=0.01)
 
@@ -325,11 +325,13 @@ def as_claimed(name: str, flat: dict[str, Any]) -> float:
 
 
 def test_claims_hold_differ_or_are_unknown() -> None:
-    holds = claims(studied(as_claimed))
+    holds = judged_claims(studied(as_claimed))
     assert [hold.judgement for hold in holds] == ["holds"] * 6
-    differs = claims(studied(lambda name, flat: 30.0 if name in ("share", "friction") else as_claimed(name, flat)))
+    differs = judged_claims(
+        studied(lambda name, flat: 30.0 if name in ("share", "friction") else as_claimed(name, flat))
+    )
     assert [differ.judgement for differ in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
-    lost = claims(studied(lambda name, flat: np.nan, UNKNOWN))
+    lost = judged_claims(studied(lambda name, flat: np.nan, UNKNOWN))
     assert {item.judgement for item in lost} == {"unknown"}
     assert all("unknown" in entry.result for entry in lost)
 
@@ -342,7 +344,7 @@ def test_edges_below_the_grid_are_good_ones() -> None:
     lost = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.ThesisCase({}, 2.0, np.nan, UNKNOWN)), 0.5)
     assert (lost.worst, lost.unknown) == (1.0, 1)
     assert not lost.does
-    share = claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
+    share = judged_claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
     assert share.judgement == "holds"
     assert BELOW in share.result
 
@@ -369,7 +371,7 @@ def quick() -> compute.Guideline:
     """A guideline of invented sweeps and a shortened rig: what is shown, not what is found."""
     patch = pytest.MonkeyPatch()
     patch.setattr(sweeps, "find_edges", invented)
-    patch.setattr(compute, "checked", lambda sweep, most: checks.Checked(most, most, 0, most, 0, 100, 0))
+    patch.setattr(compute, "simulate_samples", lambda sweep, most: checks.Checked(most, most, 0, most, 0, 100, 0))
     patch.setattr(compute, "worked", shown)
     patch.setattr(compute, "_compile", lambda: None)
     patch.setattr(parasitic, "FREQUENCIES", (300.0,))

@@ -21,7 +21,7 @@ from friso.identification.readings.common import record
 from friso.identification.readings.course import external
 from friso.identification.response.analysis import analyse
 from friso.identification.sources import recognised
-from friso.identification.stage_file import identified
+from friso.identification.stage_file import identified_stage
 from friso.identification.stage_keys import fitting
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
@@ -149,7 +149,7 @@ ODD = {
 @pytest.mark.parametrize("case", ODD)
 def test_the_stage_is_always_written(case: str, base: Stage) -> None:
     fit = fitting(base, ODD[case])
-    stage = identified(base, fit.estimates, ["log"])
+    stage = identified_stage(base, fit.estimates, ["log"])
     flat = stage.flat()
     assert flat[STATIC] >= flat[COULOMB]
     assert fit.notes
@@ -169,7 +169,7 @@ def test_static_friction_moves_along_with_coulomb(base: Stage) -> None:
 
 
 def test_static_friction_is_no_less_than_its_bound(base: Stage, wording: Wording) -> None:
-    stage = identified(base, fitting(base, ODD["static at least"]).estimates, ["log"])
+    stage = identified_stage(base, fitting(base, ODD["static at least"]).estimates, ["log"])
     assert stage.uncertain()[STATIC].low == 35.0
     fit = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
     assert fit.estimates == ()

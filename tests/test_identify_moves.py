@@ -24,7 +24,7 @@ from friso.identification.output_error import profile as profiles
 from friso.identification.output_error.fit import everywhere, first_values, fit, nearby
 from friso.identification.output_error.identifiable import BRISTLES
 from friso.identification.output_error.parameters import HIGHEST_RATIO, SHORTEST
-from friso.identification.output_error.problem import closed_loop
+from friso.identification.output_error.problem import loop_problem
 from friso.identification.output_error.refine import bounds_of, costs
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
@@ -104,7 +104,7 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Identif
         pulses[start : start + 50] = 20 * truth["friction.coulomb"] * (-1) ** (start // 600)
     changed = replace(log, signals={**log.signals, "disturbance": pulses, "force": log["force"] * 0 + pulses})
     machine = drawn(3, False)
-    full = closed_loop(machine.flat, changed, changed.segments[0], ()).record(np.zeros(0))
+    full = loop_problem(machine.flat, changed, changed.segments[0], ()).record(np.zeros(0))
     pushed = replace(changed, signals={**changed.signals, "position": full.position, "force": full.force + pulses})
     predicted = simulated_log(result, machine.measured(pushed))
     part, errors = predicted.part, predicted.errors
@@ -145,7 +145,7 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
     inputs = method._problems(log, log.segments[0], flat, method.inverse_model(log), True)[1]
     assert inputs is not None
-    exact = replace(inputs, target=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
+    exact = replace(inputs, target=loop_problem(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
     names = [item.name for item in inputs.parameters]
     core = tuple(i for i, entry in enumerate(inputs.parameters) if entry.core)
     kept = {"static friction ratio": flat["friction.static"] / flat["friction.coulomb"]}
@@ -200,7 +200,7 @@ def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, em
     flat = axis.flat() | {"masses.cart": inverse.value("mass"), "friction.viscous": inverse.value("viscous")}
     flat |= dict.fromkeys(("friction.static", "friction.coulomb"), inverse.value("coulomb"))
     flat |= {"bias.cart": -inverse.value("offset"), "friction.viscous_asymmetry": 0.0}
-    plain = closed_loop(flat, emps, identified.part, ()).record(np.zeros(0))
+    plain = loop_problem(flat, emps, identified.part, ()).record(np.zeros(0))
     assert identified.errors.force < errors_of(emps, identified.part, plain, 20.0).force
 
 

@@ -15,12 +15,12 @@ import friso
 from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
-from friso.identification.readings.at_bearing import Between, StructureMode, between
+from friso.identification.readings.at_bearing import Between, StructureMode, machine_between
 from friso.identification.readings.common import deflections, jackknife, record
 from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.presliding import GENTLE, presliding_log
 from friso.studies.rig.outcome import rig_log
-from friso.studies.rig.sizes import locked, travel
+from friso.studies.rig.sizes import locked_stage, travel
 
 DT, SECONDS = 5e-4, 6.0
 LINES = np.array([0.7, 1.3, 2.9, 5.3, 9.7, 17.3, 23.9, 31.1, 37.7])
@@ -156,16 +156,16 @@ def test_sliding_is_not_taken_for_bristles(size: float, wording: Wording) -> Non
 
 @pytest.mark.parametrize("strength", [0.3, 2.0])
 def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> None:
-    stage = locked(friso.load(EXAMPLE))
+    stage = locked_stage(friso.load(EXAMPLE))
     log = rig_log(excite(stage, 0.02, 1, kind=replace(GENTLE, strength=strength)), 0, "x", None, stage, 1).log
-    bristles = bristles_from_presliding(log, between(stage.flat()))
+    bristles = bristles_from_presliding(log, machine_between(stage.flat()))
     assert not any(item.determined for item in (bristles.mass, bristles.damping, bristles.stiffness))
 
 
 def test_a_slow_current_loop_is_taken_off() -> None:
-    stage = locked(friso.load(EXAMPLE)).replace({"drive.current_bandwidth": "100 Hz"})
+    stage = locked_stage(friso.load(EXAMPLE)).replace({"drive.current_bandwidth": "100 Hz"})
     flat = stage.flat()
-    bristles = bristles_from_presliding(presliding_log(stage, "slow", 0.02, 1).log, between(flat))
+    bristles = bristles_from_presliding(presliding_log(stage, "slow", 0.02, 1).log, machine_between(flat))
     assert bristles.damping.value == pytest.approx(flat["friction.bristle_damping"], rel=0.03)
     assert bristles.damping.holds(flat["friction.bristle_damping"])
     assert bristles.mass.holds(1.7)
@@ -178,13 +178,13 @@ def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness(wording: Wording
     stage = friso.load(EXAMPLE).replace({"drive.relative_noise": "1 nm", **none})
     flat = stage.flat()
     log = presliding_log(stage, "free", 0.02, 1).log
-    bristles = bristles_from_presliding(log, between(flat))
+    bristles = bristles_from_presliding(log, machine_between(flat))
     assert bristles.stiffness.holds(flat["friction.bristle_stiffness"])
     assert bristles.damping.holds(flat["friction.bristle_damping"])
     assert bristles.mass.holds(1.7)
     assert bristles.stiffness.half_width < 0.1 * bristles.stiffness.value
     blind = replace(log, signals={role: log.signals[role] for role in ("position", "force")})
-    wording(bristles_from_presliding(blind, between(flat)).stiffness.reason)
+    wording(bristles_from_presliding(blind, machine_between(flat)).stiffness.reason)
 
 
 def test_the_jackknife_is_the_covariance_of_least_squares() -> None:
@@ -204,9 +204,9 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
     held, widths = 0, []
     for seed in range(12):
         machine = built(seed)
-        stage, flat = locked(machine.truth), machine.flat
+        stage, flat = locked_stage(machine.truth), machine.flat
         log = presliding_log(stage, "presliding", travel(stage)[0], seed).log
-        bristles = bristles_from_presliding(log, between({**flat, "masses.stage": 1.2 * flat["masses.stage"]}))
+        bristles = bristles_from_presliding(log, machine_between({**flat, "masses.stage": 1.2 * flat["masses.stage"]}))
         mass = flat["masses.cart"] + flat["masses.stage"]
         held += bristles.stiffness.holds(flat["friction.bristle_stiffness"])
         held += bristles.damping.holds(flat["friction.bristle_damping"]) + bristles.mass.holds(mass)
@@ -217,7 +217,7 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
 
 def test_the_stage_file_takes_bristles_and_masses() -> None:
     machine = built(3)
-    stage = locked(machine.truth)
+    stage = locked_stage(machine.truth)
     logs = [presliding_log(stage, f"small_{n}", travel(stage)[0], n).log for n in (1, 2)]
     identification = identify([(log, "presliding") for log in logs], machine.guess)
     assert identification.stage is not None

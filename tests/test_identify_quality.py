@@ -27,13 +27,20 @@ from friso.identification.model_error import (
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error.changes import changes_beside, inverse_reaching
 from friso.identification.output_error.fit import OutputErrorFit, first_values
-from friso.identification.output_error.parameters import FitParameter, parameters_of
+from friso.identification.output_error.parameters import FitParameter, fit_parameters
 from friso.identification.output_error.problem import tracking
 from friso.identification.output_error.repeated import as_far_off_as_repeated
 from friso.identification.quality import Quality, halves, noise_of, whole_error
 from friso.identification.readings.common import record
 from friso.identification.spread import groups_of, spread_of
-from friso.identification.stage_file import NOT_IDENTIFIED, identified, made_up, origins, with_origins, written
+from friso.identification.stage_file import (
+    NOT_IDENTIFIED,
+    estimate_text,
+    identified_stage,
+    made_up,
+    origins,
+    with_origins,
+)
 from friso.progress import silent
 from friso.views.identify.numbers import interval_text, value_text
 
@@ -84,7 +91,7 @@ def test_what_is_determined_has_an_interval_of_some_width_in_numbers_and_in_prin
         ):  # beyond, all digits of a double are used up
             assert low != rest.split(" ")[0]
         assert value_text(estimate)
-        assert " 0 N" not in written(estimate).partition("+/-")[2]
+        assert " 0 N" not in estimate_text(estimate).partition("+/-")[2]
 
 
 def test_a_mean_of_estimates_is_never_of_no_width() -> None:
@@ -418,7 +425,7 @@ def test_starts_are_tried_all_over_a_long_record() -> None:
 
 def _parameters(flat: dict[str, Any]) -> list[FitParameter]:
     levels = {"mass": MASS, "coulomb": COULOMB, "viscous": VISCOUS, "offset": OFFSET}
-    return parameters_of(flat, levels, 0.5, 0.1, True)
+    return fit_parameters(flat, levels, 0.5, 0.1, True)
 
 
 # --- the stage file ---------------------------------------------------------------------------------------------------
@@ -431,7 +438,7 @@ def test_every_key_says_where_it_comes_from(wording: Wording) -> None:
         Estimate.normal("friction.coulomb", "N", COULOMB, 0.1, "output error"),
         Estimate.unknown("friction.static", "N", "output error", "no slow motion", COULOMB, 4 * COULOMB),
     ]
-    whole = identified(stage, estimates, ["axis"])
+    whole = identified_stage(stage, estimates, ["axis"])
     text = with_origins(whole.to_toml(), origins(whole, estimates, {}, False))
     assert tomllib.loads(text) == tomllib.loads(whole.to_toml())
     lines = {line.partition(" = ")[0]: line.partition("  # ")[2] for line in text.splitlines() if " = " in line}

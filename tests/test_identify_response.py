@@ -10,7 +10,7 @@ from scipy import signal
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
 from friso.identification.response.arbitrary import local_polynomial, welch
-from friso.identification.response.closed_loop import crossovers, disagreement, feedback, open_loop
+from friso.identification.response.closed_loop import crossovers, disagreement, feedback, measured_open_loop
 from friso.identification.response.departure import Drag, departure, friction_from_departure
 from friso.identification.response.limit_cases import visible
 from friso.identification.response.mass_line import mass_lines, straight_lines
@@ -353,7 +353,7 @@ def test_crossover_of_the_open_loop() -> None:
     truth = np.sqrt(40.0 / (2 * np.pi) ** 2 / 1.7) * np.sqrt(100)
     for _ in range(100):
         plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.02, rng)
-        (result,) = crossovers(open_loop(plant, np.full(len(frequency), 4000.0)))
+        (result,) = crossovers(measured_open_loop(plant, np.full(len(frequency), 4000.0)))
         held += result.holds(truth)
     assert held >= 88
 
@@ -364,7 +364,7 @@ def test_a_noisy_open_loop_crosses_once() -> None:
     truth, passed, result = np.sqrt(4000.0 / 1.7) / (2 * np.pi), [], []
     for _ in range(40):
         plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.1, rng)
-        loop = open_loop(plant, np.full(len(frequency), 4000.0))
+        loop = measured_open_loop(plant, np.full(len(frequency), 4000.0))
         passed.append(np.count_nonzero(np.diff(np.abs(loop.response) > 1)))
         result.append(crossovers(loop))
     assert np.mean(passed) > 1.5

@@ -20,7 +20,7 @@ from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
-from friso.identification.logs.mapping import Mapping, load, mapping_text, sidecar
+from friso.identification.logs.mapping import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.method import axis_of_all
 from friso.identification.output_error.parameters import LONGEST, SHORTEST, bends
 from friso.identification.stage_file import made_up
@@ -64,7 +64,7 @@ def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -
     options = ("--as", "break-away", "--axis", "rotary", "--out", "answer", "--json")
     answer = friso_inside(break_away, "identify", "turned.csv", *options)
     assert answer.returncode == 0, answer.stderr
-    assert load(break_away / "turned.csv") == Mapping(experiment="break-away", axis="rotary")
+    assert load_mapping(break_away / "turned.csv") == Mapping(experiment="break-away", axis="rotary")
     (result,) = json.loads(answer.stdout)["estimates"]
     static = static_from_ramps(read_log(break_away / "linear.csv")).static
     assert result["unit"] == "N*m"
@@ -96,4 +96,4 @@ def test_a_kind_of_axis_that_is_none_is_refused(tmp_path: Path, refused: Refused
     sidecar(log).write_text(mapping_text(Mapping(axis="round")))
     with refused("--axis"), pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path)
-        load(Path("log.csv"))
+        load_mapping(Path("log.csv"))

@@ -14,7 +14,7 @@ from friso.errors import InputError
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.kind import as_set_up
 from friso.identification.kinds import KINDS
-from friso.identification.logs.joined import joined
+from friso.identification.logs.joined import join_logs
 from friso.identification.logs.log import Log
 from friso.identification.method import check_predictions, identify
 from friso.identification.readings.common import record
@@ -74,7 +74,7 @@ def test_logs_that_are_not_alike_are_not_joined() -> None:
 
 def test_a_joined_log_has_a_gap_between_its_parts() -> None:
     log = record("a", 0.1, position=np.arange(5.0))
-    both = joined([log, replace(log, name="b")])
+    both = join_logs([log, replace(log, name="b")])
     assert both.segments == (slice(0, 5), slice(5, 10))
     assert np.diff(both.time).max() > 2 * 0.1
     assert both["position"] == pytest.approx(np.tile(np.arange(5.0), 2))

@@ -15,11 +15,11 @@ from friso.equations.rail import friction_factors
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
-from friso.identification.readings.at_bearing import BearingRecord, Between, at_bearing, between
+from friso.identification.readings.at_bearing import BearingRecord, Between, at_bearing, machine_between
 from friso.identification.readings.common import deflections, record
 from friso.studies.rig import many_speeds, slow_sliding
 from friso.studies.rig.outcome import RigLog
-from friso.studies.rig.sizes import locked
+from friso.studies.rig.sizes import locked_stage
 
 DT, SECONDS, FINE = 2e-4, 4.0, 10
 MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0
@@ -116,7 +116,7 @@ def test_a_stage_with_a_mode_is_what_its_two_masses_do() -> None:
         turning = np.exp(s * time)
         record = BearingRecord(time, 1e-6 * turning.real, np.zeros(len(time)), 0 * time)
         total = flat["masses.cart"] + whole
-        _, _, inertia = at_bearing(record, between(flat), total)
+        _, _, inertia = at_bearing(record, machine_between(flat), total)
         true = ((total - part + part * followed) * s**2 * 1e-6 * turning).real
         inside = slice(len(time) // 2, -200)
         assert total * inertia[inside] == pytest.approx(true[inside], abs=0.01 * np.abs(true).max())
@@ -189,7 +189,7 @@ def one_place(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig() -> None:
     """Drawn machine 93: its passes tell no Stribeck velocity, at whatever setting; friction as at the place."""
     machine = built(93)
-    stage, flat = locked(machine.truth), machine.flat
+    stage, flat = locked_stage(machine.truth), machine.flat
     passes = many_speeds.many_speeds(stage, 1)
     assert not passes.places[0].velocity.both.stribeck_velocity.determined
     for item in slow_sliding.slow_sliding(stage, [place.log for place in passes.places], 1):
@@ -207,7 +207,7 @@ def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
     from friso.studies.rig.experiments.presliding import presliding_log
 
     machine = built(93)
-    stage, flat = locked(machine.truth), machine.flat
+    stage, flat = locked_stage(machine.truth), machine.flat
     passed = many_speeds.many_speeds_logs(stage, 1)
     slow: list[tuple[Any, str]] = [
         (log.log, "slow-sliding") for log in slow_sliding.slow_sliding_logs(stage, passed, 1)

@@ -31,8 +31,8 @@ from friso.identification.method import Experiment, Identification, Prediction
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.fit import OutputErrorFit, first_values
-from friso.identification.output_error.parameters import parameters_of
-from friso.identification.output_error.problem import Simulated, closed_loop, tracking
+from friso.identification.output_error.parameters import fit_parameters
+from friso.identification.output_error.problem import Simulated, tracking
 from friso.identification.output_error.profile import Profile
 from friso.identification.quality import Quality
 from friso.identification.readings.at_bearing import Between
@@ -42,7 +42,7 @@ from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
 from friso.identification.response.two_mass import two_masses
 from friso.identification.sources import LogFile
-from friso.identification.stage_file import identified, made_up, written
+from friso.identification.stage_file import estimate_text, identified_stage, made_up
 from friso.stage.correlations import Correlations
 from friso.views.drawing import plotly_renderer
 from friso.views.drawing.figure import Figure, Panel, Series
@@ -86,9 +86,9 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
     inverse, part = inverse_model(log, 5.0), log.segments[0]
     flat = made_up(log, inverse).flat()
     levels = {name: inverse.value(name) for name in ("mass", "viscous", "coulomb", "offset")}
-    parameters = parameters_of(flat, levels, 0.16, 0.1, True)
+    parameters = fit_parameters(flat, levels, 0.16, 0.1, True)
     follows = tracking(flat, log, part, parameters, 5.0)
-    loop = closed_loop(flat, log, part, parameters) if own_loop else None
+    loop = own_loop(flat, log, part, parameters) if own_loop else None
     problem = loop if fitted_in_loop and loop else follows
     residual = 0.2 * np.random.default_rng(2).standard_normal(len(log.time))
     core = tuple(i for i, parameter in enumerate(parameters) if parameter.core)
@@ -237,7 +237,7 @@ def everything() -> tuple[Identification, list[LogFile], list[Prediction]]:
     rows += [(kind, result, (log,)) for kind, (result, log) in others]
     experiments = tuple(Experiment(kind, logs, result, moved.estimates) for kind, result, logs in rows)
     estimates = tuple(combined(list(moved.estimates))[0])
-    stage = identified(made_up(log, moved.inverse), estimates, ["axis"])
+    stage = identified_stage(made_up(log, moved.inverse), estimates, ["axis"])
     outcome = Identification(stage, Correlations(), experiments, estimates, ("something <to> know",))
     files = [
         LogFile(Path(f"{item.name}.csv"), item, kind, "as specified", None) for kind, _, logs in rows for item in logs
@@ -406,7 +406,7 @@ def test_the_document_is_plain_json_and_nothing_unknown_has_a_number(case: tuple
     assert [log["kind"] for log in document["logs"]] == [log.kind for log in case[1]]
     keys = {estimate["key"]: estimate for estimate in document["estimates"]}
     assert keys["masses.cart"]["value"] == MASS
-    assert keys["masses.cart"]["written"] == written(case[0].estimates[1])
+    assert keys["masses.cart"]["written"] == estimate_text(case[0].estimates[1])
     assert keys["masses.cart"]["written"] in case[0].stage.to_toml()
     assert keys["friction.static"]["value"] is None
     assert keys["friction.static"]["reason"] == WHY

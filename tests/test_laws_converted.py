@@ -21,7 +21,7 @@ from friso.frequency.friction import steady_force
 from friso.identification.readings.common import stribeck_curve
 from friso.stage import Stage
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import convert, convertible, measured
+from friso.studies.laws.conversion import convert, convertible, measure_friction
 from friso.views.drawing import matplotlib_renderer
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
@@ -69,7 +69,7 @@ def _keys(friction: Any, rates: list[Any]) -> set[Any]:
 def test_virgin_curves_are_those_of_the_declared_equations(friction: str) -> None:
     """The force over displacement from rest that a law says is measured of it, against its declaration by SciPy."""
     flat = under(friction).flat()
-    curve = measured(flat)
+    curve = measure_friction(flat)
     rate, force, count = slopes(flat)
     static = curve.levels.static
     few = curve.displacement[::20][:60]

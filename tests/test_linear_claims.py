@@ -11,7 +11,7 @@ import sympy as sp
 
 from friso.frequency.bode import bode
 from friso.frequency.family import spectral_abscissa
-from friso.frequency.members import Members, joined, limit_cases
+from friso.frequency.members import Members, concatenate_families, limit_cases
 from friso.studies.thesis import Evidence, Finding, thesis_rig
 from friso.studies.thesis.claims import registered
 from friso.studies.thesis.judges.series_stiffness import (
@@ -174,7 +174,7 @@ def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
     def rightmost(crossover: float, delay: float) -> float:
         changes = {"drive.sample_time": "50 us", "drive.delay": f"{delay!r} s", "joint.locked": joint == "locked"}
         flat = thesis_rig().replace({**changes, "controller.crossover": f"{crossover!r} Hz"}).flat()
-        return float(spectral_abscissa(flat, joined([*limit_cases(flat).values()])).max())
+        return float(spectral_abscissa(flat, concatenate_families([*limit_cases(flat).values()])).max())
 
     for crossover, delay in loops.delay_at.items():
         assert rightmost(crossover, 0.99 * delay) < 0 < rightmost(crossover, 1.01 * delay)

@@ -15,7 +15,7 @@ from friso.stage import Stage, numeric_keys, parse_set, violations
 from friso.stage.correlations import Correlations, correlations_text, draw, read_correlations
 from friso.stage.plug_ins import plug_ins
 from friso.studies.axes import SweptAxis, read_axis
-from friso.studies.cells import allowed, flat_cells
+from friso.studies.cells import allowed_cells, flat_cells
 from friso.studies.links import check_links, linked
 
 STIFFNESS, STRENGTH = "friction.element_stiffness", "friction.element_strength"
@@ -100,7 +100,7 @@ def test_an_element_is_swept_and_linked(three: Stage) -> None:
     assert cells[f"{STRENGTH}.1"] == pytest.approx([0.75, 1.0, 1.25])
     assert cells[f"{STIFFNESS}.1"] == pytest.approx([7.5e6, 1e7, 1.25e7])
     assert cells[f"{STRENGTH}.2"] == 1.0
-    assert list(allowed(three, {}, {f"{STRENGTH}.3": np.array([-1.0, 1.0])})) == [False, True]
+    assert list(allowed_cells(three, {}, {f"{STRENGTH}.3": np.array([-1.0, 1.0])})) == [False, True]
     assert violations(three.flat({f"{STRENGTH}.3": np.array([-1.0, 1.0])}))[0][1].startswith(f"{STRENGTH}.3 ")
     for key in (f"{STRENGTH}.4", f"{STRENGTH}.x", STRENGTH):
         with pytest.raises(InputError, match="element_strength"):

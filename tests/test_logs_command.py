@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from inside import friso_inside
 
-from friso.identification.contents import content_of
+from friso.identification.contents import log_content
 from friso.identification.logs.mapping import Mapping, from_options
 from friso.views.logs.words import next_command, sparkline
 
@@ -29,7 +29,7 @@ def test_channels_ranges_rates_and_roles(tmp_path: Path) -> None:
     names = ["time [s]", "position [mm]", "force [N]", "temp"]
     force = np.where(np.arange(1200) == 5, np.nan, M["force"])
     path = log_files.write_text(tmp_path / "a.csv", names, [M["time"], M["position"] * 1e3, force, np.full(1200, 21.5)])
-    content = content_of(path, Mapping())
+    content = log_content(path, Mapping())
     by_name = {channel.name: channel for channel in content.channels}
     assert content.kind == "moves"
     assert not content.gaps
@@ -45,7 +45,7 @@ def test_channels_ranges_rates_and_roles(tmp_path: Path) -> None:
 def test_the_course_of_a_channel(tmp_path: Path) -> None:
     ramp = np.arange(1200.0)
     path = log_files.write_text(tmp_path / "a.csv", ["time [s]", "position [mm]"], [M["time"], ramp])
-    course = content_of(path, Mapping()).channels[1].course()
+    course = log_content(path, Mapping()).channels[1].course()
     assert course == pytest.approx(50 * np.arange(24) + 24.5)
     assert sparkline(course)[0] == "▁"
     assert sparkline(course)[-1] == "█"
@@ -53,13 +53,13 @@ def test_the_course_of_a_channel(tmp_path: Path) -> None:
 
 
 def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
-    content = content_of(bare, Mapping())
+    content = log_content(bare, Mapping())
     assert {gap.key for gap in content.gaps} == {"position", "force", "time"}
     command = next_command(content)
     for option in ("--map position=x", "--map force=u", "--unit t=s", "--unit x=mm", "--unit u=N"):
         assert option in command
     options = from_options(["position=x", "force=u"], ["t=s", "x=mm", "u=N"])
-    assert content_of(bare, options).kind == "moves"
+    assert log_content(bare, options).kind == "moves"
 
 
 def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
@@ -72,9 +72,9 @@ def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
     path = log_files.write_text(
         tmp_path / "a.csv", ["time [s]", "pos [mm]", "input [V]"], [1e-3 * np.arange(8 * count), place, volts]
     )
-    content = content_of(path, Mapping())
+    content = log_content(path, Mapping())
     assert [gap.example for gap in content.gaps] == ["--map force=input"]
-    assert content_of(path, from_options(["force=input"])).kind == "frequency"
+    assert log_content(path, from_options(["force=input"])).kind == "frequency"
 
 
 def test_a_frequency_response(tmp_path: Path) -> None:
@@ -82,7 +82,7 @@ def test_a_frequency_response(tmp_path: Path) -> None:
     path = log_files.write_text(
         tmp_path / "frf.csv", ["f [Hz]", "mag [m/N]", "phase [deg]"], [hertz, hertz**-2, np.full(100, -180.0)]
     )
-    content = content_of(path, Mapping())
+    content = log_content(path, Mapping())
     assert content.kind == "frequency"
     assert content.response is not None
     assert content.response.frequency.size == 100
@@ -112,14 +112,14 @@ def test_one_bad_file_does_not_hide_the_others(bare: Path, tmp_path: Path) -> No
 def test_a_channel_of_times_is_proposed_for_its_unit(tmp_path: Path) -> None:
     names = ["Sekunde [ms]", "pos [mm]", "force [N]"]
     path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
-    content = content_of(path, Mapping())
+    content = log_content(path, Mapping())
     assert "--map time=Sekunde" in next_command(content)
-    assert content_of(path, from_options(["time=Sekunde"])).kind == "moves"
+    assert log_content(path, from_options(["time=Sekunde"])).kind == "moves"
 
 
 def test_a_german_clock_is_known_by_its_name(tmp_path: Path) -> None:
     names = ["Uhrzeit [ms]", "pos [mm]", "force [N]"]
     path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
-    content = content_of(path, Mapping())
+    content = log_content(path, Mapping())
     assert content.kind == "moves"
     assert content.channels[0].role == "time"

@@ -13,13 +13,13 @@ from scipy.io import savemat
 from friso.errors import InputError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
-from friso.identification.logs.checks import clipped_share, held, interpolated, unwrapped
+from friso.identification.logs.checks import clipped_share, interpolated, samples_held, unwrapped
 from friso.identification.logs.delays import fitted_lag, in_blocks, lag
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, from_options
 from friso.identification.logs.roles import role_of
-from friso.identification.logs.time_base import together, track
+from friso.identification.logs.time_base import resample_tracks, track
 from friso.identification.logs.units import in_si, read_scale, spelled, split_heading
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -322,8 +322,8 @@ def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
 
 
 def test_values_held(tmp_path: Path, wording: Wording) -> None:
-    assert held(np.repeat(M["position"][:200], 4)) == 4
-    assert held(M["position"]) == 1
+    assert samples_held(np.repeat(M["position"][:200], 4)) == 4
+    assert samples_held(M["position"]) == 1
     log = log_of(tmp_path, NAMES, [*columns()[:3], np.repeat(M["force"][::5], 5)])
     wording("\n".join(log.warnings))
 
@@ -399,7 +399,7 @@ def test_channels_of_different_rates(tmp_path: Path, wording: Wording) -> None:
 def test_no_common_span(refused: Refused) -> None:
     t = 1e-3 * np.arange(100)
     with refused("log"):
-        together({"a": track("a", t, t), "b": track("b", t + 5, t)})
+        resample_tracks({"a": track("a", t, t), "b": track("b", t + 5, t)})
 
 
 @settings(max_examples=30, deadline=None)
@@ -416,7 +416,7 @@ def test_values_between_segments_are_never_made_up(first: list[int], second: lis
         spans.append(np.concatenate([offset + s + np.arange(n) for s, n in zip(starts, lengths, strict=True)]))
     tracks = {name: track(name, t, 2 * t) for name, t in zip("ab", spans, strict=True)}
     try:
-        base, values = together(tracks)
+        base, values = resample_tracks(tracks)
     except InputError:
         return
     for name, t in zip("ab", spans, strict=True):
@@ -436,11 +436,11 @@ def test_without_time(tmp_path: Path) -> None:
 
 def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
     log = log_files.write_text(tmp_path / "a.csv", NAMES, columns())
-    assert mappings.load(log) is None
+    assert mappings.load_mapping(log) is None
     first = from_options(["position=ä b=c"[:12]], ['x y="mm"'], ["force=35.1507 N/V"], "1 ms", "steps")
     assert mappings.place_for(log, tmp_path / "elsewhere") == tmp_path / "a.csv.friso.toml"
     mappings.sidecar(log).write_text(mappings.mapping_text(first), encoding="utf-8")
-    assert mappings.load(log) == first
+    assert mappings.load_mapping(log) == first
     second = from_options(["position=other"], dt="2 ms").over(first)
     assert second.roles == {"position": "other"}
     assert second.sample_time == 2e-3
@@ -456,7 +456,7 @@ def test_any_mapping_comes_back(tmp_path_factory: pytest.TempPathFactory, roles:
     log = tmp_path_factory.mktemp("kept") / "log.csv"
     mapping = Mapping(roles, dict.fromkeys(roles.values(), "mm"), {}, step)
     mappings.sidecar(log).write_text(mappings.mapping_text(mapping), encoding="utf-8")
-    assert mappings.load(log) == mapping
+    assert mappings.load_mapping(log) == mapping
 
 
 def test_mapping_in_another_folder(tmp_path: Path) -> None:
@@ -470,7 +470,7 @@ def test_mapping_in_another_folder(tmp_path: Path) -> None:
         folder.chmod(0o700)
     assert place == tmp_path / "a.csv.friso.toml"
     place.write_text(mappings.mapping_text(Mapping({"position": "x"})), encoding="utf-8")
-    assert mappings.load(log, tmp_path) == Mapping({"position": "x"})
+    assert mappings.load_mapping(log, tmp_path) == Mapping({"position": "x"})
 
 
 def test_what_is_said_now_silences_what_was_kept() -> None:
@@ -490,7 +490,7 @@ def test_what_is_said_now_silences_what_was_kept() -> None:
 def test_a_broken_mapping(tmp_path: Path, text: str, refused: Refused) -> None:
     (tmp_path / "a.csv.friso.toml").write_text(text)
     with refused():
-        mappings.load(tmp_path / "a.csv")
+        mappings.load_mapping(tmp_path / "a.csv")
 
 
 @pytest.mark.parametrize(

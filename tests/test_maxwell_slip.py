@@ -24,7 +24,7 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
 from friso.hunting.cycle.multipliers import slopes
 from friso.hunting.cycle.shooting import shoot
-from friso.identification.output_error.parameters import parameters_of
+from friso.identification.output_error.parameters import fit_parameters
 from friso.virtual_rig.run import as_built_keys, failures, run
 from friso.virtual_rig.task import own_motion
 
@@ -271,7 +271,7 @@ def test_a_rail_along_which_nothing_varies_is_refused() -> None:
 def test_identification_refuses_a_law_it_does_not_know() -> None:
     levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
     with pytest.raises(InputError, match="maxwell_slip") as refused:
-        parameters_of(MOVES.flat(), levels, 0.1, 0.1, True)
+        fit_parameters(MOVES.flat(), levels, 0.1, 0.1, True)
     assert all(law in str(refused.value) for law in ("lugre", "dahl", "stribeck", "rolling"))
 
 

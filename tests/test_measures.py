@@ -13,8 +13,8 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting import turns as scanning
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER, SEPARATION, distinct_peaks
-from friso.hunting.measures import measure, options
-from friso.hunting.turns import scan
+from friso.hunting.measures import measure_runs, measuring_options
+from friso.hunting.turns import scan_turning_points
 from friso.stage import Stage
 from friso.studies.request import Request
 from friso.studies.samples import Samples
@@ -28,7 +28,7 @@ def peaks(turns: list[tuple[float, float]]) -> list[float]:
 
 def periods(times: np.ndarray, values: np.ndarray, counts: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
     """Periods of the cycles [s] in runs of 20 s."""
-    return scan(times, values, counts, amplitude, np.full(len(counts), 20.0)).period
+    return scan_turning_points(times, values, counts, amplitude, np.full(len(counts), 20.0)).period
 
 
 def test_only_late_and_tall_maxima_count() -> None:
@@ -128,9 +128,9 @@ def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatc
     values = rng.normal(0, 3e-4, (300, 40)) * (-1.0) ** np.arange(40)
     values[::2] = 2e-4 + 1e-3 * values[::2]  # ripple
     counts, amplitude = rng.integers(0, 41, 300), rng.uniform(0, 1e-3, 300)
-    compiled = scan(times, values, counts, amplitude, np.full(300, 20.0))
+    compiled = scan_turning_points(times, values, counts, amplitude, np.full(300, 20.0))
     monkeypatch.setattr(scanning, "COMPILED_FROM", np.inf)
-    plain = scan(times, values, counts, amplitude, np.full(300, 20.0))
+    plain = scan_turning_points(times, values, counts, amplitude, np.full(300, 20.0))
     for name in ("peaks", "distinct", "period", "turned", "earlier"):
         assert np.array_equal(getattr(compiled, name), getattr(plain, name), equal_nan=name == "period")
     assert 0 < np.isnan(plain.period).sum() < 300
@@ -148,10 +148,10 @@ def test_small_swings_that_are_passed_over_change_no_measure(rig: Stage, rtol: f
     flat = rig.flat(study.columns(np.arange(256)))
     shape = kernel(structure(flat))
     result = {}
-    for least in (options(rtol).least_swing, 0.0):
+    for least in (measuring_options(rtol).least_swing, 0.0):
         columns = [np.full(256, np.nan) for _ in range(7)]
-        for runs in run_chunks(shape, flat, 256, replace(options(rtol), least_swing=least)):
-            measures = measure(runs.part(flat), runs)
+        for runs in run_chunks(shape, flat, 256, replace(measuring_options(rtol), least_swing=least)):
+            measures = measure_runs(runs.part(flat), runs)
             swings = measures.outcome == "swings"
             measured = (
                 measures.distinct_peaks,

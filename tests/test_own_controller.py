@@ -18,7 +18,7 @@ from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
 from friso.frequency import crossover
-from friso.identification.output_error.problem import closed_loop
+from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.common import record
 from friso.remedies import method
 from friso.remedies.catalogue import remedies
@@ -177,7 +177,7 @@ def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     time = np.arange(4000) * 1e-3
     reference = 0.02 * (1 - np.cos(2 * np.pi * time))
     blank = record("blank", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
-    problem = closed_loop(rigid.flat(), blank, blank.segments[0], ())
+    problem = loop_problem(rigid.flat(), blank, blank.segments[0], ())
     assert problem.form.velocity_samples == 1
     simulated = problem.record(np.zeros(0))
     columns = {"time": time, "reference": reference, "position": simulated.position, "force": simulated.force}

@@ -39,8 +39,8 @@ def test_code_for_other_platforms_needs_nothing_else(platform: Processor) -> Non
     machine = platform.target_machine()
     module = kernel(structure(VARIANTS["free"].flat()), lanes=platform.lanes).module
     functions = {name: getattr(module, name) for name in FUNCTIONS if hasattr(module, name)}
-    loops = scalar_code.written(driver.run, driver_kinds())
-    for written in (vector_code.written(functions, platform.lanes), loops):
+    loops = scalar_code.scalar_llvm(driver.run, driver_kinds())
+    for written in (vector_code.vector_llvm(functions, platform.lanes), loops):
         assert missing_symbols(machine, written) <= PLATFORMS[platform]
 
 

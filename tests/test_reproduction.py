@@ -36,14 +36,14 @@ from friso.studies.thesis import (
     thesis_rig,
 )
 from friso.studies.thesis.claims import _JUDGES, judges, registered
-from friso.studies.thesis.cycles import cycles
+from friso.studies.thesis.cycles import map_cycles
 from friso.studies.thesis.experiments import _RUNS, EXPERIMENTS, GRID, MOVES, ON_RAILS, STANDSTILL
 from friso.studies.thesis.experiments import BUILT as LOOPS_BUILT
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
-from friso.studies.thesis.reproduce import _changed, _coarser, _enters, counted, lasting
+from friso.studies.thesis.reproduce import _changed, _coarser, _enters, by_peak_count, lasting
 from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.views.reproduce.document import reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
@@ -201,7 +201,7 @@ def made(name: str, count: Callable[[np.ndarray, np.ndarray], Any], points: int 
     peaks = np.broadcast_to(np.asarray(count(x[:, None], y[None, :]), dtype=float), (points, points))
     words = np.where(peaks < 0, "invalid", np.where(peaks > 0, "swings", "rests"))
     dims = tuple(span.key for span in spans)
-    return counted(
+    return by_peak_count(
         xr.Dataset(
             {"distinct_peaks": (dims, np.where(peaks < 0, np.nan, peaks)), "outcome": (dims, words)},
             coords={dims[0]: x, dims[1]: y},
@@ -211,7 +211,7 @@ def made(name: str, count: Callable[[np.ndarray, np.ndarray], Any], points: int 
 
 def cell(peaks: int = 6, amplitude: float = 0.5e-3, period: float = 1.6) -> Response:
     values = {"distinct_peaks": peaks, "peak_to_peak": 2 * amplitude, "period": period}
-    return Response(counted(xr.Dataset({**values, "outcome": "swings" if peaks else "rests"})), xr.Dataset())
+    return Response(by_peak_count(xr.Dataset({**values, "outcome": "swings" if peaks else "rests"})), xr.Dataset())
 
 
 def sticks(time: float, integral: float) -> Response:
@@ -433,7 +433,7 @@ def test_lasting_hunting() -> None:
             "outcome": ("x", ["swings", "rests", "swings", "invalid"]),
         }
     )
-    assert counted(runs).keeps_moving.values.tolist() == [True, True, False, False]
+    assert by_peak_count(runs).keeps_moving.values.tolist() == [True, True, False, False]
     ended = lasting(runs)
     assert ended.keeps_moving.values.tolist() == [True, False, True, False]
     assert ended.distinct_peaks.values[:3].tolist() == [5.0, 0.0, 0.0]
@@ -563,7 +563,7 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     cells compared add up; the page shows curve and table."""
     study = STUDIES["system"]
     with patched({import_module("friso.studies.thesis.cycles"): {"NODES": 5}}):
-        cycles_ = cycles(study, small.maps["system"])
+        cycles_ = map_cycles(study, small.maps["system"])
     counted = cycles_.comparison
     assert counted.cells == 9
     assert counted.both + counted.neither + counted.counted_only + counted.attracted_only + counted.unknown == 9

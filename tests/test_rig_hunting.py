@@ -16,13 +16,13 @@ from friso.studies.rig.experiments import hunting, in_position, measured_cycles,
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
     distance,
-    follow,
     move,
     numbers_of,
     on_rails,
     rail_runs,
     rails,
     released,
+    run_moves,
     turning_points,
     with_joint,
 )
@@ -108,7 +108,7 @@ def moved() -> RailRuns:
     """The rig with its joint locked at 8 and 14.3 Hz, on eight rails: shape (2, 8)."""
     locked, seeds = with_joint(RIG, locked=True), rails(RIG)[:8]
     changes = on_rails(RIG, {"controller.crossover": np.array([8.0, 14.3])}, seeds)
-    return follow(locked, move(RIG), numbers_of(1, 2, 8), changes).shaped(2, 8)
+    return run_moves(locked, move(RIG), numbers_of(1, 2, 8), changes).shaped(2, 8)
 
 
 def test_hunting_ends_at_more_crossover(moved: RailRuns) -> None:
@@ -123,7 +123,7 @@ def test_hunting_can_be_started() -> None:
     """Fig. 25: a rail that settles after the move hunts on once released, from several places; here at 11 Hz."""
     machine = with_joint(RIG, locked=True).replace({"controller.crossover": "11 Hz", "rail.seed": 20})
     tasks = [move(machine), *(released(machine, place) for place in (-5e-3, -5e-4, 1e-3))]
-    after_move, *after_release = (follow(machine, task, [20], {}) for task in tasks)
+    after_move, *after_release = (run_moves(machine, task, [20], {}) for task in tasks)
     assert after_move.peaks[0] == 0
     assert sum(bool(item.swings[0]) for item in after_release) >= 2
 

@@ -27,7 +27,7 @@ def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
     low, high = sizes.travel(built)
     assert high - low == pytest.approx(0.09)
     assert sizes.longest_travel(built) == pytest.approx(0.15)
-    assert constant_speed.speeds(built) == pytest.approx((2.5e-3, 10e-3))
+    assert constant_speed.pass_speeds(built) == pytest.approx((2.5e-3, 10e-3))
     assert sizes.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
     assert np.array(frf.SETTINGS) * sizes.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
 
@@ -47,7 +47,7 @@ def test_a_weaker_motor_makes_the_joint_look_stiffer(built: Stage) -> None:
 
 
 def test_slips_lie_within_the_static_friction_of_their_rail(built: Stage) -> None:
-    (log,) = stiction.slow_motion(built, 1, 1)
+    (log,) = stiction.slow_legs(built, 1, 1)
     flat = log.stage.flat()
     slips = static_from_stick_slip(log.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
     low, high = stiction.true_range(log)
@@ -77,7 +77,7 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
 
 @pytest.mark.parametrize(("locked", "mass", "weak_mass"), [(True, 1.7, 2.5), (False, 0.5, 0.75)])
 def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, mass: float, weak_mass: float) -> None:
-    stage = sizes.locked(built) if locked else sizes.freed(built)
+    stage = sizes.locked_stage(built) if locked else sizes.freed(built)
     true, weak, strong = frf.apparent_masses(stage, PLACE, 1)
     assert true == pytest.approx(mass, rel=0.1)
     assert weak == pytest.approx(weak_mass, rel=0.1)
@@ -86,12 +86,12 @@ def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, ma
 
 def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: Stage) -> None:
     """Controller times plant, both measured in the same run, against the loop read from the sensitivity alone."""
-    stage = sizes.locked(built)
+    stage = sizes.locked_stage(built)
     _, loops = frf.open_loops(stage, PLACE, 1, frf.SETTINGS)
     for item in loops[2:]:
-        assert frf.nearest(item) == pytest.approx(item.tuned, rel=0.15)
+        assert frf.crossing_near_target(item) == pytest.approx(item.tuned, rel=0.15)
     log = rig_log(excitation.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
-    plant, loop = excitation.plant([log]), excitation.loop(log)
+    plant, loop = excitation.estimate_plant([log]), excitation.loop(log)
     hertz = plant.frequency
     control = _controller(stage, hertz)
     inside = (hertz > 4) & (hertz < 150)
@@ -127,7 +127,7 @@ def test_an_experiment_on_the_joint_needs_one(built: Stage, refused: Refused) ->
 
 def test_a_standing_stage_is_simulated_as_exactly_as_a_moving_one(built: Stage) -> None:
     """A motion of no length gave tolerances without bound: the cart's velocity changed its sign unseen."""
-    log = rig_log(excitation.excite(sizes.locked(built), PLACE, 1), 0, "", None, built, 1)
+    log = rig_log(excitation.excite(sizes.locked_stage(built), PLACE, 1), 0, "", None, built, 1)
     flat = built.flat()
     assert not log.failure
     deflection = log.true["bristle_deflection"] * flat["friction.bristle_stiffness"]

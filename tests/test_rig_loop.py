@@ -15,7 +15,7 @@ from friso.identification.readings.common import record
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.stage import load
 from friso.stage.files import save
-from friso.studies.rig.experiments.stiction import slow_motion
+from friso.studies.rig.experiments.stiction import slow_legs
 from friso.studies.rig.experiments.stiffness import steps
 from friso.studies.rig.sizes import freed
 
@@ -24,7 +24,7 @@ STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 
 def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path) -> None:
     machine = built(3)
-    slow = slow_motion(machine.truth, 1, 1)
+    slow = slow_legs(machine.truth, 1, 1)
     files = through_files([steps(machine.truth, 1), *slow], tmp_path)
     assert [item.kind for item in files] == ["steps", "stick-slip"]
     stroke = freed(machine.truth).flat()["joint.stroke"]

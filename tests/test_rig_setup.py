@@ -7,7 +7,7 @@ from refusals import Refused, Wording
 
 import friso
 from friso.identification.kind import as_set_up
-from friso.identification.logs.mapping import Mapping, load, mapping_text, sidecar
+from friso.identification.logs.mapping import Mapping, load_mapping, mapping_text, sidecar
 from friso.identification.sources import read_all
 from friso.progress import silent
 from friso.stage import Stage
@@ -29,7 +29,7 @@ def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path
     sidecar(path).write_text(
         mapping_text(Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"}))
     )
-    assert load(path) == Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"})
+    assert load_mapping(path) == Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"})
     (inputs,) = read_all([path], Mapping(), tmp_path)
     flat = as_set_up(built, inputs.source)
     assert flat["joint.stroke"] == pytest.approx(8e-3)

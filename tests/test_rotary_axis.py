@@ -15,7 +15,7 @@ from friso.axis import LINEAR, ROTARY, speak_of, unit_shown
 from friso.errors import InputError, StageError
 from friso.intervals import UncertainValue
 from friso.stage import Stage, numeric_keys
-from friso.stage.plausible import doubts
+from friso.stage.plausible import implausible_values
 from friso.views.drawing.prefixes import with_unit
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -76,7 +76,7 @@ def test_the_numbers_are_those_of_a_linear_axis_in_other_units(pair: tuple[Stage
     assert units["friction.bristle_damping"] == "N*m*s/rad"
     assert units["drive.encoder_resolution"] == "rad"
     assert units["controller.crossover"] == "Hz"
-    assert not [*doubts(turntable)]
+    assert not [*implausible_values(turntable)]
     again = turntable.with_numbers({"friction.static": 2.5})
     assert again.flat()["friction.static"] == 2.5
 

@@ -6,9 +6,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from friso.engine.kinds import kind_of
-from friso.engine.machine_code import Loops, load, object_code
-from friso.engine.scalar_code import take_next, written
+from friso.engine.kinds import argument_kind
+from friso.engine.machine_code import Loops, load_object, object_code
+from friso.engine.scalar_code import scalar_llvm, take_next
 
 HALF, WAYS = 0.5, (1, -1)
 
@@ -34,8 +34,8 @@ def drawn_arguments(seed: int) -> tuple[Given, np.ndarray, np.ndarray, np.ndarra
 
 
 def compiled(function: Callable[..., None], *arguments: Any) -> Loops:
-    kinds = [kind_of(argument) for argument in arguments]
-    return Loops(load(object_code(written(function, kinds)), ["run"])["run"], kinds)
+    kinds = [argument_kind(argument) for argument in arguments]
+    return Loops(load_object(object_code(scalar_llvm(function, kinds)), ["run"])["run"], kinds)
 
 
 def arithmetic(g, x, whole, marks):
@@ -196,4 +196,4 @@ def test_other_arguments_than_those_compiled_for_are_refused() -> None:
         with pytest.raises((TypeError, ValueError)):
             run(*others)
     with pytest.raises(TypeError, match="not given"):
-        kind_of("a word")
+        argument_kind("a word")

@@ -96,7 +96,7 @@ def test_compiled_functions_are_those_of_plain_python(function: Callable[..., No
 @pytest.mark.xdist_group("rigid")
 def test_steps_are_vectorised() -> None:
     """The step of a kernel works on whole registers; hardly anything is done lane by lane."""
-    written = vector_code.written({"step": kernel(structure(VARIANTS["rigid"].flat())).module.step}, LANES)
+    written = vector_code.vector_llvm({"step": kernel(structure(VARIANTS["rigid"].flat())).module.step}, LANES)
     machine = processor().target_machine()
     assembly = machine.emit_assembly(optimised(written, machine))
     scalar = len(re.findall(r"\bv(?:f[n]?m(?:add|sub)\d+|mul|add|sub|div)sd\b", assembly))

@@ -16,7 +16,7 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting.basin import ends_in
 from friso.hunting.cycle.hunting import hunting
-from friso.hunting.measures import Measures, measure, options
+from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.verdict import judge
 from friso.stage import Stage
 from friso.studies.cells import USUAL
@@ -55,8 +55,8 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
             cell = runs.sel({"joint.locked": locked, "controller.crossover": crossover})
             alone = rig.replace({"joint.locked": locked, "controller.crossover": f"{crossover} Hz"})
             flat = alone.flat()
-            (single,) = run_chunks(kernel(structure(flat)), flat, 1, options(1e-6))
-            case = measure(flat, single)
+            (single,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(1e-6))
+            case = measure_runs(flat, single)
             assert (cell.verdict.item(), cell.outcome.item()) == (judged(alone, case), case.outcome[0])
             assert (cell.peaks.item(), cell.distinct_peaks.item()) == (case.peaks[0], case.distinct_peaks[0])
             assert cell.peak_to_peak.item() == case.peak_to_peak[0]

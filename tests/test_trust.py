@@ -15,11 +15,11 @@ from friso.stage import Stage
 from friso.studies import verify
 from friso.studies.cells import UNITS, USUAL, Columns
 from friso.studies.execute import local_crew
-from friso.studies.refine import FINER, SHARE, finer, refine
+from friso.studies.refine import FINER, SHARE, finer, refine_cells
 from friso.studies.request import Request
 from friso.studies.study import Study
 from friso.studies.sweep import sweep
-from friso.studies.verify import loosest_rtol, sampled
+from friso.studies.verify import loosest_rtol, random_cells
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
@@ -51,13 +51,13 @@ def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
 def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int, modulus: int) -> None:
     stage = friso.load(EXAMPLES / "thesis_rig.toml")
     study = Request(stage, {"controller.crossover": (np.linspace(1, 2, points), "Hz")}).study()
-    picked = sampled(study, count, lambda cells: cells % modulus == 0)
+    picked = random_cells(study, count, lambda cells: cells % modulus == 0)
     assert np.array_equal(picked, np.unique(picked))
     assert np.all(picked % modulus == 0)
     assert len(picked) <= count
     if points <= 8 * count:
         assert len(picked) == min(count, -(-points // modulus))
-    assert np.array_equal(picked, sampled(study, count, lambda cells: cells % modulus == 0))
+    assert np.array_equal(picked, random_cells(study, count, lambda cells: cells % modulus == 0))
 
 
 def test_the_loosest_safe_tolerance_is_chosen(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,7 +148,7 @@ def asked(study: Study, outcome: np.ndarray, settling: np.ndarray | None = None)
             columns["settling_time_10um"] = settling.flat[cells]
         return columns | {"outcome": outcome.flat[cells], "status": np.full(len(cells), "done")}
 
-    return refine(study, ask), count
+    return refine_cells(study, ask), count
 
 
 def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:

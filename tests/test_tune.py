@@ -19,7 +19,7 @@ from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
-from friso.hunting.margin import searched
+from friso.hunting.margin import search_bandwidths
 from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
 from friso.remedies.catalogue import Remedy, remedies
@@ -30,9 +30,9 @@ from friso.remedies.relax import relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, sensitivity
 from friso.remedies.suggestion import suggestion
-from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile
-from friso.remedies.variables import BANDWIDTH, crossover
-from friso.remedies.verified import Performance, RemedyOutcome, doubts, measure
+from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moved, quantile
+from friso.remedies.variables import BANDWIDTH, loop_bandwidth
+from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals
 from friso.stage.controllers import as_tuned
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
@@ -107,7 +107,7 @@ def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet
 
 
 def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Fleet) -> None:
-    margin = margins(Remedy.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
+    margin = modulus_margins(Remedy.settled_on("", rigid), np.zeros((1, 0)), machines, rigid)[0, 0]
     assert margin == pytest.approx(settled_margin(rigid.flat()), rel=0.02)
 
 
@@ -166,7 +166,7 @@ def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal) -> None:
     remedy = remedies(rigid, goal)[0]
     fastest = remedy.tuned(np.ones(1))
     assert [variable.name for variable in remedy.variables] == [BANDWIDTH]
-    assert crossover(fastest) == pytest.approx(25.0)
+    assert loop_bandwidth(fastest) == pytest.approx(25.0)
 
 
 def test_the_answer_does_not_hunt(tuning: Advice) -> None:
@@ -222,9 +222,9 @@ def test_the_answer_as_files(tuning: Advice, monkeypatch: pytest.MonkeyPatch) ->
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:
     """Not even one whose moves settle: 11 Hz is closer to the edge than wanted."""
     near = rigid.replace({"controller.crossover": "11 Hz"})
-    measured, case = measure(near, tuning.machines, goal, near), check_given(near)
-    assert "distance" in doubts(case, measured, goal)
-    assert "hunting" in doubts(case, measured, goal)
+    measured, case = performance_of(near, tuning.machines, goal, near), check_given(near)
+    assert "distance" in unmet_goals(case, measured, goal)
+    assert "hunting" in unmet_goals(case, measured, goal)
 
 
 def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None:
@@ -262,7 +262,7 @@ def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -
 @pytest.fixture(scope="module")
 def sensitivities(rigid: Stage) -> Sensitivities:
     """Of the thesis's rig without its joint, along several keys."""
-    return sensitivity(rigid, KEYS, edge=searched(rigid, True).margin)
+    return sensitivity(rigid, KEYS, edge=search_bandwidths(rigid, True).margin)
 
 
 KEYS = (
@@ -297,7 +297,7 @@ def test_the_edge_s_derivative_is_that_of_edges_nearby(rigid: Stage, sensitiviti
     assert sensitivities.edge is not None
     static = rigid.flat()["friction.static"]
     edges = [
-        searched(rigid.with_numbers({"friction.static": static * (1 + change)}), True).margin
+        search_bandwidths(rigid.with_numbers({"friction.static": static * (1 + change)}), True).margin
         for change in (-0.01, 0.01)
     ]
     low, high = (edge.crossover for edge in edges if edge and edge.crossover)
@@ -348,13 +348,13 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     """2 of 40 fail each part: 95 % meet each, 80 % meet all."""
     apart = made_up(**{name: range(2 * k, 2 * k + 2) for k, name in enumerate(PARTS)})
     assert apart[1].share(FORCE_LIMITED).probability == pytest.approx(0.8)
-    assert doubts(*apart, FORCE_LIMITED) == ("together",)
-    assert doubts(*made_up(**dict.fromkeys(PARTS, range(2))), FORCE_LIMITED) == ()
-    assert doubts(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
+    assert unmet_goals(*apart, FORCE_LIMITED) == ("together",)
+    assert unmet_goals(*made_up(**dict.fromkeys(PARTS, range(2))), FORCE_LIMITED) == ()
+    assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
 
 
 def test_an_edge_that_was_not_searched_to_the_end_is_a_doubt() -> None:
-    assert doubts(*made_up(given_up=(BANDWIDTHS,)), FORCE_LIMITED) == ("given up",)
+    assert unmet_goals(*made_up(given_up=(BANDWIDTHS,)), FORCE_LIMITED) == ("given up",)
     assert {"given up", "together"} <= DOUBTS.keys()
 
 

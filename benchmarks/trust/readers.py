@@ -59,7 +59,7 @@ def _uncertain() -> Stage:
 
 
 def _mapping(path: Path) -> None:
-    mapping.load(path.with_name("log.csv"))
+    mapping.load_mapping(path.with_name("log.csv"))
 
 
 def _log(path: Path) -> None:

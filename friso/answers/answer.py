@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
 from friso.axis import LINEAR, AxisKind, speaking_of
 from friso.errors import InputError
 from friso.escapes import escaped
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,7 +30,7 @@ Returned = TypeVar("Returned")
 
 def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
     """A public function: its arguments are checked, and the kind of axis that it speaks of stays its own."""
-    answer = checked(function)
+    answer = check_arguments(function)
 
     @wraps(function)
     def asked(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from filelock import FileLock
 
-from friso.interrupts import held
+from friso.interrupts import hold_interrupts
 from friso.leftovers import remove_leftover
 from friso.system import foreign_writers, replace_file
 
@@ -69,7 +69,7 @@ class Drafts:
         """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end. A
         name always has a file, the earlier one or the new."""
         undo: list[Callable[[], object]] = []
-        with held():
+        with hold_interrupts():
             try:
                 for draft, path in self.drafts:
                     undo += [folder.rmdir for folder in made(path.parent)]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import Changes, text_of
 from friso.errors import InputError
-from friso.identification.contents import LogContent, content_of
+from friso.identification.contents import LogContent, log_content
 from friso.identification.logs.mapping import from_options
 from friso.progress import Progress, silent
 
@@ -150,7 +150,7 @@ def logs(
     for number, path in enumerate(files):
         progress(number, len(files), path.name)
         try:
-            contents.append(content_of(path, options, folder))
+            contents.append(log_content(path, options, folder))
         except InputError as error:
             wrong.append(error)
     answer = LogsAnswer(contents, wrong)

@@ -12,7 +12,7 @@ from friso.answers.inputs import LOGGER, Changes, changes_of, choice
 from friso.answers.output_folder import refuse_device, write
 from friso.errors import InputError
 from friso.stage import load
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 EXAMPLES = "examples"
 
@@ -29,7 +29,7 @@ def example_names() -> list[str]:
     return sorted(path.relative_to(folder).with_suffix("").as_posix() for path in folder.rglob("*.toml"))
 
 
-@checked
+@check_arguments
 def example(name: str) -> Path:
     """The path of an example that comes with friso.
 
@@ -58,7 +58,7 @@ def example(name: str) -> Path:
     return examples_folder() / f"{choice(stem, 'NAME', example_names(), 'friso example thesis_rig')}.toml"
 
 
-@checked
+@check_arguments
 def init(
     path: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
@@ -149,7 +149,7 @@ def _start(
     return stage_of_axis.text()
 
 
-@checked
+@check_arguments
 def schema(of: str = "stage") -> dict[str, Any]:
     """The JSON Schema of the stage file, or of the specification of a design: keys, units, bounds, examples.
 

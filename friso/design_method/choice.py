@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.front import Candidate, judged
-from friso.design_method.geometry import Geometry, mechanisms, rounded, sizes_of
+from friso.design_method.geometry import Geometry, mechanisms, round_geometries, sizes_of
 from friso.design_method.requirements import LeafTask, Requirement, buckling_share, load_stress, requirements
 from friso.leaf_springs.beams import BeamFailure, beams
 from friso.leaf_springs.evaluation import Evaluation
@@ -81,7 +81,7 @@ def _in_order(
     """Geometries in whole sizes that meet the requirements by closed forms, the softest first."""
     enough = task.spec.safety.parasitic * task.crossover
     near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
-    sizes = list({geometry: None for start in near for geometry in rounded(task.spec, start, STEP)})
+    sizes = list({geometry: None for start in near for geometry in round_geometries(task.spec, start, STEP)})
     if not sizes:
         return
     judgement = judged(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])

@@ -72,7 +72,7 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
     return ranges
 
 
-def controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> DesignedController:
+def choose_controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> DesignedController:
     """The controller of a stage with leaf springs, its crossover chosen."""
     flat = stage.flat()
     gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))

@@ -93,7 +93,7 @@ def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
     return np.array([[getattr(geometry, name) for name in SIZES] for geometry in geometries])
 
 
-def rounded(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
+def round_geometries(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
     """The geometries with whole multiples of a step [m] next to one, as far as there is space for them."""
     low, high = box(spec)
     near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]

@@ -11,14 +11,20 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.choice import ChosenLeaves, Confirmed, chosen, confirmed
-from friso.design_method.controller import DesignedController, comfortable, comfortable_below, controller, dampings
+from friso.design_method.controller import (
+    DesignedController,
+    choose_controller,
+    comfortable,
+    comfortable_below,
+    dampings,
+)
 from friso.design_method.edges import Corners, edges_over, rigid, under_law, worst_edges
 from friso.design_method.front import Candidate, front
 from friso.design_method.hunting_map import HuntingMap, hunting_map
 from friso.design_method.modal import Modal
 from friso.design_method.population import Population, corners
 from friso.design_method.prepare import prepared, with_leaves
-from friso.design_method.relax import Relaxation, relaxations
+from friso.design_method.relax import Relaxation, relaxed_requirements
 from friso.design_method.requirements import LeafTask
 from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
@@ -139,7 +145,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
     task, candidates = leaves(spec, flat, friction, progress)
     progress(0, 1, "leaves and crossover")
-    fit = fitted(base, task, candidates, population)
+    fit = fit_leaves(base, task, candidates, population)
     crossover = fit.stage.flat()[CROSSOVER]
     progress(0, 1, "hunting with isolator")
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
@@ -148,7 +154,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     edges = worst_edges(isolated)
     _does_not_hunt(fit, edges)
     progress(0, 1, "margins")
-    control = controller(fit.stage, fit.choice.beams, fit.limits, population)
+    control = choose_controller(fit.stage, fit.choice.beams, fit.limits, population)
     progress(0, 1, "hunting map")
     edges_map = hunting_map(fit.stage, spec, population)
     by_beams = tuple(confirmed(fit.task, candidates))
@@ -209,23 +215,24 @@ def leaves(
         task = LeafTask(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
             choices.append((task, candidates))
-            if allowed(task, candidates) >= spec.limit:
+            if allowed_crossover(task, candidates) >= spec.limit:
                 break
     if not choices:
         raise NoDesign(
-            "no leaf springs meet the specification", relaxations(LeafTask(spec, strokes[-1], 0.0, friction, flat))
+            "no leaf springs meet the specification",
+            relaxed_requirements(LeafTask(spec, strokes[-1], 0.0, friction, flat)),
         )
-    return max(choices, key=lambda pair: min(allowed(*pair), spec.limit))
+    return max(choices, key=lambda pair: min(allowed_crossover(*pair), spec.limit))
 
 
-def allowed(task: LeafTask, candidates: list[Candidate]) -> float:
+def allowed_crossover(task: LeafTask, candidates: list[Candidate]) -> float:
     """The highest crossover [Hz] whose multiple is still below a first interfering frequency of the front."""
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
 
-def fitted(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
+def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
     """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
-    target = min(task.spec.limit, allowed(task, candidates))
+    target = min(task.spec.limit, allowed_crossover(task, candidates))
     for _ in range(ROUNDS):
         task = replace(task, crossover=target)
         choice = chosen(task, candidates)

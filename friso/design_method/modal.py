@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
-from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
+from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched_crossovers, settled_members
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import controller, distance_to_lines, grid, plants, stability_by_poles
+from friso.frequency.family import controller_response, distance_to_lines, frequency_grid, plants, stability_by_poles
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range, ranges_below
 from friso.leaf_springs.evaluation import Evaluation
@@ -49,7 +49,7 @@ class Modal:
 
     def _margin(self, crossover: float) -> float:
         keys = faster(self.flat, np.array(crossover) / bandwidth(self.flat))
-        shape = controller(keys, self.omega)
+        shape = controller_response(keys, self.omega)
         bare, loop = self.bare * shape, self.with_modes * shape
         settled = stability_by_poles(keys, self.members).abscissa < 0
         stable = settled & (np.abs(_turns((1 + loop) / (1 + bare))) < 0.5)
@@ -58,7 +58,7 @@ class Modal:
     @property
     def comfortable(self) -> tuple[Range, ...]:
         """The crossovers [Hz] with a modulus margin of 0.5."""
-        return ranges_below(np.geomspace(*searched(self.flat), STEPS), lambda at: WANTED - self.margin(at))
+        return ranges_below(np.geomspace(*searched_crossovers(self.flat), STEPS), lambda at: WANTED - self.margin(at))
 
 
 def _turns(ratio: np.ndarray) -> np.ndarray:
@@ -80,7 +80,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Angular frequencies that show the loop at all crossovers, and every mode."""
-    ends = [grid(faster(flat, np.array(end / bandwidth(flat))), DENSITY) for end in searched(flat)]
+    ends = [frequency_grid(faster(flat, np.array(end / bandwidth(flat))), DENSITY) for end in searched_crossovers(flat)]
     zeta = float(leaves.mechanism.damping_ratio)
     about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
     frequencies = np.unique(np.concatenate([*ends, *about]))

@@ -74,7 +74,7 @@ def _falls(population: Population, flat: Mapping[str, Any]) -> None:
         raise InputError("friction.static", text, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
 
 
-def sampled(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
+def random_machines(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
     """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (its tolerance either way, and down
     by the share of it that the load may take, `softening`), travel and acceleration (evenly in the logarithm)."""
     ranges = _friction(spec, flat) | _masses(spec)

@@ -18,7 +18,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
     ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
     check_designable(stage)
-    stage = with_joint(stage, spec)
+    stage = complete_joint(stage, spec)
     section = spec.leaves
     low, high = (min(map(float, section.thickness)), section.stroke.high)
     masses: dict[str, str | None] = {
@@ -47,7 +47,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base
 
 
-def with_joint(stage: Stage, spec: Spec) -> Stage:
+def complete_joint(stage: Stage, spec: Spec) -> Stage:
     """The stage with masses of cart and stage, and a joint with damping and limiter: its own, or assumed ones."""
     if stage.joint is not None:
         return stage
@@ -59,7 +59,7 @@ def assumed(stage: Stage, spec: Spec) -> dict[str, float]:
     """The masses and keys of the joint that are assumed for a stage without one, by key [SI]."""
     if stage.joint is not None:
         return {}
-    before, after = stage.flat(), with_joint(stage, spec).flat()
+    before, after = stage.flat(), complete_joint(stage, spec).flat()
     keys = ("masses.cart", "masses.stage", "joint.damping", "joint.limiter_stiffness", "joint.limiter_damping")
     return {key: after[key] for key in keys if before.get(key) != after[key]}
 

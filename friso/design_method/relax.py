@@ -40,7 +40,7 @@ class Relaxation:
     geometry: Geometry | None = None
 
 
-def relaxations(task: LeafTask) -> tuple[Relaxation, ...]:
+def relaxed_requirements(task: LeafTask) -> tuple[Relaxation, ...]:
     """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
     first. Empty where no single one is enough."""
     needs = [*requirements(task), *_space(task)]

@@ -68,7 +68,7 @@ def less(key: str, value: float, unit: str) -> RelaxableKey:
     return RelaxableKey(key, value, unit, lambda excess: value / excess)
 
 
-def factor(key: str, value: float) -> RelaxableKey:
+def safety_factor(key: str, value: float) -> RelaxableKey:
     """A factor of safety, which cannot be smaller than 1."""
     return RelaxableKey(key, value, "", lambda excess: value / excess if value >= excess else None)
 
@@ -94,23 +94,23 @@ def requirements(task: LeafTask) -> list[Requirement]:
             lambda mechanism: stiffest * closed_forms.drive_stiffness(mechanism) * stroke / task.friction,
         ),
         Requirement(
-            "fatigue limit under stroke and load", (factor("safety.fatigue", safety.fatigue), shorter), fatigue
+            "fatigue limit under stroke and load", (safety_factor("safety.fatigue", safety.fatigue), shorter), fatigue
         ),
         Requirement(
             "yield strength under stroke and load",
-            (factor("safety.strength", safety.strength),),
+            (safety_factor("safety.strength", safety.strength),),
             lambda mechanism: RESERVE * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength,
         ),
         Requirement(
             "buckling under load",
-            (factor("safety.buckling", safety.buckling), *_lighter(task)),
+            (safety_factor("safety.buckling", safety.buckling), *_lighter(task)),
             lambda mechanism: (
                 RESERVE * safety.buckling * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
             ),
         ),
         Requirement(
             PARASITIC,
-            (factor("safety.parasitic", safety.parasitic),),
+            (safety_factor("safety.parasitic", safety.parasitic),),
             lambda mechanism: safety.parasitic * task.crossover / first_interfering(mechanism),
         ),
         *_support(spec, stroke),

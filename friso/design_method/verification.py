@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.design_method.population import Population, sampled
+from friso.design_method.population import Population, random_machines
 from friso.design_method.spec import Spec
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
@@ -15,7 +15,7 @@ from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.criteria.run_outcome import CREEPS, FAILED, RESTS, SWINGS, outcomes
-from friso.hunting.measures import end_of, turns_of
+from friso.hunting.measures import run_ends, turns_of
 from friso.progress import Progress, silent
 from friso.shares import share_interval
 from friso.stage import Stage
@@ -117,7 +117,7 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
     """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
     or none of it."""
     flat = stage.flat()
-    machines = sampled(spec, flat, MACHINES, softening)
+    machines = random_machines(spec, flat, MACHINES, softening)
     window = float(spec.position.window)
     outcomes: list[MachineOutcomes] = []
     for name, held in (("joint free", False), ("joint locked", True)):
@@ -160,7 +160,7 @@ def _followed(
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
     for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
-        numbers, end = runs.numbers, end_of(runs, turns_of(runs), "inner")
+        numbers, end = runs.numbers, run_ends(runs, turns_of(runs), "inner")
         words = outcomes(end, window, hold=LAST * end.ended)
         outcome.words[numbers] = words
         outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)

@@ -9,7 +9,7 @@ from typing import Any
 from friso.axis import LINEAR, AxisKind
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, quoted
-from friso.stage.section import Section, nearest, numeric_fields
+from friso.stage.section import Section, nearest_name, numeric_fields
 from friso.stage.tables import FRICTION, Masses, ThereAndBack, friction_law
 
 
@@ -44,7 +44,7 @@ class UserAnswers:
         for key in self.texts:
             if "." not in key and key not in self.wanted:
                 wanted = sorted(name for name in self.wanted if "." not in name)
-                near = nearest(key, wanted) or "masses.stage"
+                near = nearest_name(key, wanted) or "masses.stage"
                 expected = f"a key of the stage{''.join(f', {name}' for name in wanted)}"
                 raise InputError("--set", quoted(key), expected, f"--set {near}=...")
 

@@ -30,7 +30,7 @@ _PATIENCE = 0.1
 """How long [s] another process that builds the same is waited for before it is looked whether there is still need."""
 
 
-def entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
+def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
     Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written."""
     requests = list(requests)

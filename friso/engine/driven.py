@@ -53,7 +53,7 @@ class Followed:
     statuses: np.ndarray
 
 
-def follow(
+def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[Followed]:
     """Runs of stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,), from the states

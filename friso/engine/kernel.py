@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
-from friso.engine.building import entries
+from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, Compiled
-from friso.engine.kinds import Kind, kind_of
+from friso.engine.kinds import Kind, argument_kind
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
-from friso.engine.machine_code import Loops, load
+from friso.engine.machine_code import Loops, load_object
 from friso.equations.as_built import AsBuilt
 from friso.equations.dragged import Dragged
 from friso.equations.driven import Driven
@@ -224,7 +224,7 @@ def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:
     missing = [request for request in dict.fromkeys(requests) if request not in _kernels]
     if missing:
         missing.sort(key=lambda request: not request.variational)  # these take longest
-        for request, entry in zip(missing, entries([DRIVER, *map(_request, missing)])[1:], strict=True):
+        for request, entry in zip(missing, built_entries([DRIVER, *map(_request, missing)])[1:], strict=True):
             _load(request, entry)
     return [_kernels[request] for request in requests]
 
@@ -250,15 +250,15 @@ def _load(request: KernelRequest, entry: Compiled) -> None:
             return
         module = entry.module()
         functions = [name for name in FUNCTIONS if hasattr(module, name)]
-        code = {**dict.fromkeys(FUNCTIONS, 0), **load(entry.code, functions)}
+        code = {**dict.fromkeys(FUNCTIONS, 0), **load_object(entry.code, functions)}
         arrays = {name: np.array(module.LOOKED_UP[name], np.int64) for name in LOOKED_UP}
         _kernels[request] = Kernel(module, ModelLayout(**module.LAYOUT, **arrays, **code), _loops())
 
 
 @cache
 def _loops() -> Loops:
-    (entry,) = entries([DRIVER])
-    return Loops(load(entry.code, ["run"])["run"], driver_kinds())
+    (entry,) = built_entries([DRIVER])
+    return Loops(load_object(entry.code, ["run"])["run"], driver_kinds())
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:
@@ -280,4 +280,4 @@ def driver_kinds() -> list[Kind]:
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)
     settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))
     layout = ModelLayout(*(np.zeros(1, np.int64) if name in LOOKED_UP else 0 for name in ModelLayout._fields))
-    return list(map(kind_of, (flat, layout, new_queue(), batch, settings, empty_results(1, 1, 1, 1))))
+    return list(map(argument_kind, (flat, layout, new_queue(), batch, settings, empty_results(1, 1, 1, 1))))

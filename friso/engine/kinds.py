@@ -68,13 +68,13 @@ Kind = NumberKind | ArrayKind | RecordKind
 INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
-def kind_of(example: Any) -> Kind:
+def argument_kind(example: Any) -> Kind:
     """The kind of an argument. Raises TypeError for what compiled loops are not given."""
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
     names = getattr(example, "_fields", None)
     if isinstance(example, tuple) and names is not None:
-        return RecordKind(tuple((name, kind_of(value)) for name, value in zip(names, example, strict=True)))
+        return RecordKind(tuple((name, argument_kind(value)) for name, value in zip(names, example, strict=True)))
     if isinstance(example, float | int) and not isinstance(example, bool):
         return FLOAT if isinstance(example, float) else INT
     raise TypeError(f"compiled loops are not given anything like {example!r}")

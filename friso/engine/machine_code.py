@@ -33,7 +33,7 @@ def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
     return parsed
 
 
-def load(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
+def load_object(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
     """Load an object file; the addresses of these functions of it. What is loaded stays to the end of the process.
     Raises RuntimeError where it cannot be linked."""
     library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()

@@ -21,7 +21,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from friso.engine.kinds import FLOAT, INT, TRUTH, ArrayKind, Kind, NumberKind, RecordKind, kind_of
+from friso.engine.kinds import FLOAT, INT, TRUTH, ArrayKind, Kind, NumberKind, RecordKind, argument_kind
 from friso.engine.vector_code import FASTMATH, syntax
 
 _INT64, _DOUBLE, _BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
@@ -38,7 +38,7 @@ def _types(kind: Kind) -> Sequence[ir.Type]:
     return [ir.PointerType(_ELEMENTS[kind.dtype])] + [_INT64] * kind.dimensions
 
 
-def written(function: Callable[..., None], kinds: Sequence[Kind]) -> ir.Module:
+def scalar_llvm(function: Callable[..., None], kinds: Sequence[Kind]) -> ir.Module:
     """A function of arguments of these kinds as LLVM has it, called `run`. It takes the address at which the arguments
     lie one after another (`friso.engine.kinds.Packing`)."""
     module = ir.Module()
@@ -538,7 +538,7 @@ class _Frame(ast.NodeVisitor):
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
         """A number as one of a kind; a whole number may become a float64 number, and a truth either."""
         if not isinstance(value, _Value):
-            own_kind = kind_of(value) if not isinstance(value, bool) else TRUTH
+            own_kind = argument_kind(value) if not isinstance(value, bool) else TRUTH
             if not isinstance(own_kind, NumberKind):
                 raise TypeError(f"not in the language of plain loops: {value!r} where a number is expected")
             value = _Value(ir.Constant(_types(own_kind)[0], value), own_kind)

@@ -33,7 +33,7 @@ CACHE_LINE = 64
 """Bytes: a register that straddles two of these lines takes twice as long to load."""
 
 
-def written(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
+def vector_llvm(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
     """Functions under these names, as LLVM has it. Each does what its original `(B, *numbers)` does to a column of
     numbers B[row], in each of so many lanes of a flat float64 buffer in which those of a row lie side by side; the
     numbers are the same for all.

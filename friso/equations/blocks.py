@@ -37,7 +37,7 @@ class Loop:
     rated: sp.Expr | None = None
 
 
-def direction(*rates: sp.Expr) -> sp.Expr:
+def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
     """The sign of the first of some rates that is not 0, as 1, -1 or 0."""
     cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
     return sp.Piecewise(*cases, (sp.S.Zero, True))
@@ -108,7 +108,7 @@ class Measured:
     reference_direction: Signal
 
 
-def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
+def loop_signals(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
     """The signals of a loop, which are as large as a length [m], and change at a rate [1/s]."""
     drift = STEADY.reference_velocity - STEADY.velocity
     position = Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity)
@@ -124,7 +124,7 @@ def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
             rate=loop.reference_acceleration,
         ),
         Signal(loop.reference_acceleration, length * rate**2, sp.S.Zero, sp.S.Zero, rate=sp.S.Zero),
-        Signal(loop.reference_direction, sp.S.One, direction(STEADY.reference_velocity), sp.S.Zero),
+        Signal(loop.reference_direction, sp.S.One, sign_of_motion(STEADY.reference_velocity), sp.S.Zero),
     )
 
 

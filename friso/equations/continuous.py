@@ -16,7 +16,7 @@ from friso.equations.blocks import (
     Signal,
     demanded,
     force_limit,
-    measured,
+    loop_signals,
     unwinding_time,
     wound_up,
 )
@@ -35,7 +35,7 @@ switching for ever; over this narrow band the stop is continuous and the slide i
 def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
     """The controller of the given form; `length` [m] and `rate` [1/s] are the scales of its states."""
     blocks = Continuous(rate, form)
-    demand = demanded(form, measured(loop, length, rate), blocks)
+    demand = demanded(form, loop_signals(loop, length, rate), blocks)
     bound = ForceLimit.of(demand.force, form.anti_windup) if form.anti_windup else None
     force, kinks = (bound.force, bound.kinks) if bound else (demand.force.value, ())
     outputs = {"force": Output(force, "N", "actuator force")}
@@ -60,7 +60,7 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
     form = controller_form(flat)
     loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
     blocks = Continuous(sp.S.One, form)
-    force = demanded(form, measured(loop, sp.S.One, sp.S.One), blocks).force.settled
+    force = demanded(form, loop_signals(loop, sp.S.One, sp.S.One), blocks).force.settled
     proportional, integral = _per_error(force), sp.S.Zero
     for x, integrand in blocks.integrands.items():
         gain = sp.diff(force, x)

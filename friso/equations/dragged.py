@@ -26,7 +26,7 @@ class Dragged(Imposed):
 
 def dragged(form: Dragged) -> Model:
     """The equations of the law on a body with the position [m], velocity [m/s] and acceleration [m/s^2] of a
-    reference, as `friso.engine.driven.follow` gives them at every sample."""
+    reference, as `friso.engine.driven.run_driven` gives them at every sample."""
     import sympy as sp
 
     from friso.equations.component import Output, Role, State, key, state

@@ -13,7 +13,7 @@ from friso.equations.masses import beyond_stops, stops
 from friso.equations.structure import JointForm
 
 
-def joint(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr, Component]:
+def joint_force(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr, Component]:
     """Force of the joint on the cart [N] for a deflection [m] of the stage against it, and its kinks.
 
     "locked": cart and stage meet through the limiter alone. "touching": the stroke is zero, so that the limiter

@@ -9,12 +9,12 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.blocks import Controller, Loop, direction
+from friso.equations.blocks import Controller, Loop, sign_of_motion
 from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
 from friso.equations.conditions import under_acceleration
 from friso.equations.continuous import Continuous, continuous_controller
 from friso.equations.friction.common import Friction
-from friso.equations.joint import joint
+from friso.equations.joint import joint_force
 from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.structure import ControllerForm, Structure
 from friso.equations.transmission import BACKLASH, at_motor, transmission
@@ -138,7 +138,9 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     breakaway = _breakaway(structure, friction, motor_friction)
     length, rate = _scales(structure, breakaway, chain.mass)
     stage, rated = chain.measured(structure)
-    directions = direction(velocity, acceleration)  # as they are at the last corner: where it turns there is another
+    directions = sign_of_motion(
+        velocity, acceleration
+    )  # as they are at the last corner: where it turns there is another
     two = None if rated is stage else rated.position
     loop = Loop(
         reference - stage.position, stage.position, rated.velocity, reference_velocity, acceleration, directions, two
@@ -305,7 +307,7 @@ def _mechanics(
     if structure.joint == "rigid":
         states[:0] = stage.under(on_stage - drag, *scales)
     else:
-        on_cart, part = joint(structure.joint, stage.position - cart.position, stage.velocity - cart.velocity)
+        on_cart, part = joint_force(structure.joint, stage.position - cart.position, stage.velocity - cart.velocity)
         states[:0] = [*stage.under(on_stage - on_cart, *scales), *cart.under(on_cart - drag, *scales)]
         parts.append(part)
     if friction:

@@ -20,7 +20,7 @@ from friso.equations.blocks import (
     Signal,
     demanded,
     force_limit,
-    measured,
+    loop_signals,
     unwinding_time,
     wound_up,
 )
@@ -54,7 +54,7 @@ def sampled_controller(
     integrator does at the limit of the force what its anti-windup prescribes: clamped, it rests for the sample in which
     it would drive the force further beyond."""
     blocks = Sampled(velocity_samples, form)
-    demand = demanded(form, measured(loop, sp.S.One, sp.S.One), blocks)
+    demand = demanded(form, loop_signals(loop, sp.S.One, sp.S.One), blocks)
     limit = force_limit() if form.anti_windup else None
     pushed = replace(demand.force, value=demand.force.value + extra)
     force, held = blocks.finished(replace(demand, force=pushed), form.anti_windup, rest)

@@ -9,18 +9,18 @@ from friso.errors import InputError
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
 from friso.frequency.members import Members, limit_cases, limiter_states
-from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, fed_forward, plant
+from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, plant, reference_derivatives
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
     from control import StateSpace
 
 
-@checked
+@check_arguments
 def linear(stage: Stage, case: str | Members | None = None, part: str = "plant", series: bool = False) -> StateSpace:
     """A stage in one state as a `control.StateSpace` in SI units, its states, inputs and outputs named.
 
@@ -89,7 +89,7 @@ def _plant(flat: Mapping[str, Any], member: Members) -> System:
 def _controller(flat: Mapping[str, Any], member: Members) -> System:
     controller = compensator(flat, len(member))
     measured = (REFERENCE, STAGE, VELOCITY) if controller.sees(VELOCITY) else (REFERENCE, STAGE)
-    return controller.take((*measured, *fed_forward(controller)), (FORCE,))
+    return controller.take((*measured, *reference_derivatives(controller)), (FORCE,))
 
 
 def _closed(flat: Mapping[str, Any], member: Members) -> System:

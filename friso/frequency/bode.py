@@ -11,11 +11,11 @@ import numpy as np
 from friso.errors import InputError
 from friso.frequency.crossover import Limits, limits
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import Scan, closed, loops, modes, scan, spectral_abscissa
+from friso.frequency.family import Scan, closed_loop_poles, loops, plant_poles, scan_stability, spectral_abscissa
 from friso.frequency.friction import steady_force
 from friso.frequency.loops import response
 from friso.frequency.margins import Margins, margins, with_resonances
-from friso.frequency.members import Members, family, joined, limit_cases, member
+from friso.frequency.members import Members, concatenate_families, family, limit_cases, member
 from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.stiffness import limiter_in_series
@@ -102,10 +102,10 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     states = {name: (flat, member) for name, member in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     margins_of = {name: margins(*state) for name, state in states.items()}
     low, high = band or _mattering(flat, margins_of.values())
-    together = joined([*limit_cases(flat).values()])
-    resonant = [closed(flat, together), modes(flat, together)]
+    together = concatenate_families([*limit_cases(flat).values()])
+    resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]
     omega = with_resonances(np.geomspace(low, high, POINTS) * 2 * np.pi, resonant)
-    scanned = scan(flat, family(flat))
+    scanned = scan_stability(flat, family(flat))
     worst = scanned.members[scanned.worst()]
     settled = scanned.members[scanned.worst(scanned.members.settled)]
     variants = stage.variants()
@@ -146,7 +146,7 @@ def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Me
 
 def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
     """Frequencies [Hz] that show all crossovers and resonances."""
-    poles = modes(flat, joined([*limit_cases(flat).values()]))
+    poles = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
     places = np.array(
         [*(f for case_margins in all_margins for f in case_margins.crossovers), *resonances[resonances > 1e-3]]
@@ -160,7 +160,7 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
     if flat["friction.model"] == "none":
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
-    states = joined([member(speed, touched=touched) for speed in PRESCRIBED])
+    states = concatenate_families([member(speed, touched=touched) for speed in PRESCRIBED])
     stable = spectral_abscissa(flat, states) < 0
     return tuple(
         Prescribed(speed, response(flat, states[k], DriveTiming.of(flat))(omega), bool(stable[k]))

@@ -10,8 +10,15 @@ import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import PoleStability, bare_loops, distance_to_lines, grid, scan, stability_by_poles
-from friso.frequency.members import Members, family, joined, limit_cases
+from friso.frequency.family import (
+    PoleStability,
+    bare_loops,
+    distance_to_lines,
+    frequency_grid,
+    scan_stability,
+    stability_by_poles,
+)
+from friso.frequency.members import Members, concatenate_families, family, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 
 WANTED = 0.5
@@ -36,8 +43,8 @@ JUST = 1e-5
 
 @dataclass(frozen=True)
 class Limits:
-    """The crossovers [Hz], from `searched`, at which a stage is `stable` and those with a `comfortable` modulus margin,
-    as ranges, in all limit cases: stuck under any bias force or sliding fast, its limiter free or touched.
+    """The crossovers [Hz], from `searched_crossovers`, at which a stage is `stable` and those with a `comfortable` modulus
+    margin, as ranges, in all limit cases: stuck under any bias force or sliding fast, its limiter free or touched.
 
     Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
     stable and comfortable ones end it, possibly with the search (None if there is none). `first_lost` is the state that
@@ -62,12 +69,12 @@ class Limits:
 
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
-    ends, members = searched(flat), settled_members(flat)
+    ends, members = searched_crossovers(flat), settled_members(flat)
     crossover = _stated(flat)
     stable = stable_crossovers(flat, members)
     close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
     comfortable = shared(close, stable)
-    highest, calm = (end_of(ranges, crossover) for ranges in (stable, comfortable))
+    highest, calm = (range_end(ranges, crossover) for ranges in (stable, comfortable))
     above, beyond = (np.array([end * (1 + JUST) if end else crossover]) for end in (highest, calm))
     return Limits(
         ends,
@@ -82,18 +89,18 @@ def limits(flat: Mapping[str, Any]) -> Limits:
 
 def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range, ...]:
     """The crossovers [Hz] (or factors of the bandwidth) at which all members are stable."""
-    at = np.geomspace(*searched(flat), STEPS)
+    at = np.geomspace(*searched_crossovers(flat), STEPS)
     return ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
 
 
-def end_of(ranges: Sequence[Range], crossover: float) -> float | None:
+def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
     """Upper end [Hz] of the range that contains a crossover [Hz], or of the next one below it, or else of the lowest;
     None without ranges."""
     below = [high for low, high in ranges if low <= crossover] or [high for _, high in ranges[:1]]
     return below[-1] if below else None
 
 
-def searched(flat: Mapping[str, Any]) -> Range:
+def searched_crossovers(flat: Mapping[str, Any]) -> Range:
     """The crossovers that are searched; those of a sampled drive end below half the sampling frequency."""
     drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
@@ -103,7 +110,7 @@ def searched(flat: Mapping[str, Any]) -> Range:
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
     """The least modulus margin of the settled states of a stage; 0 if one of them is not stable."""
-    loops = scan(flat, settled_members(flat))
+    loops = scan_stability(flat, settled_members(flat))
     return float(loops.distance.min()) if loops.stable.all() else 0.0
 
 
@@ -111,7 +118,7 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
     """Limit cases, and those that are stuck under a bias force: what a stage is in unless it creeps or just broke away,
     when its friction falls with the speed."""
     members = family(flat, BIASES, 2)
-    return joined([*limit_cases(flat).values(), members[members.stuck]])
+    return concatenate_families([*limit_cases(flat).values(), members[members.stuck]])
 
 
 def _stated(flat: Mapping[str, Any]) -> float:
@@ -132,7 +139,9 @@ def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Least distance of the loop from -1, shape (crossovers, members)."""
     # frequencies that show the loop at all crossovers searched, always the same: the distance stays a smooth function
-    omega = np.unique(np.concatenate([grid(_at(flat, np.array(end)), DENSITY) for end in searched(flat)]))
+    omega = np.unique(
+        np.concatenate([frequency_grid(_at(flat, np.array(end)), DENSITY) for end in searched_crossovers(flat)])
+    )
     loops_of, held = bare_loops(flat, members, omega), DriveTiming.of(flat).transfer(omega)
     shared = np.array([distance_to_lines(loops_of(_at(flat, f)) * held) for f in crossover])
     return np.minimum(shared, _stability(flat, members, crossover).resonant.reshape(shared.shape))

@@ -19,7 +19,7 @@ from friso.frequency.drive import LIGHT, DriveTiming
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
-from friso.frequency.members import Members, joined, limit_cases
+from friso.frequency.members import Members, concatenate_families, limit_cases
 from friso.frequency.parts import FORCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.system import Complex, System
@@ -63,10 +63,10 @@ class Scan:
         return int(np.where(among, self.distance, np.inf).argmin())
 
 
-def scan(flat: Mapping[str, Any], members: Members) -> Scan:
+def scan_stability(flat: Mapping[str, Any], members: Members) -> Scan:
     """Stability of every member, and its modulus margin: on frequencies that all share and about its own closed-loop
     resonances, and exactly for those that come closest to -1 there."""
-    omega = grid(flat, DENSITY)
+    omega = frequency_grid(flat, DENSITY)
     by_poles = stability_by_poles(flat, members)
     parts = (members[part] for part in _split(np.arange(len(members))))
     shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(flat, part, omega)), parts))
@@ -123,21 +123,23 @@ def distance_to_lines(loop: Complex) -> np.ndarray:
     return np.abs(start + along * step).min(axis=-1)
 
 
-def grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
+def frequency_grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
     """Angular frequencies [rad/s] that show the loops in all limit cases: so many per decade, and more about the
     resonances of plant and closed loop."""
-    cases = joined([*limit_cases(flat).values()])
-    return frequencies(flat, cases, DriveTiming.of(flat), density, [modes(flat, cases), closed(flat, cases)])
+    cases = concatenate_families([*limit_cases(flat).values()])
+    return frequencies(
+        flat, cases, DriveTiming.of(flat), density, [plant_poles(flat, cases), closed_loop_poles(flat, cases)]
+    )
 
 
-def closed(flat: Mapping[str, Any], members: Members) -> Complex:
+def closed_loop_poles(flat: Mapping[str, Any], members: Members) -> Complex:
     """Finite closed-loop poles [rad/s] of members."""
     drive = DriveTiming.of(flat)
     roots = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
     return roots[np.isfinite(roots)]
 
 
-def modes(flat: Mapping[str, Any], members: Members) -> Complex:
+def plant_poles(flat: Mapping[str, Any], members: Members) -> Complex:
     """Poles [rad/s] of the plant in all these states."""
     return np.concatenate([np.linalg.eigvals(plant(flat, kind).a).ravel() for kind in members.kinds]).astype(complex)
 
@@ -175,12 +177,12 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
     what it moves is computed once."""
     if shared_structure(flat).transmission is None:
         bare = plants(flat, members, omega)
-        return lambda keys: bare * controller(keys, omega)
-    seen = _measured(flat, members, omega)
+        return lambda keys: bare * controller_response(keys, omega)
+    seen = _measured_compliance(flat, members, omega)
     return lambda keys: (seen * _channels(keys, omega)).sum(axis=-1)
 
 
-def _measured(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
+def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """Position and velocity measured over the force [m/N, m/(N s)], shape (members, k, 2): by the whole plant, whose
     encoders may be on different sides of a transmission."""
     answers = np.empty((len(members), len(omega), 2), complex)
@@ -192,7 +194,7 @@ def _measured(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> C
     return answers
 
 
-def controller(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
+def controller_response(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
     """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
     position, velocity = _channels(flat, omega).T
     return position + 1j * omega * velocity

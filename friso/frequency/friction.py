@@ -11,7 +11,7 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.component import Switch, state
-from friso.equations.friction.common import direction, solved
+from friso.equations.friction.common import direction, solve_linear
 from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, sine
 from friso.stage.stage import declared_keys
@@ -115,7 +115,7 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
     }
     if not ways:
         return {}
-    (far,) = solved([force.subs(VELOCITY, 0).subs(ways) - BIAS], [pulled])
+    (far,) = solve_linear([force.subs(VELOCITY, 0).subs(ways) - BIAS], [pulled])
     return {x: limit.subs(pulled, far) for x, limit in ways.items()}
 
 

@@ -18,8 +18,8 @@ from friso.frequency.parts import (
     STAGE,
     VELOCITY,
     compensator,
-    fed_forward,
     plant,
+    reference_derivatives,
 )
 from friso.frequency.rates import closed_over_period, cut_over_period, samples_controller
 from friso.frequency.system import Complex, System
@@ -44,7 +44,7 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     """The closed loop in continuous time: from a force on the stage, reference, disturbance on the cart, noise of the
     sensor and what is fed forward of the reference to all that the plant shows and the actuator force."""
     machine, control = plant(flat, members), compensator(flat, len(members))
-    ahead = fed_forward(control)
+    ahead = reference_derivatives(control)
     n, k = len(machine.states), len(control.states)
     channels = machine.take((FORCE, DISTURBANCE), (STAGE, VELOCITY))
     push = machine.b[:, :, [machine.inputs.index(FORCE)]]

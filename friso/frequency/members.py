@@ -11,7 +11,7 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.friction import level, speeds
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 from friso.stage.transmission import leading_friction
 
 BIASES, SPEEDS = 65, 257
@@ -64,7 +64,7 @@ class Members:
         return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 
-@checked
+@check_arguments
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
     """A single state: sliding at a speed [m/s], `forward` or back, or, at 0, stuck under a bias force [N]; with its
     limiter `touched` or not. Raises InputError for a speed that is negative and for a bias of a cart that slides.
@@ -82,7 +82,7 @@ def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward
     return Members(np.array([speed]), np.array([bias]), np.array([touched]), np.array([forward]))
 
 
-def joined(parts: list[Members]) -> Members:
+def concatenate_families(parts: list[Members]) -> Members:
     """All members of several families, one after the other."""
     return Members(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Members)))
 
@@ -108,7 +108,7 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
     motion, and sliding at all speeds, in both directions if friction differs between them."""
     flat = leading_friction(flat)
     if flat["friction.model"] == "none":
-        return joined([*limit_cases(flat).values()])
+        return concatenate_families([*limit_cases(flat).values()])
     parts = []
     differs = any(flat.get(f"friction.{name}", 0.0) != 0 for name in ("asymmetry", "viscous_asymmetry"))
     for touched in limiter_states(flat):
@@ -118,7 +118,7 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
             speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])
             bias = np.concatenate([bias, np.zeros(speeds_)])
             parts.append(Members(speed, bias, np.full(len(speed), touched), np.full(len(speed), forward)))
-    return joined(parts)
+    return concatenate_families(parts)
 
 
 def _fast(flat: Mapping[str, Any]) -> float:

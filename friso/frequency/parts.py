@@ -97,7 +97,7 @@ def compensator(flat: Mapping[str, Any], members: int) -> System:
     return system
 
 
-def fed_forward(control: System) -> tuple[str, ...]:
+def reference_derivatives(control: System) -> tuple[str, ...]:
     """Names of the derivatives of the reference that a controller takes."""
     return tuple(name for name in FEEDFORWARD if control.sees(name))
 

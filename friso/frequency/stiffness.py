@@ -12,7 +12,7 @@ def in_series(first: Any, second: Any) -> Any:
     return first * second / (first + second)
 
 
-def sensitivity(friction_stiffness: Any, joint_stiffness: Any) -> Any:
+def series_sensitivity(friction_stiffness: Any, joint_stiffness: Any) -> Any:
     """How the stiffness of both in series changes with that of the friction (Eq. 2): (eta/(1 + eta))^2 with the ratio
     eta = k_j/k_f."""
     eta = joint_stiffness / friction_stiffness

@@ -8,7 +8,7 @@ from friso.equations.controllers.van_dijk import numbers, tuned
 from friso.errors import InputError
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 from friso.stage.stage import numeric_keys
 
 
@@ -33,7 +33,7 @@ EXAMPLE, MOST = "friso.tuning(8.0, 0.1, 2.0, 1.7)", 1e30
 """How it is called, and the largest number of any of its arguments."""
 
 
-@checked
+@check_arguments
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules with `alpha` and `beta`, and how it does
     on that mass. Raises InputError for numbers that no stage file may have.

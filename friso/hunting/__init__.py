@@ -5,7 +5,7 @@ from friso.hunting.check import Case, Solver, check
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.cycle.hunting import Cycle, Hunting, Swing, hunting
 from friso.hunting.margin import Margin
-from friso.hunting.measures import BANDS, Measures, measure
+from friso.hunting.measures import BANDS, Measures, measure_runs
 from friso.hunting.verdict import Judgement
 
 __all__ = [
@@ -24,5 +24,5 @@ __all__ = [
     "Swing",
     "check",
     "hunting",
-    "measure",
+    "measure_runs",
 ]

@@ -128,7 +128,7 @@ def _last_swing(
     return swing, completed
 
 
-def displacements(stage: Stage, target: Target) -> Kick:
+def displacements_that_hunt(stage: Stage, target: Target) -> Kick:
     """The displacements that start hunting."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
@@ -138,7 +138,7 @@ def displacements(stage: Stage, target: Target) -> Kick:
     return _kick(hunts, target.amplitude)
 
 
-def pushes(stage: Stage, target: Target) -> Kick:
+def pushes_that_hunt(stage: Stage, target: Target) -> Kick:
     """The velocities that start hunting."""
     stages = Ensemble.held(stage.flat(), 1)
 
@@ -173,7 +173,7 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
     return Kick(windows, (float(kicks[0]), float(kicks[-1])), unknown)
 
 
-def moves(stage: Stage, target: Target) -> MoveShare | None:
+def moves_that_hunt(stage: Stage, target: Target) -> MoveShare | None:
     """The share of moves that end in hunting; None for motions that have no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:

@@ -7,11 +7,11 @@ from pathlib import Path
 
 from friso.engine.cache import keep
 from friso.engine.machine_code import object_code
-from friso.engine.scalar_code import written
+from friso.engine.scalar_code import scalar_llvm
 from friso.hunting import turning
 from friso.hunting.turns import KINDS
 
 
 def build(folder: Path, task: bytes) -> str:
     """Keep the loops over turning points in a folder of the cache; the name of the entry."""
-    return keep(folder, inspect.getsource(turning), lambda module: object_code(written(module.run, KINDS)))
+    return keep(folder, inspect.getsource(turning), lambda module: object_code(scalar_llvm(module.run, KINDS)))

@@ -20,7 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
-from friso.hunting.measures import BANDS, measure, options
+from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.verdict import ATTRACTION, PARTS, WORK, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
@@ -136,8 +136,8 @@ def _needed(stage: Stage) -> set[KernelRequest]:
 def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> Case:
     flat = stage.flat()
     begun = done.done
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
-    measures = measure(flat, runs)
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol))
+    measures = measure_runs(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
     judgement = judge(stage, measures, max(rtol, LONG), lambda part: done.add(int(part != ATTRACTION), part), work)

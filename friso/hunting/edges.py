@@ -75,7 +75,7 @@ class Edges:
         return np.isfinite(self.crossover)
 
 
-def joined(parts: list[Edges]) -> Edges:
+def concatenate_edges(parts: list[Edges]) -> Edges:
     """The edges of all stages."""
     return Edges(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(Edges)))
 

@@ -79,10 +79,10 @@ NOT_SOUGHT = Searched(None, ())
 def margin(stage: Stage, attracting: bool) -> Margin | None:
     """The last edge above the bandwidth of a stage that something attracts, or the next one below that of one that
     nothing does; None within a factor of ten."""
-    return searched(stage, attracting).margin
+    return search_bandwidths(stage, attracting).margin
 
 
-def searched(stage: Stage, attracting: bool, survey: Attractors | None = None) -> Searched:
+def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> Searched:
     """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `survey` is what
     attracts the stage itself, if that was surveyed. Where an allowance is used up, ends are where they are known to be
     by then, and not certain."""

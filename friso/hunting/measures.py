@@ -15,7 +15,7 @@ from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import BAND, End, outcomes
 from friso.hunting.turning import COUNTED_AFTER, DISTINCT, WINDOW
-from friso.hunting.turns import Turns, scan
+from friso.hunting.turns import Turns, scan_turning_points
 from friso.stage import Stage
 
 BANDS = (1e-6, BAND)
@@ -47,7 +47,7 @@ class Measures:
     turns: np.ndarray
 
 
-def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
+def measuring_options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
     """How to run for these measures; turning points are kept from a little before the first that may count."""
     return RunOptions(
         rtol=rtol,
@@ -65,7 +65,7 @@ def turns_of(runs: Runs) -> Turns:
     results = runs.results
     room = max(1, int(results.turn_counts.max(initial=0)))
     times, values = results.turn_times[:, :room], results.turn_values[:, :room]
-    return scan(times, values, results.turn_counts, swing_of(runs), runs.statistic("ended"))
+    return scan_turning_points(times, values, results.turn_counts, swing_of(runs), runs.statistic("ended"))
 
 
 def swing_of(runs: Runs) -> np.ndarray:
@@ -73,7 +73,7 @@ def swing_of(runs: Runs) -> np.ndarray:
     return runs.statistic("deviation_max") - runs.statistic("deviation_min")
 
 
-def end_of(runs: Runs, turns: Turns, outside: str) -> End:
+def run_ends(runs: Runs, turns: Turns, outside: str) -> End:
     """How a chunk of runs ends, with respect to the "inner" or "outer" of their bands."""
     return End(
         completed=np.equal(runs.results.statuses, Status.DONE),
@@ -86,7 +86,7 @@ def end_of(runs: Runs, turns: Turns, outside: str) -> End:
     )
 
 
-def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
+def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
     """The measures of a chunk of runs of the stages `flat`, arrays of which have one entry per run of the chunk."""
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs)
@@ -105,7 +105,7 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
         peak_to_peak=finished(swing_of(runs)),
         period=finished(turns.period),
         settling_time=(finished(inner), finished(outer)),
-        outcome=outcomes(end_of(runs, turns, "outer"), BAND, passing),
+        outcome=outcomes(run_ends(runs, turns, "outer"), BAND, passing),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,
         steps=runs.statistic("attempted").astype(np.int64),
@@ -118,5 +118,5 @@ def measured_run(stage: Stage, rtol: float = 1e-6) -> Measures:
     """What the run of a stage's motion does, arrays of shape (1,); whatever the sampling interval of a time response,
     the turning points of the run itself decide. Raises ValueError for a tolerance that is not usable."""
     flat = stage.flat()
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
-    return measure(flat, runs)
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol))
+    return measure_runs(flat, runs)

@@ -19,7 +19,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import families, hunting_cycles
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.cycle.multipliers import multipliers
-from friso.hunting.cycle.shooting import simplest
+from friso.hunting.cycle.shooting import swings_of_simplest
 
 SCALE = 0.06
 """Change of the logarithm of the bandwidth over which is simulated where no orbit can be followed."""
@@ -289,7 +289,7 @@ class Outward:
 
 
 def _is_simple(orbit: Swinging) -> bool:
-    return orbit.cycles is not None and orbit.cycles.swings == simplest(orbit.cycles.sign)
+    return orbit.cycles is not None and orbit.cycles.swings == swings_of_simplest(orbit.cycles.sign)
 
 
 def orbit_distance(point: Point, orbit: Swinging) -> float:

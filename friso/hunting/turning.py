@@ -128,7 +128,7 @@ def last_turn(times, count, kinds):
 
 def run(times, values, counts, swing, ended, kinds, peaks, distinct, period, turned, earlier):
     """Fill `peaks` and `distinct`, shape (runs, room), `period`, `turned` and `earlier`, shape (runs,); see
-    `friso.hunting.turns.scan`. `kinds`, shape (room,), are for marks in between."""
+    `friso.hunting.turns.scan_turning_points`. `kinds`, shape (room,), are for marks in between."""
     for j in range(counts.size):
         count = counts[j]
         period[j], turned[j] = np.nan, -np.inf

@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 
-from friso.engine.building import entries
+from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, code_digest
 from friso.engine.kinds import ArrayKind
-from friso.engine.machine_code import Loops, load
+from friso.engine.machine_code import Loops, load_object
 from friso.hunting import turning
 
 COMPILED_FROM = 100
@@ -37,7 +37,9 @@ class Turns:
     earlier: np.ndarray
 
 
-def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.ndarray, ended: np.ndarray) -> Turns:
+def scan_turning_points(
+    times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.ndarray, ended: np.ndarray
+) -> Turns:
     """Scan the turning points of runs: `times` [s] and `values` [m] of position minus reference, shape (runs, room),
     valid up to `counts`, shape (runs,).
 
@@ -57,5 +59,7 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
 @cache
 def _compiled() -> Loops:
     version = code_digest("hunting/turning.py", "hunting/build.py")
-    (entry,) = entries([CodeRequest(f"turning points {version}", "loops over turning points", "friso.hunting.build")])
-    return Loops(load(entry.code, ["run"])["run"], KINDS)
+    (entry,) = built_entries(
+        [CodeRequest(f"turning points {version}", "loops over turning points", "friso.hunting.build")]
+    )
+    return Loops(load_object(entry.code, ["run"])["run"], KINDS)

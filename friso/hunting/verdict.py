@@ -19,13 +19,21 @@ from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.attractors.rounds import RESOLVED, loose_from
-from friso.hunting.basin import MOVES, Kick, MoveShare, displacements, ends_in, moves, pushes
+from friso.hunting.basin import (
+    MOVES,
+    Kick,
+    MoveShare,
+    displacements_that_hunt,
+    ends_in,
+    moves_that_hunt,
+    pushes_that_hunt,
+)
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
-from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, Searched, searched
-from friso.hunting.measures import Measures, measure, options
+from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, Searched, search_bandwidths
+from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.outward import AttractionEnd
 from friso.stage import Stage
 
@@ -142,7 +150,7 @@ def judge(
 
 def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: Hunting, work: float) -> Judgement:
     with allowance() as spent:
-        rest = _rest(stage.flat(), motions, 1, options(rtol), possible=attraction.possible)
+        rest = _rest(stage.flat(), motions, 1, measuring_options(rtol), possible=attraction.possible)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
     if attraction.possible and not observed:
@@ -183,7 +191,11 @@ def _with_a_target(
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
     try:
         with allowance(work - spent.used):
-            starts = displacements(stage, target), pushes(stage, target), moves(stage, target)
+            starts = (
+                displacements_that_hunt(stage, target),
+                pushes_that_hunt(stage, target),
+                moves_that_hunt(stage, target),
+            )
     except Exhausted:
         given_up = (*given_up, STARTS)
     if _some_unknown(*starts):
@@ -222,7 +234,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[Searched, tuple[str, ...]]:
     """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
     with allowance(work) as search:
-        sought = searched(stage, attraction.target is not None, attraction.surveyed)
+        sought = search_bandwidths(stage, attraction.target is not None, attraction.surveyed)
     return sought, (BANDWIDTHS,) if search.exhausted else ()
 
 
@@ -249,7 +261,7 @@ def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     fail leave the verdict "failed".
     """
     survey = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
-    return judge_runs(flat, _motions(flat, count, options(rtol)), survey, rtol)
+    return judge_runs(flat, _motions(flat, count, measuring_options(rtol)), survey, rtol)
 
 
 @np.errstate(all="ignore")
@@ -271,7 +283,7 @@ def judge_runs(
         decided &= survey.decided
         attracts = survey.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
-    run_options = options(rtol, threads, cancel)
+    run_options = measuring_options(rtol, threads, cancel)
     attracted = np.flatnonzero(decided & attracts)
     if survey is not None and attracted.size:
         ends, completed, _ = ends_in(
@@ -340,7 +352,7 @@ def _motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Mo
     """The motions of stages of one structure, run and measured."""
     columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
-        part = Motions.of(measure(runs.part(flat), runs))
+        part = Motions.of(measure_runs(runs.part(flat), runs))
         for column, values in zip(columns, (part.completed, part.peaks, part.swing, part.settling), strict=True):
             column[runs.numbers] = values
     return Motions(*columns)

@@ -13,7 +13,7 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.channel import Channel
 from friso.identification.logs.format import FORMATS
 from friso.identification.logs.gaps import GapsError
-from friso.identification.logs.mapping import Mapping, load
+from friso.identification.logs.mapping import Mapping, load_mapping
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
@@ -79,7 +79,7 @@ class LogContent:
     gaps: tuple[LogError, ...] = ()
 
 
-def content_of(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
+def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
     """What a file holds, mapped as the options say or as kept beside it or in `folder`. Raises LogError for what cannot
     be read."""
     name = file_format(path)
@@ -88,7 +88,7 @@ def content_of(path: Path, options: Mapping, folder: Path | None = None) -> LogC
         response = read_frequency_response(path)
         kind = next(kind for kind in KINDS if KINDS[kind].responses)
         return LogContent(path, title, (), response, kind, "the file holds a frequency response", response.read)
-    mapping = options.over(load(path, folder) or Mapping())
+    mapping = options.over(load_mapping(path, folder) or Mapping())
     table = with_user_units(FORMATS[name].read(path), mapping, FORMATS[name].times, str(path))
     reading = Reading(table, mapping, False, not FORMATS[name].units, str(path))
     if not table.channels:

@@ -11,7 +11,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.combine import Correlated, with_interval
 from friso.identification.estimate import Estimate
-from friso.identification.logs.joined import together
+from friso.identification.logs.joined import join_alike
 from friso.identification.logs.log import Log
 from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.readings.course import Course
@@ -148,4 +148,4 @@ class ExperimentKind(Generic[Result]):
             return [*([times] if times else []), *responses]
         partial = [log for log in times if len(times) > 1 and self.partial(log)]
         complete = [log for log in times if log not in partial]
-        return [*((log,) for log in (*complete, *together(partial))), *responses]
+        return [*((log,) for log in (*complete, *join_alike(partial))), *responses]

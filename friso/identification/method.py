@@ -16,7 +16,7 @@ from friso.identification.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, S
 from friso.identification.kinds import KINDS, in_order
 from friso.identification.laws.comparison import LawComparison, compare_laws
 from friso.identification.logs.log import Log
-from friso.identification.stage_file import identified, origins
+from friso.identification.stage_file import identified_stage, origins
 from friso.identification.stage_keys import Fitting, fitting
 from friso.progress import Progress, share_of, silent
 from friso.stage import Stage, plausible
@@ -95,7 +95,7 @@ def identify(
         )
     warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
-    fitted = identified(stage, fits.estimates, [log.name for log, _ in logs])
+    fitted = identified_stage(stage, fits.estimates, [log.name for log, _ in logs])
     doubts += _unusual(fitted, estimates)
     return Identification(
         fitted,
@@ -188,7 +188,7 @@ def _unpredictable(log: Log) -> InputError:
 def _unusual(stage: Stage, estimates: Sequence[Estimate]) -> tuple[str, ...]:
     """A sentence on each identified value that no positioning stage has."""
     keys = [estimate.name for estimate in estimates if estimate.determined]
-    sentences = [sentence for sentence in plausible.doubts(stage) if sentence.partition(" ")[0] in keys]
+    sentences = [sentence for sentence in plausible.implausible_values(stage) if sentence.partition(" ")[0] in keys]
     return tuple(f"{sentence}: a wrong unit or --scale of a channel?" for sentence in sentences)
 
 

@@ -22,12 +22,12 @@ from friso.identification.model_error import (
     with_causes,
     with_halves,
 )
-from friso.identification.output_error.changes import changes_beside, changes_of, inverse_reaching, reaching
+from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
-from friso.identification.output_error.parameters import MASS, is_free, keys_of, parameters_of
-from friso.identification.output_error.problem import Problem, Simulated, closed_loop, tracking
+from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
+from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
 from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated
 from friso.identification.output_error.to_keys import estimates_of
@@ -126,7 +126,7 @@ def _with_changes(
     quality that says so; `velocity` [m/s] is smooth, `unit` that of the force."""
     if quality.failed:
         return fit, inverse, quality
-    changes = changes_beside(inverse) if quality.rejected else changes_of(fit, velocity)
+    changes = changes_beside(inverse) if quality.rejected else drift_of_friction(fit, velocity)
     if changes is None:
         return fit, inverse, quality
     if quality.rejected:
@@ -168,7 +168,7 @@ def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any
     if set_up is not None:
         flat = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
         flat |= {key: value for key, value in set_up.items() if key.startswith(f"{CONTROLLER}.") or key in changed}
-    return closed_loop(flat, log, part, problem.parameters)
+    return loop_problem(flat, log, part, problem.parameters)
 
 
 def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> None:
@@ -189,11 +189,11 @@ def _problems(
     speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
-    every = parameters_of(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
+    every = fit_parameters(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
     parameters = [replace(parameter, unit=unit_of(parameter.unit, log)) for parameter in every]
     full = {**flat, **keys_of(flat, {parameter.name: parameter.start for parameter in parameters})}
     follows = tracking(full, log, part, parameters, inverse.bandwidth)
-    return follows, closed_loop(full, log, part, parameters) if own_loop else None
+    return follows, own_loop(full, log, part, parameters) if own_loop else None
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:

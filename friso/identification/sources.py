@@ -12,7 +12,7 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import Log
-from friso.identification.logs.mapping import SUFFIX, Mapping, load, place_for
+from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, place_for
 from friso.identification.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
@@ -68,7 +68,7 @@ def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogF
             mappings[path] = file.mapping
         except GapsError as error:
             gaps += error.gaps
-            mappings[path] = mapping.over(load(path, folder) or Mapping())
+            mappings[path] = mapping.over(load_mapping(path, folder) or Mapping())
     if gaps:
         raise OpenQuestions(gaps, mappings)
     return files
@@ -103,7 +103,7 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
     if is_frequency_response(path):
         kind = next(name for name in KINDS if KINDS[name].responses)
         return LogFile(path, read_frequency_response(path), kind, "the file holds a frequency response")
-    stored = load(path, folder) or Mapping()
+    stored = load_mapping(path, folder) or Mapping()
     if stored.experiment is not None:
         KINDS.checked(stored.experiment, f"{path}{SUFFIX}: experiment", 'experiment = "{}"')
     mapping = options.over(stored)

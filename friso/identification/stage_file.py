@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.axis import LINEAR
-from friso.equations.controllers.van_dijk import table
+from friso.equations.controllers.van_dijk import controller_table
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import SMOOTH, InverseModel, motion
 from friso.identification.logs.log import Log
@@ -50,7 +50,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} {axis.unit('N*s/m')}",
             "viscous": f"{viscous:.6g} {axis.unit('N*s/m')}",
         },
-        "controller": table("10 Hz"),
+        "controller": controller_table("10 Hz"),
         "motion": {
             "kind": "there_and_back",
             "acceleration": f"{brisk:.4g} {axis.length}/s^2",
@@ -64,7 +64,7 @@ def made_up(log: Log, inverse: InverseModel) -> Stage:
     return Stage(name=log.name, source=OUR_CHOICE, **tables)
 
 
-def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
+def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
     """The stage with the estimates of its keys, as values with 95 % intervals or as ranges.
 
     Their units are those of the stage's kind of axis. A stiffness that follows from a [flexure] stays as it follows.
@@ -75,7 +75,7 @@ def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str])
         if "." not in estimate.name or (stage.flexure and estimate.name == "joint.stiffness"):
             continue
         if np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low:
-            changes[estimate.name] = written(estimate)
+            changes[estimate.name] = estimate_text(estimate)
     source = f"identified by friso from {', '.join(logs)}"
     return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
 
@@ -104,17 +104,17 @@ def with_origins(text: str, origins: Mapping[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def written(estimate: Estimate) -> str:
+def estimate_text(estimate: Estimate) -> str:
     """The text of an estimate in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is not shown."""
     unit = f" {estimate.unit}" if estimate.unit else ""
     if not estimate.determined:
         return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
-    half, digits = rounded(estimate.half_width)
+    half, digits = round_uncertainty(estimate.half_width)
     value = f"{estimate.value:.{digits}f}" if digits > 0 else f"{round(estimate.value, digits):.0f}"
     return f"{value}{unit} +/- {half}{unit}"
 
 
-def rounded(half: float) -> tuple[str, int]:
+def round_uncertainty(half: float) -> tuple[str, int]:
     """An uncertainty rounded up to two digits, as text, and the decimal places of its value."""
     digits = DIGITS - 1 - math.floor(math.log10(half))
     up = math.ceil(round(half * 10**digits, 6)) / 10**digits

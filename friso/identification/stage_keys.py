@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.parameters import HIGHEST_RATIO
-from friso.identification.stage_file import identified, written
+from friso.identification.stage_file import estimate_text, identified_stage
 from friso.intervals import uncertain_value
 from friso.quantities import Number, Quantity
 from friso.stage import Stage
@@ -103,9 +103,9 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
         return estimate, ""
     low = LEAST * estimate.high
     cut = replace(estimate, value=np.nan, low=low, reason=estimate.reason or f"it has to be {field.bound.text}")
-    limits = f"{written(estimate)} was found, but it has to be {field.bound.text}"
+    limits = f"{estimate_text(estimate)} was found, but it has to be {field.bound.text}"
     if estimate.low < low and _allowed(cut, field):
-        return cut, f"{limits}: the stage file has {written(cut)}, from a thousandth of the upper end on"
+        return cut, f"{limits}: the stage file has {estimate_text(cut)}, from a thousandth of the upper end on"
     return None, f"{limits}: the stage file keeps what it had"
 
 
@@ -117,7 +117,7 @@ def _ends(estimate: Estimate) -> list[tuple[str, float]]:
 def _allowed(estimate: Estimate, field: Quantity | Number) -> bool:
     """Whether the key takes the text of the estimate."""
     try:
-        uncertain_value(written(estimate), field)
+        uncertain_value(estimate_text(estimate), field)
     except InputError:
         return False
     return True
@@ -132,7 +132,7 @@ def _static_above(
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
         return {}
     centre = {
-        key: float(uncertain_value(written(estimates[key]), fields[key]) if key in estimates else flat[key])
+        key: float(uncertain_value(estimate_text(estimates[key]), fields[key]) if key in estimates else flat[key])
         for key in (STATIC, COULOMB)
     }
     if centre[STATIC] >= centre[COULOMB]:
@@ -140,16 +140,18 @@ def _static_above(
     static = estimates.get(STATIC)
     if static is not None and not static.determined and centre[COULOMB] < static.high:
         estimates[STATIC] = replace(static, low=centre[COULOMB])
-        notes.append(f"{STATIC}: no smaller than Coulomb friction, the stage file has {written(estimates[STATIC])}")
+        notes.append(
+            f"{STATIC}: no smaller than Coulomb friction, the stage file has {estimate_text(estimates[STATIC])}"
+        )
         return {}
     leads, follows = (COULOMB, STATIC) if COULOMB in estimates else (STATIC, COULOMB)
     ratio, lead = flat[follows] / flat[leads], estimates[leads]
-    remark = f" ({written(estimates[follows])} was found)" if follows in estimates else ""
+    remark = f" ({estimate_text(estimates[follows])} was found)" if follows in estimates else ""
     estimates[follows] = replace(
         lead, name=follows, value=lead.value * ratio, low=lead.low * ratio, high=lead.high * ratio
     )
     why = f"Coulomb friction would be above static friction otherwise{remark}"
-    notes.append(f"{follows}: moved along with {leads} to {written(estimates[follows])}, since {why}")
+    notes.append(f"{follows}: moved along with {leads} to {estimate_text(estimates[follows])}, since {why}")
     return {follows: leads}
 
 
@@ -160,7 +162,7 @@ def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) ->
     fine: list[Estimate] = []
     for unit in units:
         try:
-            identified(stage, [*fine, *(estimates[key] for key in unit)], ())
+            identified_stage(stage, [*fine, *(estimates[key] for key in unit)], ())
         except InputError as error:
             for key in unit:
                 del estimates[key]

@@ -72,7 +72,7 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluat
     rest = Configuration.rest(leaves)
     straight = np.repeat(leaves.stiffness(rest.state(mechanism.offsets)[:1]), leaves.count, axis=0)
     unloaded = np.zeros((leaves.count, leaves.nodes, 6))
-    held = [_held(mechanism, rest, _solved(mechanism, rest, straight, unloaded), straight, unloaded)]
+    held = [_held(mechanism, rest, _condensed(mechanism, rest, straight, unloaded), straight, unloaded)]
     for z in deflections[1:]:
         held.append(_pushed(mechanism, leaves, held, z))
     stiffness = np.array([state.stiffness for state in held])
@@ -136,7 +136,7 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
             break
         state = place.state(mechanism.offsets)
         forces, stiffness = leaves.forces(state), leaves.stiffness(state)
-        solved = _solved(mechanism, place, stiffness, forces)
+        solved = _condensed(mechanism, place, stiffness, forces)
         if solved.energy < close:
             return _held(mechanism, place, solved, stiffness, forces)
         place = place.plus(solved.change)
@@ -153,7 +153,7 @@ class Solved:
     energy: float
 
 
-def _solved(mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
+def _condensed(mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
     """The stiffness of the leaves and the forces on their nodes, condensed onto the stage."""
     offsets, turn = mechanism.offsets, place.stage[2]
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from friso.leaf_springs.beams import BeamFailure, beams
-from friso.leaf_springs.closed_model import closed
+from friso.leaf_springs.closed_model import closed_form_model
 from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism
 from friso.stage import Stage
@@ -42,7 +42,7 @@ class BothModels:
 
 def both_models(stage: Stage, mechanism: Mechanism, stroke: float) -> BothModels:
     """The leaf springs of a stage at a stroke [m]; a failure of the beams is kept as such."""
-    simple = closed(mechanism, stroke)
+    simple = closed_form_model(mechanism, stroke)
     try:
         return BothModels(stage, simple, beams(mechanism, stroke))
     except BeamFailure as failure:

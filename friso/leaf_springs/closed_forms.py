@@ -51,7 +51,7 @@ def edgewise_shear(mechanism: Mechanism) -> Any:
         SHEAR
         * mechanism.shear
         * mechanism.area
-        * plate.edgewise_shear(mechanism.length, mechanism.width, mechanism.poisson)
+        * plate.edgewise_shear_factor(mechanism.length, mechanism.width, mechanism.poisson)
     )
 
 

@@ -20,7 +20,7 @@ STEPS = 5
 """Deflections from 0 to the stroke."""
 
 
-def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
+def closed_form_model(mechanism: Mechanism, stroke: float) -> Evaluation:
     """The mechanism by closed forms over its stroke [m]: its drive stiffness is the same at any deflection."""
     deflections = np.linspace(0.0, stroke, STEPS)
     drive = closed_forms.drive_stiffness(mechanism) * np.ones(STEPS)

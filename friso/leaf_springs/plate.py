@@ -171,7 +171,7 @@ def stretching(length: Any, width: Any, poisson: Any) -> Any:
     return 1 / (1 - 0.28 * poisson**2 * width / length)
 
 
-def edgewise_shear(length: Any, width: Any, poisson: Any) -> Any:
+def edgewise_shear_factor(length: Any, width: Any, poisson: Any) -> Any:
     """By what factor a leaf is stiffer against shear in its plane than a beam, its bending there being that of a beam
     (fitted to the same shells)."""
     ratio = length / width

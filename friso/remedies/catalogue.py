@@ -111,7 +111,7 @@ def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Remedy]:
     if free.flexure:
         kept = {key: flat[key] for key in flat if key.startswith(("joint.stiffness", "parasitic."))}
         free = free.with_numbers(kept, without=("flexure",))
-    joint = variables.joint(float(least_breakaway(flat)))
+    joint = variables.joint_variables(float(least_breakaway(flat)))
     yield Remedy("isolator", free, joint, True)
     if goal.controller:
         yield from _gains("isolator and gains", free, speed, joint, True)

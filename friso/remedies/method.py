@@ -20,7 +20,7 @@ from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
-from friso.remedies.verified import Performance, RemedyOutcome, doubts, measure, verified
+from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals, verified
 from friso.remedies.window import windows
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
@@ -55,7 +55,7 @@ class Advice:
     @property
     def needed(self) -> bool:
         """Whether the stage as it is does not meet the goal."""
-        return bool(doubts(self.case, self.present, self.goal))
+        return bool(unmet_goals(self.case, self.present, self.goal))
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
@@ -93,7 +93,7 @@ def tune(
     fresh = draw_fleet(ideal, correlations, budget.fresh, seed + FRESH)
     machines = draw_fleet(ideal, correlations, budget.machines, seed)
     report("the stage as it is")
-    case, present = verified(ideal), measure(ideal, fresh, goal, stage)
+    case, present = verified(ideal), performance_of(ideal, fresh, goal, stage)
     outcomes: list[RemedyOutcome] = []
     relaxed: tuple[RelaxedGoal, ...] = ()
     interrupted, searches = False, list[Search]()
@@ -134,7 +134,7 @@ def _outcome_of(search: Search, fresh: Fleet, drive: Stage, outcomes: list[Remed
     for number, shares in enumerate(search.surveyed()):
         tuned = remedy.tuned(shares)
         search.report(f"{remedy.name}: cycles")
-        measured = measure(tuned, fresh, goal, drive)
+        measured = performance_of(tuned, fresh, goal, drive)
         case = verified(tuned)
         around = windows(search, shares)
         outcome = RemedyOutcome(
@@ -142,7 +142,7 @@ def _outcome_of(search: Search, fresh: Fleet, drive: Stage, outcomes: list[Remed
             tuned,
             measured,
             case,
-            doubts(case, measured, goal),
+            unmet_goals(case, measured, goal),
             around,
             search.points,
             search.attracted,

@@ -12,7 +12,7 @@ from scipy.optimize import differential_evolution
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
-from friso.remedies.trials import Moves, attraction, margins, moved, quantile
+from friso.remedies.trials import Moves, attraction, modulus_margins, moved, quantile
 from friso.stage import Stage
 
 SEED = 27
@@ -134,7 +134,7 @@ class Search:
         """Points on the machines: the moves are run only where the loop is stable and has half of the margin."""
         goal, count = self.goal, len(shares)
         few = self.machines.take(np.arange(min(6, self.machines.count)))
-        margin = quantile(-margins(self.remedy, shares, few, self.drive), goal.share) * -1
+        margin = quantile(-modulus_margins(self.remedy, shares, few, self.drive), goal.share) * -1
         stable = np.flatnonzero(margin > goal.margin / 2)
         columns = [np.full(count, np.inf) for _ in range(4)]
         if stable.size:

@@ -14,7 +14,7 @@ from friso.equations.variational import along
 from friso.errors import InputError
 from friso.frequency.crossover import settled_members
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import scan
+from friso.frequency.family import scan_stability
 from friso.frequency.loops import response
 from friso.frequency.margins import margins
 from friso.frequency.members import Members
@@ -25,7 +25,7 @@ from friso.hunting.cycle.shooting import Orbits, close
 from friso.hunting.margin import Margin
 from friso.hunting.verdict import can_hunt
 from friso.stage import Stage, numeric_keys
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 from friso.stage.controllers import as_tuned, controller_of
 
 RTOL = 1e-11
@@ -97,7 +97,7 @@ class Sensitivities:
         return [(self.keys[k], float(moves[k])) for k in np.argsort(-np.abs(moves), kind="stable")]
 
 
-@checked
+@check_arguments
 def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None) -> Sensitivities:
     """Derivatives of cycle, edge of hunting and modulus margin to keys; all that the equations contain if none are
     named. The `edge` is located unless it is given (that of a check).
@@ -271,7 +271,7 @@ def _multipliers(inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]]
 
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:
     members = settled_members(flat)
-    loops = scan(flat, members)
+    loops = scan_stability(flat, members)
     if not loops.stable.all():
         return None
     worst: Members = members[loops.worst()]

@@ -16,7 +16,7 @@ from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
-from friso.remedies.variables import DAMPING_RATIOS, joint
+from friso.remedies.variables import DAMPING_RATIOS, joint_variables
 from friso.stage import Stage
 
 STROKES = (1e-4, 3e-4, 1e-3, 3e-3)
@@ -50,7 +50,10 @@ def suggestion(stage: Stage) -> Suggestion | None:
         free = isolated(stage)
     except InputError:
         return None
-    remedy, tried = Remedy("", free, joint(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
+    remedy, tried = (
+        Remedy("", free, joint_variables(friction), True),
+        [(stroke, d) for stroke in STROKES for d in DAMPING],
+    )
     shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
     numbers = remedy.changes(shares)
     flat = {**free.flat(), **numbers}

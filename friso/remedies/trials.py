@@ -77,7 +77,7 @@ def timing(drive: Stage) -> dict[str, float]:
 
 
 @np.errstate(all="ignore")
-def margins(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
+def modulus_margins(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
     """The least modulus margin of the limit cases (0: not stable), shape (points, machines), with the sampling and
     delay of the stage `drive`."""
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}

@@ -58,12 +58,12 @@ def of_key(key: str, low: float, high: float) -> Variable:
 
 def bandwidth_factor(stage: Stage, limit: float | None) -> Variable:
     """How fast the controller is as a whole, as a factor of what it is, up to a limit of the bandwidth [Hz]."""
-    present = crossover(stage)
+    present = loop_bandwidth(stage)
     high = FASTEST if limit is None or not present > 0 else min(FASTEST, limit / present)
     return Variable(BANDWIDTH, min(SLOWEST, high / 2), high, sped_up)
 
 
-def crossover(stage: Stage) -> float:
+def loop_bandwidth(stage: Stage) -> float:
     """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1 while the
     stage slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it."""
     flat = stage.flat()
@@ -84,7 +84,7 @@ def gains(stage: Stage, bandwidth: Variable) -> tuple[Variable, ...]:
     return (*shape, *against, bandwidth)
 
 
-def joint(friction: float) -> tuple[Variable, ...]:
+def joint_variables(friction: float) -> tuple[Variable, ...]:
     """Stroke, stiffness and damping of an isolator for the least static friction [N]."""
 
     def stiffness(flat: Mapping[str, Any], share: np.ndarray) -> dict[str, Any]:

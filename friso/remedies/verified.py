@@ -17,8 +17,8 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import Attraction, Moves, attraction, margins, moved, quantile, timing
-from friso.remedies.variables import crossover
+from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moved, quantile, timing
+from friso.remedies.variables import loop_bandwidth
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -107,7 +107,7 @@ class RemedyOutcome:
 
 
 @np.errstate(all="ignore")
-def measure(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
+def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
     """A stage on machines, with the sampling and delay of the stage `drive` for its margins."""
     remedy = Remedy.settled_on("", stage)
     flat = stage.flat()
@@ -116,7 +116,7 @@ def measure(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performa
         stiffness = in_series(stiffness, flat["joint.stiffness"])
     return Performance(
         moved(remedy, ONE, machines, goal),
-        margins(remedy, ONE, machines, drive),
+        modulus_margins(remedy, ONE, machines, drive),
         attraction(remedy, ONE, machines, goal),
         settled_margin({**flat, **timing(drive)}),
         float(stiffness),
@@ -128,7 +128,7 @@ def verified(stage: Stage) -> Case:
     return check_given(stage)
 
 
-def doubts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
+def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """What of the goal a stage does not meet, or not surely: names of `friso.views.tune.words.DOUBTS`."""
     judgement, edge = case.judgement, case.judgement.margin
     listed: list[str] = []
@@ -140,7 +140,7 @@ def doubts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
         listed.append("given up")
     if edge is not None and edge.quiet * goal.distance > 1 and edge.factor < 1:
         listed.append("distance")
-    if goal.bandwidth_limit is not None and not crossover(case.stage) <= goal.bandwidth_limit * (1 + ROUNDED):
+    if goal.bandwidth_limit is not None and not loop_bandwidth(case.stage) <= goal.bandwidth_limit * (1 + ROUNDED):
         listed.append("bandwidth")
     if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
         listed.append("window")

@@ -103,7 +103,7 @@ _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
 used."""
 
 
-def checked(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
+def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
     """A function that raises InputError for an argument of another type than is annotated."""
     parameters = signature(function)
     annotated = {

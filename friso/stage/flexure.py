@@ -11,7 +11,7 @@ from friso.errors import StageError
 from friso.materials import DENSITY, STRENGTH, YOUNG, materials
 from friso.quantities import Bound, Number, Quantity, Value, any_sign, at_least_1, positive, quoted
 from friso.stage.plug_ins import load_own
-from friso.stage.section import Rule, UncertainSection, nearest
+from friso.stage.section import Rule, UncertainSection, nearest_name
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
 """Flat keys that follow from others, from the flat SI mapping; arrays allowed."""
@@ -146,7 +146,9 @@ Flexure = create_model(
 
 def unknown_material(name: str) -> StageError:
     """The error for a material that is not known, naming the nearest that is."""
-    near = nearest(name, materials()) or next((material for material in materials() if name.lower() in material), None)
+    near = nearest_name(name, materials()) or next(
+        (material for material in materials() if name.lower() in material), None
+    )
     hint = f"unknown; did you mean {near}?" if near else "unknown"
     names = ", ".join(materials())
     return StageError("", quoted(name, hint), f"one of {names}", f'material = "{near or "stainless 1.4310"}"')

@@ -59,7 +59,7 @@ _ROTARY: Mapping[str, _Usual] = {
 """What rotary axes have, from a mirror to a telescope."""
 
 
-def doubts(stage: Stage) -> Iterator[str]:
+def implausible_values(stage: Stage) -> Iterator[str]:
     """A sentence on each implausible value: key, value, and the unit that probably was."""
     flat = stage.flat()
     usual_values = dict(_ROTARY) if stage.axis_kind == ROTARY else _usual(flat)

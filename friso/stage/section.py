@@ -198,7 +198,7 @@ class Variants:
         name = table.get(self.tag)
         if isinstance(name, str) and (cls := self.named(name)):
             return cls
-        example = nearest(name, self.classes) or next(iter(self.classes))
+        example = nearest_name(name, self.classes) or next(iter(self.classes))
         expected = f"one of {', '.join(map(as_toml, self.classes))}"
         raise InputError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
 
@@ -254,14 +254,14 @@ def list_fields(cls: type[Section]) -> Mapping[str, Several]:
     return {key: item for key, item in items if isinstance(item, Several)}
 
 
-def nearest(name: Any, names: Iterable[str]) -> str | None:
+def nearest_name(name: Any, names: Iterable[str]) -> str | None:
     """The known name most like `name`, if one is like it."""
     return next(iter(difflib.get_close_matches(str(name).lower(), [*names], n=1, cutoff=0.7)), None)
 
 
 def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError:
     """The error for a key that does not exist, naming the nearest that does."""
-    near = nearest(key, names)
+    near = nearest_name(key, names)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
     return InputError(key, hint, f"one of {', '.join(names)}", example)
 
@@ -271,7 +271,7 @@ def _problems(cls: type[Section], error: ValidationError, kind: AxisKind) -> Inp
     is wrong below it."""
     order = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     nearest_keys = {
-        nearest(problem["loc"][-1], cls.model_fields) for problem in order if problem["type"] == "extra_forbidden"
+        nearest_name(problem["loc"][-1], cls.model_fields) for problem in order if problem["type"] == "extra_forbidden"
     }
     missing = [problem for problem in order if problem["type"] == "missing" and problem["loc"][0] not in nearest_keys]
     others = [problem for problem in order if problem["type"] != "missing"]
@@ -290,7 +290,7 @@ def _problem(cls: type[Section], problem: Any, kind: AxisKind) -> InputError:
     if isinstance(cause, InputError):
         return _complete(cause, key)
     if problem["type"] == "extra_forbidden":
-        near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
+        near = nearest_name(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, _own_first(cls), _described(cls, near, kind)[1])
     return InputError(key, quoted(problem["input"]), *_described(cls, key, kind))
 

@@ -140,12 +140,12 @@ class Change(NamedTuple):
     high: float
 
 
-def changes_of(result: Diagram) -> list[Change]:
+def stability_changes(result: Diagram) -> list[Change]:
     """Where hunting begins and ends over the range, in order."""
     values = _values(result.space, result.places[:, None])[:, 0]
     decided = [(value, word) for value, word in zip(values.tolist(), place_verdicts(result), strict=True)]
     decided = [(value, word == ATTRACTS) for value, word in decided if word in (ATTRACTS, REPELS)]
-    turns = turns_of(result)
+    turns = followed_changes(result)
     changes = []
     for (low, before), (high, after) in pairwise(decided):
         if before != after:
@@ -155,7 +155,7 @@ def changes_of(result: Diagram) -> list[Change]:
     return changes
 
 
-def turns_of(result: Diagram) -> list[tuple[float, bool]]:
+def followed_changes(result: Diagram) -> list[tuple[float, bool]]:
     """The values [SI] at which a cycle that was followed begins to attract (true), or ceases to, as the key rises."""
     return sorted(
         (float(line.at[k, 0]), begins)

@@ -15,7 +15,7 @@ from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.measures import BANDS, Measures, measure, options
+from friso.hunting.measures import BANDS, Measures, measure_runs, measuring_options
 from friso.hunting.verdict import Motions, can_hunt, judge_runs
 from friso.stage import Stage, violations
 from friso.studies.links import linked
@@ -109,8 +109,8 @@ def run_cells(
     for flat, cells in parts:
         table.invalidate(cells, flat)
     for flat, cells, shape in _groups(parts, table.valid):
-        for runs in run_chunks(kernel(shape), flat, len(cells), options(rtol, threads, cancel)):
-            table.write(cells[runs.numbers], measure(runs.part(flat), runs), runs)
+        for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
+            table.write(cells[runs.numbers], measure_runs(runs.part(flat), runs), runs)
     if any(name in metrics for name in BY_ATTRACTORS):
         for flat, cells, survey in cell_attractors(parts, table.ran, threads, cancel):
             table.write_attractors(cells, survey)
@@ -148,7 +148,7 @@ def _once(
     return attractors(stages).take(again.ravel())
 
 
-def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
+def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which cells a stage may have, shape (cells,)."""
     table = _Table(len(next(iter(columns.values()))), ALWAYS)
     for flat, cells in by_words(stage, links, columns):

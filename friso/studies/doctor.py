@@ -132,15 +132,15 @@ def _running() -> str:
     from friso.engine.batch import run_chunks
     from friso.engine.kernel import kernel
     from friso.equations.structure import structure
-    from friso.hunting.measures import measure, options
+    from friso.hunting.measures import measure_runs, measuring_options
 
     flat = _stage().flat()
-    settings = options(1e-6, threads=1)
+    settings = measuring_options(1e-6, threads=1)
     shape = kernel(structure(flat))
     begin = time.perf_counter()
     (runs,) = run_chunks(shape, flat, RUNS, settings)
     seconds, steps = time.perf_counter() - begin, runs.statistic("attempted").sum()
-    swings = measure(flat, runs).peak_to_peak
+    swings = measure_runs(flat, runs).peak_to_peak
     if not abs(swings / SWING - 1).max() < WITHIN:
         raise RuntimeError(f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not by {SWING:g} m")
     return f"{steps / seconds / 1e6:.2g} million steps of the solver per second on one core; the result is right"

@@ -15,7 +15,7 @@ from friso.frequency.describing.multi import DONE, balanced
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
 from friso.stage import Stage
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,7 +32,7 @@ HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
 """Default orders of the highest harmonic."""
 
 
-@checked
+@check_arguments
 def harmonic_balance(
     stage: Stage,
     crossovers: Sequence[float] | np.ndarray,

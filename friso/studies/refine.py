@@ -67,7 +67,7 @@ def _finer(axis: SweptAxis) -> SweptAxis:
     return replace(axis, values=between)
 
 
-def refine(study: Study, ask: Ask) -> Columns:
+def refine_cells(study: Study, ask: Ask) -> Columns:
     """The measures of a fine study, each of shape (cells,), from the cells computed.
 
     A cell that was not computed has the outcome (and the verdict) of the nearest one that was, a status that says so,

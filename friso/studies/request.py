@@ -14,7 +14,7 @@ from friso.stage import Stage
 from friso.studies import links as linking
 from friso.studies.axes import SweptAxis, SweptRange, Values, read_axes
 from friso.studies.cells import ALWAYS, CYCLE_UNITS, METRICS, USUAL
-from friso.studies.samples import SAMPLE, Samples, sampled
+from friso.studies.samples import SAMPLE, Samples, sample_axes
 from friso.studies.study import Dimension, Study
 
 TRIED = 512
@@ -61,7 +61,7 @@ class Request:
         dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
         if self.samples is not None:
             free = linking.names(self.links)
-            dimensions.append(Dimension(SAMPLE, sampled(self.stage, self.samples, free, self.log)))
+            dimensions.append(Dimension(SAMPLE, sample_axes(self.stage, self.samples, free, self.log)))
         names = [axis.name for dimension in dimensions for axis in dimension.axes]
         for name in names:
             if names.count(name) > 1 or name in (*METRICS, SAMPLE):

@@ -29,7 +29,7 @@ class Samples:
     seed: int = field(default=0)
 
 
-def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
+def sample_axes(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
     """The sampled axes, all of one length. Raises InputError."""
     read = read_axes(stage, samples.ranges, free, log)
     ranges = [axis for axis in read if isinstance(axis, SweptRange)]

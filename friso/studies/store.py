@@ -25,7 +25,7 @@ from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.store_files import refuse_foreign
-from friso.studies.store_folder import exchange, locked, make, remove_leftovers, remove_partial_files
+from friso.studies.store_folder import exchange, lock_store, make, remove_leftovers, remove_partial_files
 from friso.studies.study import Block, Study, study_of
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ class Store:
             elif overwrite and path.is_dir() and is_store(path):
                 store._replace()
         metadata = checked_metadata(path)
-        with locked(path):
+        with lock_store(path):
             _refuse_other(path, study)
             _warn_of_another_machine(path)
             remove_partial_files(path)
@@ -79,7 +79,7 @@ class Store:
 
     def _replace(self) -> None:
         """Put this study in place of the store that is there, unless it is that of this study already."""
-        with locked(self.path) as lock:
+        with lock_store(self.path) as lock:
             try:
                 _refuse_other(self.path, self.study)
             except StoreError:

@@ -17,7 +17,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.errors import StoreError
-from friso.interrupts import held
+from friso.interrupts import hold_interrupts
 from friso.leftovers import is_leftover, remove_leftover
 from friso.system import MOVES_OPEN_FOLDERS, rename_folder
 from friso.whole_file import PARTIAL, is_partial
@@ -80,7 +80,7 @@ def remove_partial_files(path: Path) -> None:
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[FileLock]:
+def lock_store(path: Path) -> Iterator[FileLock]:
     """Keep other processes out of a store; the lock. Raises StoreError if one is in."""
     lock = FileLock(path / LOCK)
     try:
@@ -106,7 +106,7 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
         draft.mkdir(parents=True)
         with FileLock(draft / LOCK):  # locked, it is no leftover
             new = draft / "store"
-            with held():
+            with hold_interrupts():
                 fill(new)
             yield new
     finally:

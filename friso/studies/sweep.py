@@ -15,13 +15,12 @@ from friso.stage import Stage
 from friso.studies.axes import Values
 from friso.studies.cells import METRICS, USUAL, WORDS, Columns, attributes_of
 from friso.studies.execute import Crew, local_crew, run_scattered
-from friso.studies.refine import Ask, finer
-from friso.studies.refine import refine as refine_study
+from friso.studies.refine import Ask, finer, refine_cells
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store
 from friso.studies.study import Study, cells_of
-from friso.studies.verify import checked_share, verified
+from friso.studies.verify import checked_share, verify_cells
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,7 +90,7 @@ def run_in_memory(
         tally.add(len(columns_of_block["outcome"]), CELLS)
     results = [dataset(study, columns_of_study) for study, columns_of_study in zip(studies, columns, strict=True)]
     for study, runs in zip(studies, results, strict=True):
-        runs.attrs |= verified(study, runs, crew, verify)
+        runs.attrs |= verify_cells(study, runs, crew, verify)
     return results
 
 
@@ -125,7 +124,7 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
         tally.add(len(measures["outcome"]), CELLS)
     runs = store.read()
     if verify and runs.attrs.get("verified_share") != verify:
-        store.annotate(verified(study, runs, crew, verify))
+        store.annotate(verify_cells(study, runs, crew, verify))
     return store.read()
 
 
@@ -138,7 +137,7 @@ def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], As
         tally.add(len(cells), CELLS)
         return columns
 
-    columns = refine_study(study, keeping(ask))
+    columns = refine_cells(study, keeping(ask))
     return {name: columns[name].reshape(study.shape) for name in study.metrics}
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.tolerance import TIGHTEST
 from friso.errors import InputError
-from friso.studies.cells import ALWAYS, INFERRED, allowed
+from friso.studies.cells import ALWAYS, INFERRED, allowed_cells
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.study import Study
 
@@ -40,7 +40,7 @@ def checked_share(share: float) -> float:
     return share
 
 
-def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
+def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
     """Run a share of the cells again at rtol/100; attributes with the share of outcomes that survived.
 
     The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
@@ -53,7 +53,7 @@ def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[s
     tighter = replace(study, rtol=rtol, metrics=ALWAYS)
 
     def same(kind: str) -> tuple[int, int]:
-        picked = sampled(study, count, lambda cells: _kinds(runs, study, cells) == kind)
+        picked = random_cells(study, count, lambda cells: _kinds(runs, study, cells) == kind)
         again = run_scattered(tighter, picked, crew)["outcome"] if picked.size else np.empty(0)
         return len(picked), int(np.sum(_at(runs["outcome"], study, picked) == again))
 
@@ -73,7 +73,7 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
 
     If no tolerance is good enough it is the one at which most survive.
     """
-    picked = sampled(study, TRIED, lambda cells: allowed(study.stage, study.links, study.columns(cells)))
+    picked = random_cells(study, TRIED, lambda cells: allowed_cells(study.stage, study.links, study.columns(cells)))
     if not picked.size:
         return CANDIDATES[-1], {}, 0
     outcomes: dict[float, np.ndarray] = {}
@@ -92,7 +92,7 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     return max(shares, key=lambda rtol: shares[rtol]), shares, len(picked)
 
 
-def sampled(study: Study, count: int, condition: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+def random_cells(study: Study, count: int, condition: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Up to `count` numbers of different cells for which `condition` holds, drawn evenly, rising; always the same."""
     rng = np.random.default_rng(0)
     if study.cells <= 8 * count:

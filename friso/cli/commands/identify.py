@@ -101,11 +101,11 @@ def identify(
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
     """Keep what was said of logs, by file, for the next time, where it is not kept so already."""
     from friso.answers.output_folder import write
-    from friso.identification.logs.mapping import load, mapping_text
+    from friso.identification.logs.mapping import load_mapping, mapping_text
     from friso.identification.sources import kept_at
 
     folder = target.folder
-    new = {path: mapping for path, mapping in mappings.items() if mapping != load(path, folder)}
+    new = {path: mapping for path, mapping in mappings.items() if mapping != load_mapping(path, folder)}
     texts: dict[Path, Content] = {
         place: mapping_text(mapping)
         for path, mapping in new.items()

@@ -98,7 +98,7 @@ class VanDijk(Pid):
         }
 
 
-def table(crossover: str) -> dict[str, Any]:
+def controller_table(crossover: str) -> dict[str, Any]:
     """The table [controller] of a stage file for a crossover such as "8 Hz"; alpha and beta as in the examples."""
     return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
 

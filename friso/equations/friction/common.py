@@ -73,7 +73,7 @@ class Friction:
         if self.sliding is not None:
             slid = {x: sp.sympify(self.sliding.get(x, 0)) for x in states}
         else:
-            unchanged = solved([state.derivative for state in self.component.states], states) if states else []
+            unchanged = solve_linear([state.derivative for state in self.component.states], states) if states else []
             slid = dict(zip(states, unchanged, strict=True))
         sides = self.sides(slid)
         modes = {kink.beyond: sp.S.Zero for kink in self.component.kinks if isinstance(kink, Switch)}
@@ -102,7 +102,7 @@ class Friction:
         return {kink.beyond: Piecewise((1, kink.surface.subs({**states}) >= 0), (0, True)) for kink in kinks}
 
 
-def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
+def solve_linear(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
     """What the unknowns are where all equations, which are linear in them, are zero. Raises ValueError if they are not
     linear."""
     import sympy as sp

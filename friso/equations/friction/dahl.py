@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.equations.conditions import friction_level, has_conditions
 from friso.equations.friction.common import LEVEL_WORDS, Friction, direction
-from friso.equations.friction.measured import Levels, MeasuredFriction, displacements
+from friso.equations.friction.measured import Levels, MeasuredFriction, virgin_displacements
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import FrictionSection, register_friction
 
@@ -55,7 +55,7 @@ class Dahl(FrictionSection):
         viscous."""
         coulomb, stiffness = flat["friction.coulomb"], flat["friction.bristle_stiffness"]
         levels = Levels(coulomb, coulomb, NO_SPEED, 2.0, flat["friction.viscous"])
-        displacement = displacements(coulomb, stiffness)
+        displacement = virgin_displacements(coulomb, stiffness)
         return MeasuredFriction(
             levels, stiffness, 0.0, displacement, -coulomb * np.expm1(-displacement * stiffness / coulomb)
         )

@@ -19,7 +19,7 @@ from friso.equations.friction.common import (
     stribeck_level,
     stribeck_level_from_speed,
 )
-from friso.equations.friction.measured import MeasuredFriction, as_good, best, displacements, on_bristles
+from friso.equations.friction.measured import MeasuredFriction, as_good, best, on_bristles, virgin_displacements
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import Rule, register_friction
 
@@ -87,13 +87,13 @@ class ElastoPlastic(StribeckSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """Purely elastic up to the break-away deflection."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        displacement = displacements(static, stiffness)
-        return on_bristles(flat, virgin(static, stiffness, flat["friction.breakaway_deflection"], displacement))
+        displacement = virgin_displacements(static, stiffness)
+        return on_bristles(flat, virgin_force(static, stiffness, flat["friction.breakaway_deflection"], displacement))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """Bristles as stiff and damped as measured; the break-away deflection fits the virgin curve best."""
-        return keeping_bristle(measured, breakaway_deflection=best(*_tried(measured)))
+        return keeping_bristle(measured, breakaway_deflection=best(*_break_away_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"elastic_share": (0.02, 0.5, 0.98)}
 
@@ -106,7 +106,7 @@ class ElastoPlastic(StribeckSection):
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Break-away deflections with which the virgin curve is hardly another."""
-        return {"friction.breakaway_deflection": as_good(*_tried(measured))}
+        return {"friction.breakaway_deflection": as_good(*_break_away_candidates(measured))}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
@@ -120,15 +120,15 @@ def _most(measured: MeasuredFriction) -> float:
     return levels.coulomb * (1 - abs(levels.asymmetry)) / measured.stiffness
 
 
-def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
+def _break_away_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
     """Break-away deflections [m], and how far the virgin curve is off with each."""
     levels, stiffness = measured.levels, measured.stiffness
     tried = np.linspace(0.02, 0.98, 49) * _most(measured)
-    curves = (virgin(levels.static, stiffness, begins, measured.displacement) for begins in tried)
+    curves = (virgin_force(levels.static, stiffness, begins, measured.displacement) for begins in tried)
     return tried, np.array([measured.misfit(curve) for curve in curves])
 
 
-def virgin(static: float, stiffness: float, begins: float, displacement: np.ndarray) -> np.ndarray:
+def virgin_force(static: float, stiffness: float, begins: float, displacement: np.ndarray) -> np.ndarray:
     """Force [N] over displacement [m] from rest, both of shape (n,): dz/dx = 1 - alpha(z) z/z_max, z_max being
     F_s/sigma_0, by quadrature of dx/dz."""
     from scipy.integrate import cumulative_simpson

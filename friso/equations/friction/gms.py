@@ -28,10 +28,10 @@ from friso.equations.friction.common import (
 )
 from friso.equations.friction.measured import (
     MeasuredFriction,
-    displacements,
     levels_of,
     levels_under_conditions,
     power_law,
+    virgin_displacements,
 )
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage import Rule, Several, Values, element_keys, register_friction
@@ -151,7 +151,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         """From rest each element is drawn along until it bears its share of static friction."""
         levels, stiffness, strength = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         strength = strength * levels.static
-        displacement = displacements(levels.static, float(stiffness.sum()))
+        displacement = virgin_displacements(levels.static, float(stiffness.sum()))
         force = np.minimum(stiffness * displacement[:, None], strength).sum(axis=1)
         damping = sum(flat[name] for name in element_keys(flat, DAMPING))
         return MeasuredFriction(levels, float(stiffness.sum()), float(damping), displacement, force)
@@ -174,7 +174,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         """`FITTED` elements on the virgin curve of rolling friction, at even slopes; friction that lags so many times
         as long as LuGre's does at the Stribeck velocity."""
         levels, stiffness = measured.levels, measured.stiffness
-        way = displacements(levels.static, stiffness)
+        way = virgin_displacements(levels.static, stiffness)
         curve = power_law(levels.static, stiffness, shape["rolling_exponent"], way)
         whole = MeasuredFriction(levels, stiffness, measured.damping, way, curve)
         parts = _tangents(whole, (1 - np.arange(FITTED + 1) / FITTED) ** EVEN)

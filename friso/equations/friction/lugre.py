@@ -15,7 +15,7 @@ from friso.equations.friction.common import (
     direction,
     stribeck_level,
 )
-from friso.equations.friction.measured import MeasuredFriction, displacements, on_bristles
+from friso.equations.friction.measured import MeasuredFriction, on_bristles, virgin_displacements
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
@@ -48,7 +48,7 @@ class LuGre(StribeckSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """From rest F = F_s (1 - exp(-sigma_0 x/F_s))."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        deflection = displacements(static, stiffness) * stiffness / static
+        deflection = virgin_displacements(static, stiffness) * stiffness / static
         return on_bristles(flat, -static * np.expm1(-deflection))
 
     @staticmethod

@@ -60,7 +60,7 @@ class MeasuredFriction:
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
 
-def displacements(static: float, stiffness: float) -> np.ndarray:
+def virgin_displacements(static: float, stiffness: float) -> np.ndarray:
     """Displacements [m] at which virgin curves are compared, shape (n,)."""
     return static / stiffness * REACH * np.linspace(0.0, 1.0, POINTS) ** 2
 
@@ -78,10 +78,14 @@ def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
 
 def on_bristles(flat: Mapping[str, Any], force: np.ndarray) -> MeasuredFriction:
     """What is measured of a law with a Stribeck curve whose bristles, as stiff and damped as those of LuGre, give the
-    virgin curve `force` [N] at the `displacements` that belong to them."""
+    virgin curve `force` [N] at the `virgin_displacements` that belong to them."""
     levels, stiffness = levels_of(flat), float(flat["friction.bristle_stiffness"])
     return MeasuredFriction(
-        levels, stiffness, float(flat["friction.bristle_damping"]), displacements(levels.static, stiffness), force
+        levels,
+        stiffness,
+        float(flat["friction.bristle_damping"]),
+        virgin_displacements(levels.static, stiffness),
+        force,
     )
 
 

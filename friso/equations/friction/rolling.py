@@ -26,10 +26,10 @@ from friso.equations.friction.measured import (
     MeasuredFriction,
     as_good,
     best,
-    displacements,
     levels_under_conditions,
     on_bristles,
     power_law,
+    virgin_displacements,
 )
 from friso.quantities import Bound, Number, Quantity, Value, non_negative, positive
 from friso.stage import register_friction
@@ -72,13 +72,13 @@ class Rolling(StribeckSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """From rest as Dahl's exponent has it."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        displacement = displacements(static, stiffness)
+        displacement = virgin_displacements(static, stiffness)
         return on_bristles(flat, power_law(static, stiffness, flat["friction.rolling_exponent"], displacement))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
         """Bristles as stiff and damped as measured; the exponent fits the virgin curve best."""
-        return keeping_bristle(measured, rolling_exponent=best(*_tried(measured)))
+        return keeping_bristle(measured, rolling_exponent=best(*_exponent_candidates(measured)))
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {"rolling_exponent": (1.0, 1.5, 4.0)}
 
@@ -90,7 +90,7 @@ class Rolling(StribeckSection):
     @staticmethod
     def left_open(measured: MeasuredFriction) -> dict[str, tuple[float, float]]:
         """Exponents with which the virgin curve is hardly another."""
-        return {"friction.rolling_exponent": as_good(*_tried(measured))}
+        return {"friction.rolling_exponent": as_good(*_exponent_candidates(measured))}
 
     @staticmethod
     def active(flat: Mapping[str, Any]) -> str:
@@ -113,7 +113,7 @@ def softening(lacking: Any, exponent: Any) -> Any:
     return ((lacking**2 + ROUNDED**2) / (1 + ROUNDED**2)) ** ((exponent - 1) / 2)
 
 
-def _tried(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
+def _exponent_candidates(measured: MeasuredFriction) -> tuple[np.ndarray, np.ndarray]:
     """Exponents, and how far the virgin curve is off with each."""
     tried = np.linspace(1.0, 4.0, 301)
     curves = (power_law(measured.levels.static, measured.stiffness, i, measured.displacement) for i in tried)

@@ -131,7 +131,7 @@ class Roots:
     unknown: np.ndarray
 
 
-def roots(driven: DrivenPlant, forces: np.ndarray) -> Roots:
+def driven_amplitudes(driven: DrivenPlant, forces: np.ndarray) -> Roots:
     """All amplitudes at which forces [N] move the cart, as far as the grid resolves them."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]

@@ -20,9 +20,9 @@ from friso.engine.arrays import Status
 from friso.engine.tolerance import checked_rtol
 from friso.equations.imposed import HARMONIC
 from friso.errors import InputError
-from friso.frequency.describing.steady import RTOL, Imposition, closed, share_of_period, steady
+from friso.frequency.describing.steady import RTOL, Imposition, periodic_gap, share_of_period, steady
 from friso.stage import Stage
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,11 +44,11 @@ def dynamic_stiffness(
     friction = Imposition.of(flat, amplitudes, frequencies, rtol)
     motion = steady(friction)
     first, _ = _harmonics(friction, motion.inner, 1, 0)
-    good = motion.done & (motion.gap <= closed(rtol))
+    good = motion.done & (motion.gap <= periodic_gap(rtol))
     return np.where(good, first[:, 1] / amplitudes, np.nan)
 
 
-@checked
+@check_arguments
 def describing(
     stage: Stage,
     amplitudes: Sequence[float] | np.ndarray,
@@ -86,7 +86,7 @@ def describing(
     friction = Imposition.of(stage.flat(), *pairs, checked_rtol(rtol))
     motion = steady(friction)
     force, aliasing = _harmonics(friction, motion.inner, harmonics, samples if harmonics > 1 else 0)
-    status = np.where(motion.gap <= closed(rtol), Status.DONE.text, NOT_CLOSED)
+    status = np.where(motion.gap <= periodic_gap(rtol), Status.DONE.text, NOT_CLOSED)
     status = np.where(motion.done & np.isfinite(force[:, 1]), status, NOT_RUN)
     force[status != Status.DONE.text] = np.nan
     coords = _coords(sizes, rates, harmonics)

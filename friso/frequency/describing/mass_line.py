@@ -10,13 +10,13 @@ import numpy as np
 from friso.frequency.describing.response import plant_response
 from friso.frequency.describing.steady import RTOL
 from friso.stage import Stage
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-@checked
+@check_arguments
 def mass_line(
     stage: Stage,
     places: Sequence[Mapping[str, Any]],

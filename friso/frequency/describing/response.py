@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.describing.driven import CLOSE, DrivenPlant, Roots, roots
+from friso.frequency.describing.driven import CLOSE, DrivenPlant, Roots, driven_amplitudes
 from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke
 from friso.frequency.describing.steady import RTOL
 from friso.stage import Stage
-from friso.stage.arguments import checked
+from friso.stage.arguments import check_arguments
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +27,7 @@ NOT_FOUND = "no amplitude was found at which this force moves the cart"
 MISSING = "answers are missing: friction was not found at some amplitude, or the least or greatest answer does not last"
 
 
-@checked
+@check_arguments
 def plant_response(
     stage: Stage,
     forces: Sequence[float] | np.ndarray,
@@ -56,7 +56,7 @@ def plant_response(
 
     sizes, rates = checked_positive("forces", forces, "2 N"), checked_positive("frequencies", frequencies, "10 Hz")
     driven = DrivenPlant.of(stage.flat(), rates, checked_rtol(rtol))
-    branch_points = roots(driven, sizes)
+    branch_points = driven_amplitudes(driven, sizes)
     plane, place, count = ("force", "frequency"), *_branches(branch_points, (len(sizes), len(rates)))
     columns = _columns(driven, branch_points)
     branches = {name: _spread(values, place, count.shape) for name, (values, _, _) in columns.items()}

@@ -114,7 +114,7 @@ def _rows(rows: list[Any], count: int) -> np.ndarray:
     return np.array([np.broadcast_to(row, (count,)) for row in rows], dtype=float).reshape(len(rows), count)
 
 
-def closed(rtol: float) -> float:
+def periodic_gap(rtol: float) -> float:
     """Gap up to which a state counts as periodic."""
     return min(CLOSED * rtol, WIDEST)
 
@@ -141,7 +141,7 @@ def steady(friction: Imposition) -> PeriodicStates:
         chosen_friction, scales = friction.take(open_), friction.scales[open_][:, friction.inner]
         step, missed, fine = _secant(chosen_friction, inner[open_], width[open_])
         gap[open_], done[open_] = np.max(np.abs(missed) / scales, axis=1), fine
-        far = fine & (gap[open_] > closed(friction.rtol))
+        far = fine & (gap[open_] > periodic_gap(friction.rtol))
         inner[open_[far]] += step[far]
         width[open_[far]] = np.clip(np.abs(step[far]), FINEST * scales[far], scales[far])
         open_ = open_[far]

@@ -18,7 +18,7 @@ NEAR = 0.2
 """Share of peak to peak by which that of an orbit may differ from the run that it was closed from."""
 
 
-def closed(
+def close_orbits(
     runs: Pending, swings: np.ndarray, times: np.ndarray, sizes: np.ndarray, rtol: float
 ) -> list[tuple[np.ndarray, Cycles]]:
     """The cycles beside runs that repeat themselves after numbers of swings and times [s], with sizes from peak to peak

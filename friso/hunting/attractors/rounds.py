@@ -13,7 +13,7 @@ from friso.hunting.attractors.recurrence import Recurrence, recurrence
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.find import COARSE_RTOL
 from friso.hunting.cycle.rest import wait
-from friso.hunting.cycle.return_map import PATIENCE, follow
+from friso.hunting.cycle.return_map import PATIENCE, trace_returns
 from friso.hunting.cycle.swings import last_swings
 
 RTOL, TIGHT = 1e-7, 1e-9
@@ -113,7 +113,7 @@ def loose_from(stages: Ensemble) -> np.ndarray:
     """The distance [m] up to which a stage creeps home, and from which on it breaks away, shape (count,)."""
     distances = CREEPS * stages.length[:, None]
     sides = (1.0,) if stages.symmetric.all() else (1.0, -1.0)
-    returns = np.max([follow(stages, distances, COARSE_RTOL, side).returns for side in sides], axis=0)
+    returns = np.max([trace_returns(stages, distances, COARSE_RTOL, side).returns for side in sides], axis=0)
     breaks = returns > ACROSS * distances
     first = np.where(breaks.any(axis=1), breaks.argmax(axis=1), len(CREEPS) - 1)
     return distances[np.arange(stages.count), first]

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from friso.hunting.attractors.closing import closed
+from friso.hunting.attractors.closing import close_orbits
 from friso.hunting.attractors.rounds import Ends, Pending, lengthened, one_round
 from friso.hunting.cycle.find import Cycles
 
@@ -264,7 +264,7 @@ class Survey:
     ) -> None:
         """Close orbits from the runs with the numbers `swinging`, after numbers of swings and times [s]."""
         repeats = ends.repeats
-        for group, cycles in closed(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
+        for group, cycles in close_orbits(runs.take(swinging), swings, times, repeats.size[swinging], self.rtol):
             numbers = swinging[group]
             self.add(of_cycles(owners[numbers], cycles, runs.stages.sticking))
             self.slow_down(owners[numbers], cycles)

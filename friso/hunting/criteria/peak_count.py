@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, DISTINCT, SEPARATION
-from friso.hunting.turns import scan
+from friso.hunting.turns import scan_turning_points
 
 __all__ = [
     "COUNTED_ABOVE",
@@ -47,14 +47,14 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
     shape (runs,).
     """
     nothing = np.zeros(len(counts))
-    return scan(times, values, counts, nothing, nothing).peaks
+    return scan_turning_points(times, values, counts, nothing, nothing).peaks
 
 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """The same of distinct peaks alone, whose valleys on both sides are at least `DISTINCT` deep; times [s] and values
     [m] of the turning points, shape (runs, room), valid up to counts (runs,)."""
     nothing = np.zeros(len(counts))
-    return scan(times, values, counts, nothing, nothing).distinct
+    return scan_turning_points(times, values, counts, nothing, nothing).distinct
 
 
 def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:

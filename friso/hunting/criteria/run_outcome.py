@@ -19,7 +19,7 @@ from typing import Final
 import numpy as np
 
 from friso.hunting.turning import HALF, WINDOW
-from friso.hunting.turns import scan
+from friso.hunting.turns import scan_turning_points
 
 SWINGS: Final = "swings"
 CREEPS: Final = "creeps"
@@ -87,7 +87,7 @@ def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, complete
     values = np.ascontiguousarray(deviation[:, late])
     ended = np.full(runs, time[-1])
     samples = np.full(runs, values.shape[1])
-    turns = scan(np.tile(time[late], (runs, 1)), values, samples, np.nan_to_num(swing), ended)
+    turns = scan_turning_points(np.tile(time[late], (runs, 1)), values, samples, np.nan_to_num(swing), ended)
     done = np.ones(runs, bool) if completed is None else completed
     return End(done, swing, earlier, turns.period, turns.turned, last_outside(time, deviation, band), ended)
 

@@ -12,7 +12,7 @@ from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_g
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.cycle.shooting import Orbits, close, simplest
+from friso.hunting.cycle.shooting import Orbits, close, swings_of_simplest
 from friso.hunting.cycle.swings import swings
 
 RTOL = 1e-9
@@ -123,10 +123,10 @@ def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
     symmetric = stages.symmetric
     kinds = ((symmetric, symmetric_cycles), (~symmetric, whole_cycles))
     parts = [(which, find(stages.take(which), rtol)) for mask, find in kinds if (which := np.flatnonzero(mask)).size]
-    return joined(parts)
+    return concatenate_cycles(parts)
 
 
-def joined(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
+def concatenate_cycles(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
     """The cycles of all stages from those of some and others, with the numbers of these."""
     if len(parts) == 1:
         return parts[0][1]
@@ -171,7 +171,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         sign,
         np.full(count, np.inf),
         np.zeros(count, bool),
-        simplest(sign),
+        swings_of_simplest(sign),
     )
     for distance, time in TRIES:
         missing = guess.numbers[~orbits.closed[guess.numbers]]

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
-from friso.hunting.cycle.return_map import ReturnMap, follow
+from friso.hunting.cycle.return_map import ReturnMap, trace_returns
 
 REFINED = 8
 """Distances between the two of the map that enclose a fixed point, to enclose it closer."""
@@ -43,7 +43,7 @@ def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess
     if numbers.size:
         subset = stages.take(numbers)
         between = np.linspace(low[numbers], high[numbers], REFINED, axis=1)
-        finer = follow(subset, between, rtol, 1.0)
+        finer = trace_returns(subset, between, rtol, 1.0)
         distances[numbers] = root = _crossing(finer.distances, finer.returns - finer.distances)
         times[numbers] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(subset, root)
     return Guess(distances, times)

@@ -38,12 +38,12 @@ class ReturnMap:
 def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     """The map of stages that stick on one side, 1 or -1, of their reference; finer where it might return as far."""
     coarse = np.geomspace(*RANGE, POINTS)[None, :] * stages.length[:, None]
-    first = follow(stages, coarse, rtol, side)
+    first = trace_returns(stages, coarse, rtol, side)
     gain = np.argmax(first.returns / first.distances, axis=1)
     rows = np.arange(stages.count)
     low, high = (first.distances[rows, np.clip(gain + step, 0, POINTS - 1)] for step in (-1, 1))
     finer = np.geomspace(low, high, POINTS // 2 + 2, axis=1)[:, 1:-1]
-    second = follow(stages, finer, rtol, side)
+    second = trace_returns(stages, finer, rtol, side)
     parts = (np.hstack(pair) for pair in zip(_columns(first), _columns(second), strict=True))
     distances, returns, times = parts
     order = np.argsort(distances, axis=1)
@@ -54,7 +54,7 @@ def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
     return return_map.distances, return_map.returns, return_map.times
 
 
-def follow(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
+def trace_returns(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
     """Let every stage go from each of the distances [m], shape (count, points), ascending."""
     shape = distances.shape
     several = stages.take(np.repeat(np.arange(stages.count), shape[1]))

@@ -98,7 +98,7 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     return Shot(sign * ends, sign * flows, high, low, np.all(done(results).reshape(count, followed), axis=1))
 
 
-def simplest(sign: float) -> int:
+def swings_of_simplest(sign: float) -> int:
     """The swings in half a period (sign -1), or in a whole one, of the simplest cycles."""
     return 1 if sign < 0 else 2
 
@@ -114,7 +114,7 @@ def close(
     flow's derivative changes from one nanometre to the next and points nowhere; the last Jacobian from farther away
     then serves for as many steps as it takes.
     """
-    orbits = _solved(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
+    orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
 
 
@@ -146,7 +146,7 @@ def close_along(
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
-    orbits = _solved(following).orbits
+    orbits = _iterated(following).orbits
     return replace(orbits, swings=swings or orbits.swings), following.best_places
 
 
@@ -246,7 +246,7 @@ class _Shooting:
     def orbits(self) -> Orbits:
         limit = CLOSED_CHATTERING if self.chatters else CLOSED
         closed = self.gaps < limit
-        return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, simplest(self.sign))
+        return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
 
 
 class _Following(_Shooting):
@@ -282,7 +282,7 @@ class _Following(_Shooting):
         return np.hstack([super()._residual(which, stages), residual[:, None]])
 
 
-def _solved(shooting: _S) -> _S:
+def _iterated(shooting: _S) -> _S:
     for _ in range(STEPS):
         if not shooting.advance():
             break

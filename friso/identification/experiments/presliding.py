@@ -40,7 +40,7 @@ from friso.identification.readings.common import (
     correlation_of,
     deflections,
     jackknife,
-    solved,
+    solve_normal_equations,
 )
 from friso.identification.stage_keys import shared_masses
 from friso.quantities import percent
@@ -180,12 +180,12 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
 
     def off(logarithm: float) -> float:
         x = equation.columns(float(np.exp(logarithm)) / span)
-        return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
+        return float(np.sum((target - x @ solve_normal_equations(x.T @ x, x.T @ target)) ** 2))
 
     best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
     bending = float(np.exp(best.x)) / span
     x = equation.columns(bending)
-    solution = solved(x.T @ x, x.T @ target)
+    solution = solve_normal_equations(x.T @ x, x.T @ target)
     bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
     covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
     left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.driven import Inputs, follow
+from friso.engine.driven import Inputs, run_driven
 from friso.engine.kernel import kernel
 from friso.equations.dragged import Dragged
 from friso.identification.logs.log import Log
@@ -58,7 +58,7 @@ class DraggedRecord:
         starts = np.zeros((runs, shape.initial_size))
         starts[:, shape.position] = self.position[0]
         forces = np.full((runs, len(self.force)), np.nan)
-        for part in follow(shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, RTOL):
+        for part in run_driven(shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, RTOL):
             impulse = part.states[:, :, -1]
             mean = np.diff(impulse, axis=1) / self.interval
             middle = np.pad((mean[:, 1:] + mean[:, :-1]) / 2, ((0, 0), (1, 1)), mode="edge")

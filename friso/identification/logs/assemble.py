@@ -17,7 +17,7 @@ from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.read import file_format
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
-from friso.identification.logs.time_base import Track, together, track
+from friso.identification.logs.time_base import Track, resample_tracks, track
 from friso.quantities import percent, quoted
 
 LEAST_SAMPLES = 50
@@ -52,7 +52,7 @@ def read_log(
     notes = Notes(list(table.read), _undecided(proposal))
     try:
         tracks = _tracks(chosen, reading, notes, needed)
-        base, signals = together(tracks)
+        base, signals = resample_tracks(tracks)
         notes.read += base.read
         notes.warnings += base.warnings
         _check(base, signals, needed)
@@ -136,7 +136,7 @@ def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings
-    if (n := checks.held(values)) > 1:
+    if (n := checks.samples_held(values)) > 1:
         notes.warnings.append(
             f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
         )

@@ -29,7 +29,7 @@ def is_hdf5(head: bytes) -> bool:
     return HDF5 in (head[:8], head[512:520])
 
 
-def read_mat(path: Path) -> dict[str, Any]:
+def mat_tree(path: Path) -> dict[str, Any]:
     """The tree of a MAT file, by the names of its variables."""
     with path.open("rb") as file:
         head = file.read(520)
@@ -128,7 +128,7 @@ def _structures(item: Any, children: dict[str, Any]) -> Any:
     return children
 
 
-def read_uff(path: Path) -> dict[str, Any]:
+def uff_datasets(path: Path) -> dict[str, Any]:
     """The datasets 58 of a universal file, and the codes of its units."""
     import pyuff
 
@@ -138,14 +138,14 @@ def read_uff(path: Path) -> dict[str, Any]:
     return {"sets": sets, "units": [file.read_sets(i)["units_code"] for i, kind in enumerate(kinds) if kind == 164]}
 
 
-def read_lvm(path: Path) -> dict[str, Any]:
+def lvm_content(path: Path) -> dict[str, Any]:
     """The content of a measurement text of LabVIEW."""
     import lvm_read
 
     return {str(key): part for key, part in lvm_read.read(str(path), read_from_pickle=False, dump_file=False).items()}
 
 
-def read_tdms(path: Path) -> dict[str, Any]:
+def tdms_channels(path: Path) -> dict[str, Any]:
     """The channels of a TDMS file, and what the library said: a file that ends early is read as far as it goes."""
     import nptdms
 
@@ -179,10 +179,10 @@ class _Heard(logging.Handler):
 
 
 READERS: dict[str, Callable[[Path], dict[str, Any]]] = {
-    "MAT": read_mat,
-    "UFF": read_uff,
-    "LVM": read_lvm,
-    "TDMS": read_tdms,
+    "MAT": mat_tree,
+    "UFF": uff_datasets,
+    "LVM": lvm_content,
+    "TDMS": tdms_channels,
 }
 
 

@@ -106,7 +106,7 @@ def jumps(values: np.ndarray) -> tuple[float, int]:
     return (float(steps[largest]), largest + 1) if sizes[largest] > JUMP * usual else (0.0, 0)
 
 
-def held(values: np.ndarray) -> int:
+def samples_held(values: np.ndarray) -> int:
     """For how many samples each value is held, 1 where the signal changes at any sample: the changes all fall on every
     n-th sample, n up to 20 (a signal that changes more rarely is one of steps)."""
     changes = np.flatnonzero(np.diff(values) != 0)

@@ -13,7 +13,7 @@ from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import option
 from friso.identification.logs.roles import AssignedRole, Proposal, listing, role_of, words
 from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
-from friso.identification.logs.units import OTHERS, factor, in_si
+from friso.identification.logs.units import OTHERS, in_si, unit_factor
 from friso.quantities import quoted
 
 OPTIONAL = ("velocity", "acceleration")
@@ -111,7 +111,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool]:
     finite = channel.values[np.isfinite(channel.values)]
     changes = bool(finite.size and np.ptp(finite) > 0)
     kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))  # those of a rotary axis among them
-    unit = 1 if not channel.unit else 2 if any(factor(channel.unit, kind) is not None for kind in kinds) else 0
+    unit = 1 if not channel.unit else 2 if any(unit_factor(channel.unit, kind) is not None for kind in kinds) else 0
     first = next(iter(words(channel.name)), " ")[0]
     return changes, unit, first in _INITIALS.get(role, "")
 

@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_trapezoid
 
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.roles import Proposal, role_of
-from friso.identification.logs.units import factor
+from friso.identification.logs.units import unit_factor
 
 NOTE = (
     "position: the integral of the velocity, since no channel holds one; where the log begins counts as 0, after a gap "
@@ -37,7 +37,7 @@ def _may_be_a_position(channel: Channel) -> bool:
     finite = channel.values[np.isfinite(channel.values)]
     if not finite.size or not np.ptp(finite) > 0 or role_of(channel.name) is not None:
         return False
-    return not channel.unit or any(factor(channel.unit, unit) is not None for unit in LENGTHS)
+    return not channel.unit or any(unit_factor(channel.unit, unit) is not None for unit in LENGTHS)
 
 
 def integrated(velocity: np.ndarray, sample_time: float, segments: Sequence[slice]) -> np.ndarray:

@@ -19,7 +19,7 @@ def joinable(one: Log, other: Log) -> bool:
     return same and abs(one.sample_time / other.sample_time - 1) <= SAME
 
 
-def joined(logs: Sequence[Log]) -> Log:
+def join_logs(logs: Sequence[Log]) -> Log:
     """Logs that are `joinable` as one, each after a gap of a second behind the one before."""
     first = logs[0]
     times, segments, start, end = [], [], 0, 0.0
@@ -43,7 +43,7 @@ def joined(logs: Sequence[Log]) -> Log:
     )
 
 
-def together(logs: Sequence[Log]) -> list[Log]:
+def join_alike(logs: Sequence[Log]) -> list[Log]:
     """The logs, those that are alike joined."""
     groups: list[list[Log]] = []
     for log in logs:
@@ -52,4 +52,4 @@ def together(logs: Sequence[Log]) -> list[Log]:
             groups.append([log])
         else:
             alike.append(log)
-    return [group[0] if len(group) == 1 else joined(group) for group in groups]
+    return [group[0] if len(group) == 1 else join_logs(group) for group in groups]

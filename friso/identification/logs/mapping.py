@@ -163,7 +163,7 @@ def place_for(log: Path, folder: Path) -> Path:
     return beside if writable else sidecar(log, folder)
 
 
-def load(log: Path, folder: Path | None = None) -> Mapping | None:
+def load_mapping(log: Path, folder: Path | None = None) -> Mapping | None:
     """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises LogError
     for a file that is not one."""
     for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):

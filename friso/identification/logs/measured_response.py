@@ -11,7 +11,7 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.roles import words
-from friso.identification.logs.units import factor, spelled
+from friso.identification.logs.units import spelled, unit_factor
 from friso.quantities import Quantity, any_sign
 
 _KEYS = {
@@ -38,7 +38,7 @@ class MeasuredResponse:
     unit: str = ""
 
 
-def kind_of(name: str) -> str | None:
+def column_kind(name: str) -> str | None:
     """What a heading says that its column is; None for nothing of a response."""
     parts = set(words(name))
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
@@ -47,7 +47,7 @@ def kind_of(name: str) -> str | None:
 
 def is_response(names: Iterable[str]) -> bool:
     """Whether headings hold a frequency with magnitude and phase, or with real and imaginary part."""
-    kinds = {kind_of(name) for name in names}
+    kinds = {column_kind(name) for name in names}
     return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
 
 
@@ -55,8 +55,8 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
     """The response in the columns of a table. Raises LogError."""
     by_kind: dict[str, list[Channel]] = {}
     for channel in table.channels:
-        if kind_of(channel.name) is not None:
-            by_kind.setdefault(str(kind_of(channel.name)), []).append(channel)
+        if column_kind(channel.name) is not None:
+            by_kind.setdefault(str(column_kind(channel.name)), []).append(channel)
     for kind, channels in by_kind.items():
         if len(channels) > 1:
             names = ", ".join(channel.name for channel in channels)
@@ -80,12 +80,12 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
     read = (*table.read, quantities, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
     with np.errstate(all="ignore"):  # what is no number is told below
         response = response * scale
-    return checked(MeasuredResponse(frequency, response, coherence, path.stem, read, unit), path)
+    return check_response(MeasuredResponse(frequency, response, coherence, path.stem, read, unit), path)
 
 
 def _frequency(column: Channel, path: Path) -> np.ndarray:
     """Frequencies in Hz. Raises LogError for a column without a unit."""
-    value = factor(column.unit, "Hz") if column.unit else None
+    value = unit_factor(column.unit, "Hz") if column.unit else None
     if value is None:
         actual = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
         raise LogError("frequency", actual, "Hz or rad/s in the heading", "f [Hz]", str(path))
@@ -94,7 +94,7 @@ def _frequency(column: Channel, path: Path) -> np.ndarray:
 
 def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
     """Response from magnitude and phase; its scale, unit and words. Raises LogError for a phase without a unit."""
-    turn = factor(phase.unit, "rad") if phase.unit else None
+    turn = unit_factor(phase.unit, "rad") if phase.unit else None
     if turn is None:
         raise LogError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
     angle = np.exp(1j * turn * phase.values)
@@ -111,12 +111,12 @@ def response_unit(text: str) -> tuple[float, str, str]:
     text = spelled(text)
     for si in ("m/N", "m/s/N", "m/s^2/N", "m/V", "m/A", "m/s^2/A", "m/s^2/V", "rad/s^2/A", "rad/A", "rad/s/A", "rad/V",
                "rad/(N*m)", "m"):  # fmt: skip
-        if text and factor(text, si) is not None:
+        if text and unit_factor(text, si) is not None:
             return Quantity(si, any_sign, "").factor(text), si, f"in {text}"
     return 1.0, text, f"in {text}" if text else "without a unit"
 
 
-def checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
+def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
     """The response without its line at 0 Hz, checked. Raises LogError for too few or falling frequencies and NaN."""
     positive = measured.frequency > 0
     if not positive.all():

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from friso.identification.logs.units import factor, is_unit, split_heading
+from friso.identification.logs.units import is_unit, split_heading, unit_factor
 
 RATES = frozenset(
     {"fs", "fsample", "samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "abtastrate",
@@ -65,7 +65,7 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
 def _seconds(number: float, unit: str) -> float | None:
     """A sample time or rate in seconds; None without a unit of either, or for what is not positive."""
     for si, power in (("s", 1), ("Hz", -1)):
-        if number > 0 and unit and (size := factor(unit, si)) is not None:
+        if number > 0 and unit and (size := unit_factor(unit, si)) is not None:
             return (number * size) ** power
     return None
 

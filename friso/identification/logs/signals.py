@@ -17,7 +17,7 @@ from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find
 from friso.identification.logs.text import with_times
-from friso.identification.logs.units import FOREIGN, factor, in_si, is_unit, read_scale
+from friso.identification.logs.units import FOREIGN, in_si, is_unit, read_scale, unit_factor
 from friso.quantities import quoted
 
 TURNS = f"--axis {ROTARY.name}"
@@ -188,7 +188,7 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
         line = f"time: {name} has no unit (this format has none): assumed to be in s"
         notes.warnings += [line] if line not in notes.warnings else []
         return 1.0
-    value = factor(unit, "s") if unit else None
+    value = unit_factor(unit, "s") if unit else None
     if value is None:
         actual = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
         expected = "; or ".join(text for text in ("a unit convertible to s", _offers(reading.table)) if text)
@@ -215,7 +215,7 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
 
 def _is_clock(channel: Channel) -> bool:
     """Whether a channel is in a unit of time and always rises."""
-    of_time = bool(channel.unit) and factor(channel.unit, "s") is not None
+    of_time = bool(channel.unit) and unit_factor(channel.unit, "s") is not None
     return of_time and channel.values.size > 1 and bool((np.diff(channel.values) > 0).all())
 
 

@@ -17,7 +17,7 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.roles import role_of
 from friso.identification.logs.sniff import DOS_END, STAMP, TextLayout, layout, split_line
-from friso.identification.logs.units import factor
+from friso.identification.logs.units import unit_factor
 from friso.quantities import quoted
 
 
@@ -212,7 +212,7 @@ def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
     """Each column with the instants of the time column to its left that is as long (a file may have one per channel);
     where none stands to its left, of the only one there is. A time column is one that says so and has its unit."""
     clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name) or ("",))[0] == "time"]
-    clocks = [(i, c, factor(c.unit, "s")) for i, c in clocks if c.unit]
+    clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]
     out = []
     for i, column in enumerate(columns):
         fitting = [clock for clock in clocks if clock[2] is not None and len(clock[1].values) == len(column.values)]

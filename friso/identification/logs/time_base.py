@@ -101,7 +101,7 @@ def _evened(name: str, raw: Track) -> Track:
     return raw
 
 
-def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
+def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
     """All tracks at the instants of the coarsest one that all of them cover: these instants as a track, and the values
     by name. Others are interpolated linearly within their own segments only. Raises LogError where nothing is
     covered by all."""

@@ -79,7 +79,7 @@ def spelled(text: str) -> str:
 
 
 @lru_cache(maxsize=1024)
-def factor(unit: str, si_unit: str) -> float | None:
+def unit_factor(unit: str, si_unit: str) -> float | None:
     """SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
     try:
         return Quantity(si_unit, any_sign, "").factor(spelled(unit))
@@ -90,7 +90,7 @@ def factor(unit: str, si_unit: str) -> float | None:
 def is_unit(text: str) -> bool:
     """Whether a text is a unit that a log could have."""
     text = spelled(text)
-    return text.lower() in COUNTS or text in ("dB", "%") or any(factor(text, unit) is not None for unit in _KINDS)
+    return text.lower() in COUNTS or text in ("dB", "%") or any(unit_factor(text, unit) is not None for unit in _KINDS)
 
 
 _KINDS = (
@@ -142,7 +142,7 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
     """Factor, and the unit that values have with it: that of the role where possible, else one of `OTHERS`, else the
     unit as it stands with factor 1 ("1" for no unit)."""
     for target in (role_unit, *OTHERS.get(role_unit, ())):
-        value = factor(unit, target) if unit else None
+        value = unit_factor(unit, target) if unit else None
         if value is not None:
             return value, target
     text = spelled(unit)
@@ -164,7 +164,7 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
     if below.lower() in COUNTS and unit.lower() in COUNTS:
         return above, "count"
     for kind in ("m", "rad", "A", "V", "N*m", "N", "m/s", "rad/s", "m/s^2"):
-        of_unit, of_scale = factor(unit, kind), factor(below, kind)
+        of_unit, of_scale = unit_factor(unit, kind), unit_factor(below, kind)
         if of_unit is not None and of_scale is not None:
             return above * of_unit / of_scale, unit
     if unit == below:

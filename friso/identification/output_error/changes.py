@@ -49,7 +49,7 @@ class Changes:
         ]
 
 
-def changes_of(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
+def drift_of_friction(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
     """What changes during a record, of the smooth `velocity` [m/s], shape (n,); None where nothing clearly does.
 
     Constant force and friction may follow a line each over either half of the record. They are fitted together with

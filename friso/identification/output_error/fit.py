@@ -13,7 +13,7 @@ from scipy.stats import qmc
 from friso.engine.driven import Inputs
 from friso.identification.output_error.parameters import FitParameter, keys_of
 from friso.identification.output_error.problem import Problem
-from friso.identification.output_error.refine import bounds_of, costs, refine
+from friso.identification.output_error.refine import bounds_of, costs, refine_fit
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
 
@@ -84,7 +84,7 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErro
     mask = np.zeros(starts.shape[1], bool)
     mask[list(free)] = True
     screened = _screened(problem, starts)
-    refined = refine(problem, screened, np.tile(mask, (len(screened), 1)), ROUGH)
+    refined = refine_fit(problem, screened, np.tile(mask, (len(screened), 1)), ROUGH)
     best = refined.inner[np.argmin(refined.cost)]
     return _polished(problem, tuple(free), best)
 

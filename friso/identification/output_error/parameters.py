@@ -62,7 +62,7 @@ def is_free(flat: Mapping[str, Any]) -> bool:
     return "joint.stiffness" in flat and not flat["joint.locked"]
 
 
-def parameters_of(
+def fit_parameters(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
     """The parameters of a stage given as flat keys, that a log may show.

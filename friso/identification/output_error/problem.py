@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from friso.engine.arrays import Status
-from friso.engine.driven import Followed, Inputs, follow
+from friso.engine.driven import Followed, Inputs, run_driven
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
 from friso.equations.driven import HELD_FORCE, Driven
@@ -110,7 +110,7 @@ class Problem:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
         flat = stages(self.flat, self.parameters, inner)
         starts = self._starts(flat, len(inner))
-        for runs in follow(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
+        for runs in run_driven(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
             yield runs.numbers, self._record(flat, runs)
 
     def record(self, inner: np.ndarray) -> Simulated:
@@ -189,7 +189,7 @@ class Problem:
         return self.flat[KP] * off + self.flat[KD] * slip
 
 
-def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
+def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
     """The stage with its own controller on the log's reference; a `disturbance` in the log acts beside it."""
     sampled = "drive.sample_time" in flat and not why_continuous(flat, log.sample_time)
     samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0

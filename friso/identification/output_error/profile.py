@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.refine import bounds_of, costs, refine
+from friso.identification.output_error.refine import bounds_of, costs, refine_fit
 
 POINTS = 7
 """Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
@@ -72,7 +72,7 @@ def _costs(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np
     starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
-    return refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
+    return refine_fit(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:

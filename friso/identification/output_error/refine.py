@@ -41,7 +41,7 @@ def costs(problem: Problem, inner: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(costs), costs, np.inf)
 
 
-def refine(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: int) -> Refined:
+def refine_fit(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: int) -> Refined:
     """Fit from several starts, shape (starts, parameters); of each only the numbers that are `free`, a mask of the same
     shape."""
     low, high = bounds_of(problem)

@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.problem import Problem, tracking
-from friso.identification.output_error.refine import refine
+from friso.identification.output_error.refine import refine_fit
 from friso.identification.readings.common import robust
 from friso.identification.spread import CONFIDENCE
 from friso.intervals import COVERAGE
@@ -39,7 +39,7 @@ def as_far_off_as_repeated(
     """
     free = np.isin(np.arange(len(once.inner)), once.free)
     again = [
-        refine(problem, once.inner[None], free[None], ITERATIONS).inner[0]
+        refine_fit(problem, once.inner[None], free[None], ITERATIONS).inner[0]
         for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
     ]
     off = np.sqrt(np.mean([(inner - once.inner)[free] ** 2 for inner in again], axis=0))

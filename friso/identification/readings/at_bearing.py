@@ -72,7 +72,7 @@ DIRECT = Between()
 """Nothing lies between; the delay is not known."""
 
 
-def between(flat: Mapping[str, Any]) -> Between:
+def machine_between(flat: Mapping[str, Any]) -> Between:
     """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
     limiter.
 
@@ -102,7 +102,7 @@ def between(flat: Mapping[str, Any]) -> Between:
 def believed_between(prior: Prior, log: Log) -> Between:
     """What lies between force and bearing, as other experiments show it or else the stage file has it, which states no
     viscous friction better than to its whole size. Raises InputError."""
-    believed = between(prior.believed(log))
+    believed = machine_between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")
     return replace(believed, viscous=(believed.viscous[0], viscous.half_width if viscous else believed.viscous[0]))
 

@@ -172,7 +172,7 @@ def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: 
     return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
 
 
-def solved(square: np.ndarray, product: np.ndarray) -> np.ndarray:
+def solve_normal_equations(square: np.ndarray, product: np.ndarray) -> np.ndarray:
     """The solution of normal equations, shape (p, p) and (p,), whose columns are of very different size; 0 for one that
     is empty."""
     size = np.sqrt(np.maximum(np.diag(square), 0.0))
@@ -184,7 +184,7 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
     """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
     parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
     square, product = columns.T @ columns, columns.T @ target
-    without = np.array([solved(square - x.T @ x, product - x.T @ y) for x, y in parts])
+    without = np.array([solve_normal_equations(square - x.T @ x, product - x.T @ y) for x, y in parts])
     off = without - without.mean(axis=0)
     return off.T @ off * (BLOCKS - 1) / BLOCKS
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.readings.common import LINEARITY, Mean, by_t, solved
+from friso.identification.readings.common import LINEARITY, Mean, by_t, solve_normal_equations
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"
@@ -43,4 +43,4 @@ def stiffness_of_loading(
 
 def _spring(products: np.ndarray) -> float:
     """Coefficient of the first signal in a fit of the last by the others, from the scalar products of all."""
-    return float(solved(products[:-1, :-1], products[:-1, -1])[0])
+    return float(solve_normal_equations(products[:-1, :-1], products[:-1, -1])[0])

@@ -105,7 +105,7 @@ def disagreement(direct: FrequencyResponse, indirect: FrequencyResponse) -> tupl
     return (f"direct and indirect estimates differ (chance {chance:.1g}): the direct one is biased by the loop",)
 
 
-def open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
+def measured_open_loop(plant: FrequencyResponse, controller: np.ndarray) -> FrequencyResponse:
     """L = C G from the plant and the controller's known response (lines,), complex, [input per output unit]."""
     loop = plant.times(np.asarray(controller), "loop", plant.channels.input_unit)
     return FrequencyResponse(**{**vars(loop), "channels": Channels("error", "1", "loop", "1")})
@@ -129,14 +129,14 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
         if not groups or centre - half > max(high for _, _, high in groups[-1]):
             groups.append([])
         groups[-1].append((centre - half, centre, centre + half))
-    passages = [passage for group in groups for passage in ([_joined(group)] if len(group) % 2 else group)]
+    passages = [passage for group in groups for passage in ([_merged_passage(group)] if len(group) % 2 else group)]
     method, crossed = "where the open loop passes 0 dB", []
     for number, (low, centre, high) in enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1):
         crossed.append(Estimate(f"crossover {number}", "Hz", centre, low, high, method))
     return tuple(crossed)
 
 
-def _joined(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
+def _merged_passage(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
     """Low end, centre and high end of passages taken for one: the middle one, and all that they span."""
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 

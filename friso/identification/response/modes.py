@@ -10,7 +10,15 @@ import numpy as np
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.response.fitting import ResponseFit, refined
-from friso.identification.response.rational import RationalShape, Row, bounds, orders, rational, roots, simplest
+from friso.identification.response.rational import (
+    RationalShape,
+    Row,
+    bounds,
+    orders,
+    poles_and_zeros,
+    rational,
+    simplest_model,
+)
 from friso.identification.response.response import FrequencyResponse
 
 METHOD = "rational fit of the response"
@@ -72,7 +80,7 @@ def fit_modes(
     deviation = np.hypot(part.scatter(), LEAST * np.abs(part.response))
     kinds = (True, False) if rigid is None else (rigid,)
     rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, most)]
-    shape, start, *_ = simplest(rows)
+    shape, start, *_ = simplest_model(rows)
     low, high = bounds(shape, s)
     fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
@@ -102,7 +110,7 @@ def _described(shape: RationalShape, rows: list[Row]) -> str:
 
 def _cancelling(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> Iterator[str]:
     """A sentence for each resonance within the band that an antiresonance nearly cancels."""
-    poles, zeros = roots(fit.parameters, shape)
+    poles, zeros = poles_and_zeros(fit.parameters, shape)
     for pole in sorted(poles, key=abs):
         if not zeros.size or not band[0] <= abs(pole) * scale <= band[1]:
             continue
@@ -120,7 +128,7 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
         inside = [
             root
-            for root in sorted(roots(fit.parameters, shape)[which], key=abs)
+            for root in sorted(poles_and_zeros(fit.parameters, shape)[which], key=abs)
             if band[0] <= abs(root) * scale <= band[1] and -root.real < 0.7 * abs(root)
         ]
         for number, root in enumerate(inside, 1):
@@ -137,7 +145,7 @@ def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.nd
     """The root that is nearest to a given one, as a function of the parameters."""
 
     def nearest(parameters: np.ndarray) -> complex:
-        candidates = roots(parameters, shape)[which]
+        candidates = poles_and_zeros(parameters, shape)[which]
         return complex(candidates[np.argmin(np.abs(candidates - root))]) if candidates.size else complex(np.nan, np.nan)
 
     return nearest

@@ -68,13 +68,13 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
             rows.append(_completed(nonlinear, shape, s, values, deviation))
         if len(rows) > 1 and not _better(rows[-1], rows[-2]):
             break
-    best = simplest(rows)
+    best = simplest_model(rows)
     shape = RationalShape(rigid, best.shape.modes, True)
     nonlinear = _eliminated(best.parameters[: shape.nonlinear], shape, s, values, deviation)
     return [*rows, _completed(nonlinear, shape, s, values, deviation)]
 
 
-def simplest(rows: list[Row]) -> Row:
+def simplest_model(rows: list[Row]) -> Row:
     """The simplest model that no larger one beats clearly."""
     ordered = sorted(rows, key=lambda row: (len(row.parameters), not row.shape.rigid))
     best = ordered[0]
@@ -104,7 +104,7 @@ def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 
-def _solved(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _linear_parameters(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The best real linear parameters and the weighted residuals, real and imaginary part after each other."""
     weight = np.sqrt(2) / deviation
     matrix, right = (columns * weight).T, values * weight
@@ -133,7 +133,7 @@ def _another(
     for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), PLACES):
         for damping in DAMPINGS:
             start = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
-            left = _solved(_columns(start, shape, s), values, deviation)[1]
+            left = _linear_parameters(_columns(start, shape, s), values, deviation)[1]
             if left @ left < best:
                 best, best_parameters = left @ left, start
     return best_parameters
@@ -145,7 +145,7 @@ def _eliminated(
     """Nonlinear parameters refined with the linear ones eliminated (Golub, Pereyra 1973)."""
 
     def left(nonlinear: np.ndarray) -> np.ndarray:
-        return _solved(_columns(nonlinear, shape, s), values, deviation)[1]
+        return _linear_parameters(_columns(nonlinear, shape, s), values, deviation)[1]
 
     lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
     return least_squares(left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=CLOSE, max_nfev=60).x
@@ -155,13 +155,13 @@ def _completed(
     nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> Row:
     """The model with all its parameters, and how good it is."""
-    linear, left = _solved(_columns(nonlinear, shape, s), values, deviation)
+    linear, left = _linear_parameters(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)
     return Row(shape, parameters, ResponseFit(parameters, np.zeros((0, 0)), squares, left.size).bic, squares)
 
 
-def roots(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
+def poles_and_zeros(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
     """Poles of the modes and zeros of the response, those with positive imaginary part, in units of the scale."""
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]

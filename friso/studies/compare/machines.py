@@ -109,7 +109,7 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
             raise InputError(option, str(value), f"a whole number from {least} to {most}", example)
     clocked, notes = _with_clock(stage)
     spreads = _spreads(clocked)
-    sample = draw(_spread(clocked, spreads), _joined(correlations, spreads), count, seed)
+    sample = draw(_spread(clocked, spreads), _with_default_correlations(correlations, spreads), count, seed)
     held = [key for key in stage.uncertain() if key.startswith(HELD)]
     if held:
         notes += [f"not drawn, as they are the same on all machines: {', '.join(held)}"]
@@ -174,7 +174,7 @@ def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
     )
 
 
-def _joined(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
+def _with_default_correlations(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
     """Those given, and those of the keys with default spreads."""
     arrays = [tuple(key for key in spreads if key.startswith(f"{array}.")) for array in ELEMENTS]
     levels = TOGETHER if all(key in spreads for key in TOGETHER) else ()

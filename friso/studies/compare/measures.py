@@ -52,14 +52,14 @@ class MachineMeasures:
 Measures = TypeVar("Measures", "MachineMeasures", "Later")
 
 
-def joined(parts: Sequence[Measures]) -> Measures:
+def concatenate_chunks(parts: Sequence[Measures]) -> Measures:
     """Chunks of runs, one after the other."""
     names = [field.name for field in fields(parts[0])]
     return type(parts[0])(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
-def measured(recorded: Recorded, corner: float, within: float) -> MachineMeasures:
+def measure_chunk(recorded: Recorded, corner: float, within: float) -> MachineMeasures:
     """The measures of a chunk of runs whose reference stands from `corner` [s] on; in position is `within` [m]. What
     the drive logs counts for the peaks, what really moves for the rest."""
     time, reference = recorded.time, recorded.logged["reference"]

@@ -19,10 +19,10 @@ from friso.studies.compare.measures import (
     Later,
     LoopRobustness,
     MachineMeasures,
+    concatenate_chunks,
     followed,
-    joined,
     linear_loops,
-    measured,
+    measure_chunk,
 )
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
@@ -229,15 +229,17 @@ class _Work:
         label, total = f"{option.letter} {option.name}", count * self.options
         self.progress(before * count, total, label)
         for recorded in self._recorded(option, self.task, count, 1):
-            parts.append(measured(recorded, self.corner, self.within))
+            parts.append(measure_chunk(recorded, self.corner, self.within))
             self.progress(before * count + int(recorded.numbers[-1]) + 1, total, label)
-        return joined(parts)
+        return concatenate_chunks(parts)
 
     def longer(self, option: Option) -> Later:
         """An option on the first machines, for longer."""
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
-        return joined([followed(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)])
+        return concatenate_chunks(
+            [followed(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
+        )
 
     def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[Recorded]:
         """The runs of the first machines, chunk by chunk."""

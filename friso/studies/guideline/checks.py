@@ -44,7 +44,7 @@ class Checked:
     failed: int
 
 
-def checked(sweep: Sweep, most: int) -> Checked:
+def simulate_samples(sweep: Sweep, most: int) -> Checked:
     """The first `most` samples that have an edge, which are random ones, simulated."""
     usable = sweep.usable
     samples = usable.take(np.arange(min(most, len(usable.edge))))

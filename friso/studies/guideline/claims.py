@@ -48,9 +48,9 @@ class GuidelineClaim:
     judgement: str
 
 
-def claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
+def judged_claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
     """The claims of the thesis that the edge decides, judged by computed edges, not by the laws."""
-    return _gap(worked), _share(worked), _mass(worked), _stiffness(worked), _stroke(worked), _edges(worked)
+    return _gap(worked), _share_below_limit(worked), _mass(worked), _stiffness(worked), _stroke(worked), _edges(worked)
 
 
 def _gap(worked: Worked) -> GuidelineClaim:
@@ -68,7 +68,7 @@ def _gap(worked: Worked) -> GuidelineClaim:
     )
 
 
-def _share(worked: Worked) -> GuidelineClaim:
+def _share_below_limit(worked: Worked) -> GuidelineClaim:
     cases = worked.studies["share"]
     edges = _computed(cases)
     at = [STUDIED["share"](case.changes) for case in cases]

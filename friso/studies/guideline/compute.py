@@ -16,9 +16,9 @@ from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
-from friso.studies.guideline.checks import Checked, checked
-from friso.studies.guideline.groups import Count, counted, values_of
-from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fitted
+from friso.studies.guideline.checks import Checked, simulate_samples
+from friso.studies.guideline.groups import Count, group_count, values_of
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fit_law
 from friso.studies.guideline.parasitic import ParasiticLimits, parasitic_limits
 from friso.studies.guideline.sweeps import (
     FREE_FIT,
@@ -29,9 +29,9 @@ from friso.studies.guideline.sweeps import (
     STEPS,
     Keep,
     Sweep,
+    concatenate_sweeps,
     free_sweep,
     locked_sweep,
-    together,
 )
 from friso.studies.guideline.thesis_rig import Laws, plain
 from friso.studies.guideline.worked import Worked, friction_range, worked
@@ -72,7 +72,7 @@ class Fit:
     @property
     def sweep(self) -> Sweep:
         """Samples of fit and test."""
-        return together(self.fit, self.test)
+        return concatenate_sweeps(self.fit, self.test)
 
     @property
     def kinds(self) -> Mapping[str, int]:
@@ -171,14 +171,14 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, tally)
     tally.add(0, "laws and simulations")
     few = max(8, int(samples * CHECKED))
-    locked_fit = _locked(rigid, together(rigid_test, beside, beside_test), few)
+    locked_fit = _locked(rigid, concatenate_sweeps(rigid_test, beside, beside_test), few)
     free_fit = _free(free, free_test, locked_fit.law, few)
     tally.add(0, "worked steps")
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(thesis_rig())
     seconds, cores = time.perf_counter() - begin, usable_cores()
-    return Guideline(samples, counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
+    return Guideline(samples, group_counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
 
 
 def checked_samples(samples: int) -> None:
@@ -189,9 +189,13 @@ def checked_samples(samples: int) -> None:
         )
 
 
-def counts() -> dict[str, Count]:
+def group_counts() -> dict[str, Count]:
     """Parameters and groups of the rig rigid, with its joint, and with its parasitic mode as well."""
-    return {"rigid": counted(plain()), "joint": counted(plain("joint")), "parasitic": counted(thesis_rig().flat())}
+    return {
+        "rigid": group_count(plain()),
+        "joint": group_count(plain("joint")),
+        "parasitic": group_count(thesis_rig().flat()),
+    }
 
 
 def _sizes(samples: int) -> dict[str, int]:
@@ -218,15 +222,17 @@ def _compile() -> None:
 
 def _locked(fit: Sweep, test: Sweep, few: int) -> Fit:
     used, held = fit.usable, test.usable
-    law = fitted(LOCKED_LAW, used.values, used.edge)
+    law = fit_law(LOCKED_LAW, used.values, used.edge)
     errors = Errors.between(law.edge(held.values), held.edge)
-    return Fit(law, fit, test, Errors.between(law.edge(used.values), used.edge), errors, errors, checked(test, few))
+    return Fit(
+        law, fit, test, Errors.between(law.edge(used.values), used.edge), errors, errors, simulate_samples(test, few)
+    )
 
 
 def _free(fit: Sweep, test: Sweep, locked: FittedLaw, few: int) -> Fit:
     used, held = fit.usable, test.usable
-    law = fitted(FREE_LAW, used.values, used.edge, used.locked)
+    law = fit_law(FREE_LAW, used.values, used.edge, used.locked)
     from_simulated = Errors.between(law.edge(held.values, held.locked), held.edge)
     combined = Errors.between(law.edge(held.values, locked.edge(held.values)), held.edge)
     on_fit = Errors.between(law.edge(used.values, used.locked), used.edge)
-    return Fit(law, fit, test, on_fit, combined, from_simulated, checked(test, few))
+    return Fit(law, fit, test, on_fit, combined, from_simulated, simulate_samples(test, few))

@@ -183,7 +183,7 @@ class Count:
         return self.parameters - self.rank
 
 
-def parameters_of(flat: Mapping[str, Any]) -> tuple[str, ...]:
+def group_parameters(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The parameters on which the equations of a stage depend, by name; masses that move as one are one."""
     form = structure(flat)
     present = {str(symbol) for symbol in assemble(form).parameters}
@@ -206,9 +206,9 @@ def _powers(unit: str) -> tuple[float, float, float]:
     return mass, length, time
 
 
-def counted(flat: Mapping[str, Any]) -> Count:
+def group_count(flat: Mapping[str, Any]) -> Count:
     """How many groups govern stages of the structure of this one."""
-    names = parameters_of(flat)
+    names = group_parameters(flat)
     matrix = np.stack([dimensions(name, flat) for name in names])
     return Count(len(names), int(np.linalg.matrix_rank(matrix)))
 

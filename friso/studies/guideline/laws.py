@@ -148,7 +148,7 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
 
 
-def fitted(law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
+def fit_law(law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
     """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
@@ -162,7 +162,7 @@ def fitted(law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray |
             break
         path.append(min(scores))
         chosen = (*chosen, remaining[int(np.argmin(scores))])
-    solution = _solved(law, chosen, values, target, offset)
+    solution = _log_coefficients(law, chosen, values, target, offset)
     rates = len(law.rates)
     factors = tuple(float(factor) for factor in np.exp(solution[:rates]))
     return FittedLaw(law, factors, dict(zip(chosen, map(float, solution[rates:]), strict=True)), tuple(path))
@@ -185,13 +185,13 @@ def _validated(
     off = np.empty(len(target))
     for fold in range(FOLDS):
         out, rest = folds == fold, folds != fold
-        solution = _solved(law, chosen, _some(values, rest), target[rest], offset[rest])
+        solution = _log_coefficients(law, chosen, _some(values, rest), target[rest], offset[rest])
         rates = _log_rates(law, chosen, _some(values, out), solution)
         off[out] = law.combine(rates, offset[out])[0] - target[out]
     return loss(off)
 
 
-def _solved(
+def _log_coefficients(
     law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
     """Logarithms of the factors, then the exponents."""

@@ -16,7 +16,7 @@ import friso.hunting.cycle as hunting_cycle
 from friso.hunting import edges as edges_module
 from friso.hunting import persistence
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.edges import ROUNDS, Edges, find_edges, joined
+from friso.hunting.edges import ROUNDS, Edges, concatenate_edges, find_edges
 from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
@@ -92,10 +92,12 @@ class Sweep:
         return self.take(self.edges.located)
 
 
-def together(*sweeps: Sweep) -> Sweep:
+def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
     """The samples of all sweeps of one kind."""
     values = {name: np.concatenate([sweep.values[name] for sweep in sweeps]) for name in sweeps[0].values}
-    return Sweep(values, np.concatenate([sweep.locked for sweep in sweeps]), joined([sweep.edges for sweep in sweeps]))
+    return Sweep(
+        values, np.concatenate([sweep.locked for sweep in sweeps]), concatenate_edges([sweep.edges for sweep in sweeps])
+    )
 
 
 @dataclass(frozen=True)
@@ -141,7 +143,7 @@ def _sources() -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
 
 
-def sampled(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
+def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
     """Sobol samples of a box, by group, each of shape (count,)."""
     points = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(np.array(list(box.values()))).T
@@ -150,7 +152,7 @@ def sampled(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
 
 def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
     """The edges of samples of rigid masses, which locked joints are apart from the contact of their fixtures."""
-    values = sampled(LOCKED_BOX, count, seed)
+    values = sobol_samples(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     edges = _in_parts(f"locked {seed} {count}", values, grid, keep, tally, LOCKED)
     return Sweep(values, edges.crossover, edges)
@@ -159,7 +161,7 @@ def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
 def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
     """The edges of samples with a free joint, of those that have one with the joint locked; and those of all samples
     with their joints locked, to which the frequency of the joint is drawn relative."""
-    drawn_values = sampled({**LOCKED_BOX, **JOINT_BOX}, count, seed)
+    drawn_values = sobol_samples({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, tally, LOCKED)
@@ -182,7 +184,7 @@ def _in_parts(
             keep.part(f"{name} {first}", lambda subset=subset, part=part: find_edges(_stages(subset), grid[part]))
         )
         tally.add(STEPS[label] * len(grid[part]), label)
-    return joined(parts)
+    return concatenate_edges(parts)
 
 
 def _stages(values: Mapping[str, np.ndarray]) -> Callable[[np.ndarray, np.ndarray], Ensemble]:

@@ -12,7 +12,7 @@ from friso.equations.friction.measured import MeasuredFriction
 from friso.errors import InputError
 from friso.frequency.friction import steady_force
 from friso.stage import Stage
-from friso.stage.section import list_fields, nearest, numeric_fields
+from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws
 
 ELEMENTS = 6
@@ -77,7 +77,7 @@ def convertible() -> list[str]:
     return sorted(name for name, law in friction_laws().items() if law.keeping is not FrictionSection.keeping)
 
 
-def measured(flat: Mapping[str, Any]) -> MeasuredFriction:
+def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
     """What measurements would show of the friction of a stage given as flat keys, moving forward. Raises InputError for
     a law that does not declare it."""
     name = flat["friction.model"]
@@ -95,9 +95,9 @@ def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
     can; `elements` side by side, of a law that has several. Raises InputError for a law that cannot be made from
     measurements, and for a stage whose own does not stick."""
     if law not in convertible():
-        near = nearest(law, convertible()) or "gms"
+        near = nearest_name(law, convertible()) or "gms"
         raise InputError("--friction", f'"{law}"', f"one of {', '.join(convertible())}", f"--friction {near}")
-    before = measured(stage.flat())
+    before = measure_friction(stage.flat())
     if not before.stiffness and law != stage.flat()["friction.model"]:
         actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
@@ -113,12 +113,12 @@ def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
 def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConversion:
     """A stage `made` from another, whose friction was measured `before`."""
     flat = made.flat()
-    after, law = measured(flat), friction_law(flat["friction.model"])
+    after, law = measure_friction(flat), friction_law(flat["friction.model"])
     items = (
         _curve(source, made, before),
         _number("static", "N", before.levels.static, after.levels.static),
         _number("stiffness", "N/m", before.stiffness, after.stiffness),
-        _virgin(before, after),
+        _virgin_change(before, after),
         _number("damping", "N*s/m", before.damping, after.damping),
         _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
@@ -164,7 +164,7 @@ WITHIN = 0.02
 """Share of static friction by which a virgin curve may be off and still be the same in a measurement."""
 
 
-def _virgin(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
+def _virgin_change(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
     """The virgin curve, where the two are farthest apart."""
     if not after.stiffness:
         return MeasuredChange("virgin", "N", before.levels.static, 0.0, 1.0, WITHIN)

@@ -16,7 +16,15 @@ from friso.hunting.verdict import BANDWIDTHS
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.tables import friction_law
-from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, convert, convertible, measured
+from friso.studies.laws.conversion import (
+    ELEMENTS,
+    LawConversion,
+    Shown,
+    compared,
+    convert,
+    convertible,
+    measure_friction,
+)
 
 NEEDED: frozenset[Shown] = frozenset(("curve", "static", "stiffness", "viscous"))
 """What a law has to keep to be tried."""
@@ -172,7 +180,7 @@ def verdicts_by_law(
 def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[Shown, ...]]]:
     """The stage as it is, and under the other laws that keep what is measured of it; and what the others lose."""
     own = stage.flat()["friction.model"]
-    kept = [compared(stage, stage, measured(stage.flat()))]
+    kept = [compared(stage, stage, measure_friction(stage.flat()))]
     left_out: dict[str, tuple[Shown, ...]] = {}
     for law in convertible():
         if law == own:

@@ -71,7 +71,7 @@ def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
     return signal / signal.std()
 
 
-def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
+def estimate_plant(logs: Sequence[RigLog]) -> FrequencyResponse:
     """From the commanded force to the position, of realisations: the indirect estimate. Raises InputError for a loop
     that was not stable."""
     for log in logs:

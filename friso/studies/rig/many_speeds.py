@@ -81,7 +81,7 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     logs, places = many_speeds_logs(stage, seed), []
     for log, begin in zip(logs, _begins(stage), strict=True):
         velocity = friction_velocity(log.log, moving_mass(stage.flat()))
-        low, *_, high = speeds_of(log.stage)
+        low, *_, high = controller_speeds(log.stage)
         speeds = np.geomspace(low, high, CURVE)
         ends = velocity.places if len(velocity.velocities) else (begin, begin + SHARED * longest_travel(stage))
         drag = log.stage.flat().get("cable.drag", 0.0)
@@ -118,7 +118,7 @@ def _begins(stage: Stage) -> np.ndarray:
     return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
 
 
-def speeds_of(stage: Stage) -> np.ndarray:
+def controller_speeds(stage: Stage) -> np.ndarray:
     """The speeds [m/s], shape (`SPEEDS`,), of a stage with its controller made faster."""
     top = longest_travel(stage) * pace(stage) / SHORTEST
     return np.geomspace(top / RATIO, top, SPEEDS)
@@ -128,7 +128,7 @@ def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> R
     """The passes over the stretch that begins at a place [m], ever faster."""
     period, shared = 1 / pace(stage), SHARED * longest_travel(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
-    for speed in speeds_of(stage):
+    for speed in controller_speeds(stage):
         run_up = max(0.0, speed * SHORTEST * period - shared) / 2
         for span in (shared + run_up + before, -(shared + 2 * run_up)):
             parts += [(float(np.sign(span) * speed), abs(span) / speed), (0.0, STANDS * period)]

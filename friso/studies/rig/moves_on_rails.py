@@ -15,7 +15,7 @@ from friso.errors import InputError
 from friso.hunting.criteria.peak_count import peaks_in_traces
 from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, outcomes
 from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
-from friso.hunting.turns import scan
+from friso.hunting.turns import scan_turning_points
 from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -168,14 +168,14 @@ def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[st
     return recorded
 
 
-def joined(parts: list[RailRuns]) -> RailRuns:
+def concatenate_runs(parts: list[RailRuns]) -> RailRuns:
     """What became of several lots of runs, one after the other."""
     return RailRuns(
         **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(RailRuns)}
     )
 
 
-def follow(
+def run_moves(
     stage: Stage,
     task: MoveTask,
     seeds: Sequence[int],
@@ -189,7 +189,7 @@ def follow(
     for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
         parts.append(rail_runs(chunk))
         progress(int(chunk.numbers[-1]) + 1, len(seeds), label)
-    return joined(parts)
+    return concatenate_runs(parts)
 
 
 def rail_runs(recorded: Recorded) -> RailRuns:
@@ -204,7 +204,7 @@ def rail_runs(recorded: Recorded) -> RailRuns:
         times[row, : len(at)], values[row, : len(at)] = at, value
     swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (WINDOW, HALF))
     ended = np.full(len(turns), time[-1])
-    ending = scan(times, values, counts, swing, ended)
+    ending = scan_turning_points(times, values, counts, swing, ended)
     end = End(~failed, swing, earlier, ending.period, ending.turned, last_outside(time, deviation, BAND), ended)
     shapes = [cycle_shape(*turn, size, time[-1]) for turn, size in zip(turns, swing, strict=True)]
     valid = np.where(failed, np.nan, 1.0)

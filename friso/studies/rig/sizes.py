@@ -46,7 +46,7 @@ def freed(stage: Stage) -> Stage:
     return stage.with_numbers({"joint.stroke": WIDE * stroke}).replace({"joint.locked": False})
 
 
-def locked(stage: Stage) -> Stage:
+def locked_stage(stage: Stage) -> Stage:
     """The stage with its joint held. Raises InputError where it has none."""
     return jointed(stage).replace({"joint.locked": True})
 

@@ -14,11 +14,11 @@ import numpy as np
 from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.rail import friction_factors
 from friso.identification.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
-from friso.identification.readings.at_bearing import between
+from friso.identification.readings.at_bearing import machine_between
 from friso.identification.readings.passes import passes
 from friso.stage import Stage
 from friso.stage.transmission import moving_mass
-from friso.studies.rig.many_speeds import speeds_of
+from friso.studies.rig.many_speeds import controller_speeds
 from friso.studies.rig.outcome import RigLog, rig_log
 from friso.studies.rig.sizes import interval, pace, travel
 from friso.virtual_rig.run import as_built_keys, run
@@ -75,7 +75,7 @@ def _has_falling_bristles(stage: Stage) -> bool:
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:
     """Speeds [m/s] at the edge of what was steady; where all were, some from the least on."""
-    speeds = speeds_of(passed[0].stage)
+    speeds = controller_speeds(passed[0].stage)
     unsteady = {
         int(np.argmin(np.abs(np.log(speeds / abs(stretch.velocity)))))
         for log in passed
@@ -94,7 +94,7 @@ def _analysed(log: RigLog) -> SlowSliding:
     stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
     mass, exponent = moving_mass(log.stage.flat()), flat["friction.stribeck_exponent"]
     bristles = MassOnBristles((mass, 0.0), (stiffness, 0.0), (damping, 0.0), exponent)
-    return stribeck_from_slow_sliding(log.log, between(flat), bristles)
+    return stribeck_from_slow_sliding(log.log, machine_between(flat), bristles)
 
 
 def _true(log: RigLog) -> np.ndarray:

@@ -28,18 +28,18 @@ from friso.studies.rig.experiments.measured_cycles import MOTORS, on_rail, start
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover, stroke_crossover
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
+    concatenate_runs,
     crossover,
     distance,
-    follow,
-    joined,
     move,
     numbers_of,
     on_rails,
     released,
+    run_moves,
     with_joint,
 )
 from friso.studies.rig.outcome import rig_log
-from friso.studies.rig.sizes import freed, locked, pace, travel
+from friso.studies.rig.sizes import freed, locked_stage, pace, travel
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(
     {
@@ -102,36 +102,36 @@ class CyclesOnRails:
     weak: RailRuns
 
 
-def as_built(stage: Stage) -> Stage:
+def rig_with_drive(stage: Stage) -> Stage:
     """The rig with its drive."""
     return stage.replace(dict(AS_BUILT))
 
 
 def moves(stage: Stage) -> MovesOnRails:
     """The moves of Fig. 24 and 25, on several rails."""
-    machine = as_built(stage)
+    machine = rig_with_drive(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
     seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
     keys = CROSSOVER
-    held = follow(
+    held = run_moves(
         locked, move(machine), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(machine, {keys: frequencies}, seeds)
     )
     first, second = (on_rails(machine, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
-    loose = follow(free, move(machine), numbers_of(SEED, 1, RAILS), first)
+    loose = run_moves(free, move(machine), numbers_of(SEED, 1, RAILS), first)
     tasks = [released(machine, share * distance(machine)) for share in DISPLACEMENTS]
-    let_go = joined([follow(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
+    let_go = concatenate_runs([run_moves(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
     return MovesOnRails(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
 
 
 def grid(stage: Stage) -> StrokeCrossover:
     """Fig. 26: a small grid on a few rails."""
     seeds = 1.0 + np.arange(float(GRID_RAILS))
-    return stroke_crossover(with_joint(as_built(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
+    return stroke_crossover(with_joint(rig_with_drive(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
 
 
 def cycles(stage: Stage) -> CyclesOnRails:
     """Fig. 27: an even rail and rails that vary, the joint locked."""
-    machine = as_built(stage)
+    machine = rig_with_drive(stage)
     even = on_rail(with_joint(machine, locked=True))
     run = started(even, SEED, {}, 1, silent, "")
     swing = float(run.swing[0]) if run.swings[0] else 0.01 * distance(machine)
@@ -150,7 +150,7 @@ _FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")
 
 def standstill(stage: Stage) -> InPosition:
     """Fig. 28."""
-    return in_position(as_built(stage), SEED, silent)[0]
+    return in_position(rig_with_drive(stage), SEED, silent)[0]
 
 
 @dataclass(frozen=True)
@@ -167,8 +167,8 @@ class RigLoops:
 
 def rig_loops(stage: Stage) -> RigLoops:
     """The loops of a rig with its drive as built."""
-    built = as_built(stage)
-    fixed, free, place = locked(built), freed(built), travel(built)[0]
+    built = rig_with_drive(stage)
+    fixed, free, place = locked_stage(built), freed(built), travel(built)[0]
     log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)
     settings, stable = stable_settings(free, place, SEED)
     apparent = np.array([apparent_masses(machine, place, SEED) for machine in (fixed, free)])

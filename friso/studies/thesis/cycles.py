@@ -59,7 +59,7 @@ class CyclesOnMap:
     comparison: PeaksAgainstCycles
 
 
-def cycles(study: ThesisStudy, runs: xr.Dataset) -> CyclesOnMap:
+def map_cycles(study: ThesisStudy, runs: xr.Dataset) -> CyclesOnMap:
     """The hunting cycles over a map of the thesis, from the study and its runs."""
     return CyclesOnMap(_edges(study, runs), _comparison(runs))
 

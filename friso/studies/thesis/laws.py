@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING
 
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, measured
+from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, measure_friction
 from friso.studies.laws.verdicts import kept_laws
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
 from friso.studies.thesis.linear import analysed
-from friso.studies.thesis.reproduce import RESPONSES, Reproduction, maps_of, response_of
+from friso.studies.thesis.reproduce import RESPONSES, Reproduction, maps_of, run_response
 from friso.studies.thesis.studies import STUDIES, thesis_rig
 
 if TYPE_CHECKING:
@@ -82,7 +82,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
         progress(number, len(converted), conversion.law)
         changes = {"friction": conversion.stage.as_written()["friction"]}
         maps = maps_of(studies, reproduction.points, reproduction.rtol, changes=changes)
-        responses = {name: response_of(of_run, changes, reproduction.rtol) for name, of_run in RESPONSES.items()}
+        responses = {name: run_response(of_run, changes, reproduction.rtol) for name, of_run in RESPONSES.items()}
         evidences[conversion.law] = _evidence(maps, responses, rig.replace(changes))
     progress(len(converted), len(converted), "laws")
     findings = {
@@ -110,4 +110,4 @@ def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:
     if not same:
         return conversion
     far = {key: high for key, (_, high) in conversion.open.items()}
-    return compared(rig, conversion.stage.with_numbers(far), measured(rig.flat()))
+    return compared(rig, conversion.stage.with_numbers(far), measure_friction(rig.flat()))

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def verdict_table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Coordinates of rows and columns [SI], whether runs keep moving, by their criterion (its attribute: the thesis's
     count, or the end of the run), and valid, both booleans of shape (rows, columns)."""
     moving, outcome = (runs[name].transpose(rows, columns).values for name in ("keeps_moving", "outcome"))
@@ -22,7 +22,7 @@ def table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.nda
     return runs[rows].values, runs[columns].values, moving & valid, valid
 
 
-def counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
+def peak_counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
     """Counts of distinct peaks, shape (rows, columns)."""
     return runs["distinct_peaks"].transpose(rows, columns).values
 
@@ -66,11 +66,11 @@ def free_square(moving: np.ndarray, valid: np.ndarray) -> float:
     return float(side.max(initial=0) ** 2 / max(1, valid.sum()))
 
 
-def share(part: np.ndarray, total: np.ndarray) -> float:
+def overlap(part: np.ndarray, total: np.ndarray) -> float:
     """Share of the cells of `total` that are in `part` too; NaN of an empty whole."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 
 def share_text(moving: np.ndarray, cells: np.ndarray) -> str:
     """The same share in words."""
-    return f"{percent(share(moving, cells))}" if cells.any() else "none"
+    return f"{percent(overlap(moving, cells))}" if cells.any() else "none"

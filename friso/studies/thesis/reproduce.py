@@ -16,7 +16,7 @@ from friso.hunting.criteria.run_outcome import CREEPS, CRITERION, RESTS, SWINGS
 from friso.progress import Progress, Tally, silent
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
-from friso.studies.thesis.cycles import CyclesOnMap, cycles
+from friso.studies.thesis.cycles import CyclesOnMap, map_cycles
 from friso.studies.thesis.experiments import EXPERIMENTS, experiment, experiments_on
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS, Linear, analysed
@@ -91,7 +91,7 @@ def reproduce(
     variants = (*OPEN, *METHOD)
     tally = Tally(progress, 2 + len(variants) + (len(studies) if with_cycles else 0))
     tally.add(0, "maps")
-    responses = {name: response_of(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
+    responses = {name: run_response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
     maps = maps_of(studies, points, rtol, VERIFIED)
     baseline = Evidence(maps, responses, analysed(thesis_rig()), experiments_on(thesis_rig()))
     tally.add(1, "Fig. 14B at two tolerances")
@@ -109,7 +109,7 @@ def reproduce(
     behind: dict[str, CyclesOnMap] = {}
     for study in studies if with_cycles else ():
         tally.add(1, f"hunting cycles, {study.name}")
-        behind[study.name] = cycles(study, baseline.maps[study.name])
+        behind[study.name] = map_cycles(study, baseline.maps[study.name])
     tally.add(1, "done")
     verdicts, curves = _verdicts(entries, baseline, varied), bode(thesis_rig(), SHOWN, series=True)
     results = (baseline.maps, baseline.responses, baseline.analysis, curves)
@@ -157,7 +157,7 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     tolerance = variant.rtol or rtol
     touched = [study for study in studies if variant.touches(study)]
     maps = {**plain.maps, **maps_of(touched, points, tolerance, changes=variant.changes)}
-    responses = {name: response_of(changes, variant.changes, tolerance) for name, changes in RESPONSES.items()}
+    responses = {name: run_response(changes, variant.changes, tolerance) for name, changes in RESPONSES.items()}
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(response.cell), response.trace) for name, response in responses.items()}
@@ -183,17 +183,17 @@ def _map(
     study: ThesisStudy, changes: Mapping[str, object], points: int, rtol: float, verify: float = 0.0
 ) -> xr.Dataset:
     runs = sweep(study.stage(changes), study.axes(points), links=dict(study.links), rtol=rtol, verify=verify)
-    return counted(runs)
+    return by_peak_count(runs)
 
 
-def response_of(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
+def run_response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
     """One run in time; a variant's changes come before the run's own, which distinguish it from the others."""
     stage = thesis_rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
-    return Response(counted(cell), simulate(stage, rtol))
+    return Response(by_peak_count(cell), simulate(stage, rtol))
 
 
-def counted(runs: xr.Dataset) -> xr.Dataset:
+def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
     """The runs with `keeps_moving` by the thesis's metric: whether distinct peaks are counted."""
     return runs.assign(keeps_moving=(runs["distinct_peaks"] > 0).assign_attrs(criterion=DISTINCT_CRITERION))
 

@@ -17,13 +17,13 @@ from friso.studies.boundary_lines import (
     Change,
     Line,
     Shape,
-    changes_of,
     corner_verdicts,
     end_verdicts,
+    followed_changes,
     lines,
     lost_places,
     place_verdicts,
-    turns_of,
+    stability_changes,
 )
 from friso.views.drawing.figure import Array
 from friso.views.drawing.prefixes import listed, plus_minus, pretty, with_unit
@@ -140,11 +140,11 @@ def _course(line: Line, keys: tuple[ShownKey, ...]) -> str:
 
 def _edges(traced: Diagram, key: ShownKey) -> str:
     """Where hunting begins and ends over the range, and how finely that was looked for."""
-    changes, verdicts = changes_of(traced), place_verdicts(traced)
+    changes, verdicts = stability_changes(traced), place_verdicts(traced)
     values_tried = f"{len(verdicts)} values were tried"
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
     at = {change.low for change in changes}
-    others = sorted({value for value, _ in turns_of(traced)} - at)
+    others = sorted({value for value, _ in followed_changes(traced)} - at)
     also = [f"Cycles also begin or stop attracting at {listed([key.text(value) for value in others], 'and')}."]
     answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
     if changes:

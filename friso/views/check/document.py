@@ -159,13 +159,13 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "count": draws.sample.count,
         "seed": draws.seed,
         "left_out": draws.sample.left_out,
-        "hunts": _share(fates.share(("hunts",))),
-        "attracting_cycle": _share(fates.share(ATTRACTED)),
+        "hunts": _share_document(fates.share(("hunts",))),
+        "attracting_cycle": _share_document(fates.share(ATTRACTED)),
         "criterion": CRITERION,
         "verdicts": fates.counts,
         "separation": fates.separations(draws.sample.keys),
     }
 
 
-def _share(share: Share) -> dict[str, float]:
+def _share_document(share: Share) -> dict[str, float]:
     return {"probability": share.probability, "low": share.low, "high": share.high}

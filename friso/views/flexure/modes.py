@@ -68,8 +68,8 @@ def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
     size = float(np.max(high - low))
     gain = LARGE * size / largest
     colour, label = (VERMILLION, "seen by actuator and sensor") if visible else (BLUE, "not seen by both")
-    rest = _joined([shape.rest[:, axes] for shape in shapes])
-    moved = _joined([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
+    rest = _polyline([shape.rest[:, axes] for shape in shapes])
+    moved = _polyline([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
     lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
     x, y = _limits(low - LARGE * size * 1.1, high + LARGE * size * 1.1)
     title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')}"
@@ -165,7 +165,7 @@ def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> l
     return shapes
 
 
-def _joined(lines: list[Array]) -> tuple[Array, Array]:
+def _polyline(lines: list[Array]) -> tuple[Array, Array]:
     """All lines as one, with gaps between them, shapes (n,)."""
     gap = np.full((1, 2), np.nan)
     points = np.concatenate([part for line in lines for part in (line, gap)])

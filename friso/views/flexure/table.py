@@ -37,7 +37,7 @@ def megapascals(value: float) -> str:
     return f"{_plain(value / 1e6)} MPa" if math.isfinite(value) else UNKNOWN
 
 
-def factor(value: float) -> str:
+def margin_factor(value: float) -> str:
     """A margin as a factor."""
     return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
 
@@ -77,9 +77,9 @@ _BORNE: dict[str, Callable[[Evaluation], str]] = {
     "Largest stress at full stroke": lambda evaluation: megapascals(evaluation.stress),
     "Concentration factor at the clamp": lambda evaluation: f"{evaluation.mechanism.stress_concentration:g}",
     "Stress at the clamp": lambda evaluation: megapascals(evaluation.clamp_stress),
-    "Margin to yield": lambda evaluation: factor(evaluation.yield_margin),
-    "Margin to fatigue": lambda evaluation: factor(evaluation.fatigue_margin),
+    "Margin to yield": lambda evaluation: margin_factor(evaluation.yield_margin),
+    "Margin to fatigue": lambda evaluation: margin_factor(evaluation.fatigue_margin),
     "Shortening at full stroke": lambda evaluation: with_unit(evaluation.shortening, "m"),
     "Buckling load": lambda evaluation: with_unit(evaluation.buckling, "N"),
-    "Buckling load over the load": lambda evaluation: factor(evaluation.buckling_margin),
+    "Buckling load over the load": lambda evaluation: margin_factor(evaluation.buckling_margin),
 }

@@ -7,7 +7,7 @@ from typing import Any
 
 from friso.hunting.edges import OF
 from friso.studies.guideline import Fit, Guideline
-from friso.studies.guideline.claims import claims
+from friso.studies.guideline.claims import judged_claims
 from friso.studies.guideline.laws import FittedLaw
 from friso.studies.guideline.thesis_rig import ThesisCase
 from friso.studies.guideline.worked import WorkedDesign
@@ -41,7 +41,7 @@ def guideline_document(guideline: Guideline) -> dict[str, Any]:
                 "studies": {name: [_case(case) for case in cases] for name, cases in steps.studies.items()},
             },
             "parasitic": [asdict(item) for item in guideline.parasitic],
-            "claims": [asdict(claim) for claim in claims(steps)],
+            "claims": [asdict(claim) for claim in judged_claims(steps)],
         }
     )
 

@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from friso.evidence import entries, value
+from friso.evidence import findings_on_file, value
 from friso.frequency.crossover import WANTED
 from friso.hunting.edges import KINDS, ROUNDS, STEP
 from friso.hunting.persistence import DISTANCES
 from friso.quantities import percent
 from friso.studies.guideline import Guideline
 from friso.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
-from friso.studies.guideline.claims import claims
+from friso.studies.guideline.claims import judged_claims
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors
 from friso.studies.guideline.parasitic import DRIVE
@@ -78,12 +78,12 @@ def guideline_page(guideline: Guideline) -> str:
         formulas=formulas(guideline),
         groups=group_rows(guideline),
         figures={figure.name: figure for figure in guideline_figures(guideline)},
-        claims=claims(guideline.worked),
+        claims=judged_claims(guideline.worked),
         parasitic=guideline.parasitic,
         parasitic_words=parasitic_sentences(guideline.parasitic),
         parasitic_edges=parasitic_edges(guideline.worked.studies["parasitic"]),
         rough_minutes=value("guideline.minutes", "rough"),
-        rough_day=entries()["guideline.minutes"].day,
+        rough_day=findings_on_file()["guideline.minutes"].day,
         drive=DRIVE,
         kinds=KINDS,
         errors_of=_errors(guideline),

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.axis import axis_shown, unit_shown
 from friso.identification.estimate import Estimate
-from friso.identification.stage_file import written
+from friso.identification.stage_file import estimate_text
 
 
 def ends_document(estimate: Estimate) -> dict[str, Any]:
@@ -31,5 +31,5 @@ def key_document(estimate: Estimate) -> dict[str, Any]:
     """An estimate of a key of the stage file, with the text that stands there."""
     document = estimate_document(estimate)
     stands = np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low
-    text = written(replace(estimate, unit=unit_shown(estimate.unit))) if stands else None
+    text = estimate_text(replace(estimate, unit=unit_shown(estimate.unit))) if stands else None
     return {"key": document.pop("name"), **document, "written": text}

@@ -18,8 +18,8 @@ def law_sentence(comparison: LawComparison) -> str:
     best, supported = comparison.predictions[0], comparison.supported
     if not supported:
         return (
-            f"None of the laws predicts the record: {best.law}, the best, is off by {_share(best)} of the friction "
-            "where it was not fitted."
+            f"None of the laws predicts the record: {best.law}, the best, is off by {_error_share(best)} of the "
+            "friction where it was not fitted."
         )
     names = _listed(supported)
     if len(supported) == len(comparison.predictions):
@@ -71,17 +71,17 @@ def laws_document(comparison: LawComparison) -> dict[str, Any]:
     }
 
 
-def _share(prediction: LawPrediction) -> str:
+def _error_share(prediction: LawPrediction) -> str:
     return percent(prediction.error)
 
 
 def _listed(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
-    return ", ".join(f"{law.law} (off by {_share(law)})" for law in laws)
+    return ", ".join(f"{law.law} (off by {_error_share(law)})" for law in laws)
 
 
 def _fact(prediction: LawPrediction) -> str:
     low, high = percent(prediction.errors.min()), percent(prediction.errors.max())
-    return f"off by {_share(prediction)} ({low} to {high}); {_keys(prediction.fit.keys)}"
+    return f"off by {_error_share(prediction)} ({low} to {high}); {_keys(prediction.fit.keys)}"
 
 
 def _keys(keys: Mapping[str, float]) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.views.documents import plain_json
 from friso.views.map.findings import headline, unstable_loop
-from friso.views.map.words import counts, word_counts
+from friso.views.map.words import text_counts, word_counts
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -37,7 +37,7 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         "conclusion": " ".join([*unstable_loop(study.stage), headline(runs, metric)]),
         "outcomes": word_counts(runs, "outcome"),
         "verdicts": word_counts(runs, "verdict") or None,
-        "attractors": counts(runs, "attractor") or None,
+        "attractors": text_counts(runs, "attractor") or None,
         "criteria": criteria,
         "verified": verified or None,
     }

@@ -19,11 +19,11 @@ from friso.views.map.words import (
     INVALID,
     KINDS,
     NOT_RUN,
-    counts,
     failures,
     grouped,
     in_sentence,
     tally,
+    text_counts,
     word_counts,
 )
 
@@ -82,10 +82,10 @@ def headline(runs: xr.Dataset, metric: str) -> str:
     measures of what attracts: has a swing that attracts), and where: the ranges of the axes outside of which no cell
     does. Empty where the runs do not say."""
     if metric == "verdict" and metric in runs:
-        bistable = [_BISTABLE] if counts(runs, "verdict").get("bistable") else []
+        bistable = [_BISTABLE] if text_counts(runs, "verdict").get("bistable") else []
         return " ".join(_answer(runs, question) for question in [_HUNTS, *bistable])
     if metric in CYCLE_UNITS and "attractor" in runs:
-        unknown = counts(runs, "attractor").get(UNKNOWN, 0)
+        unknown = text_counts(runs, "attractor").get(UNKNOWN, 0)
         doubt = f"In {grouped(unknown)} of the cells it is not certain what attracts." if unknown else ""
         return " ".join(filter(None, (_answer(runs, _ATTRACTS), doubt)))
     if metric in PEAKS and metric in runs:
@@ -95,7 +95,7 @@ def headline(runs: xr.Dataset, metric: str) -> str:
 
 def _creeping(runs: xr.Dataset) -> list[str]:
     """What it means that runs creep: the next breakaway may come after their end."""
-    creeping = counts(runs, "outcome").get(CREEPS, 0)
+    creeping = text_counts(runs, "outcome").get(CREEPS, 0)
     if not creeping:
         return []
     where = f"in {_percent(creeping, runs['outcome'].size)} of the map"
@@ -220,7 +220,7 @@ def caveats(runs: xr.Dataset, metric: str) -> list[str]:
 
 def _extent(runs: xr.Dataset) -> str:
     cells = int(np.prod(list(runs.sizes.values())))
-    status = counts(runs, "status")
+    status = text_counts(runs, "status")
     inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
     words = word_counts(runs, "outcome")
     idle = sum(words.get(kind.label, 0) for kind in (INVALID, NOT_RUN))

@@ -149,7 +149,7 @@ def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
     return codes.reshape(values.shape), [str(word) for word in words]
 
 
-def counts(runs: xr.Dataset, name: str) -> dict[str, int]:
+def text_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """How many cells have each text of a variable, the most frequent first; none where there is no such variable."""
     if name not in runs:
         return {}
@@ -166,14 +166,14 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
     """How many cells have no result, by the reason in their status."""
     return {
         reason: number
-        for reason, number in counts(runs, "status").items()
+        for reason, number in text_counts(runs, "status").items()
         if reason != "done" and not reason.startswith("inferred")
     }
 
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """How many cells have each word of the variable `name`, in the order of the legend; none without that variable."""
-    cells = {word_kind(name, word): number for word, number in counts(runs, name).items()}
+    cells = {word_kind(name, word): number for word, number in text_counts(runs, name).items()}
     return {kind.label: cells[kind] for kind in in_order(cells)}
 
 

@@ -33,7 +33,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
                 "distance": goal.distance,
                 "share": goal.share,
             },
-            "as_is": _measured(tuning.present, tuning) | {"verdict": tuning.case.verdict},
+            "as_is": _performance(tuning.present, tuning) | {"verdict": tuning.case.verdict},
             "ways": {outcome.remedy.name: _remedy(outcome, tuning) for outcome in tuning.outcomes},
             "edge_moved_by_1_percent": dict(tuning.sensitivities.ranked()) if tuning.sensitivities else {},
             "relaxed": [
@@ -61,11 +61,11 @@ def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
         "certain": outcome.case.judgement.hunting.certain,
         "edge_factor": None if edge is None else edge.factor,
         "windows": [asdict(window) for window in outcome.windows],
-        **_measured(outcome.measured, tuning),
+        **_performance(outcome.measured, tuning),
     }
 
 
-def _measured(measured: Performance, tuning: Advice) -> dict[str, Any]:
+def _performance(measured: Performance, tuning: Advice) -> dict[str, Any]:
     goal = tuning.goal
     return {
         "meets_goal": asdict(measured.share(goal)),

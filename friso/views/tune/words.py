@@ -14,7 +14,7 @@ from friso.remedies.goal import Goal
 from friso.remedies.method import Advice
 from friso.remedies.relax import RelaxedGoal
 from friso.remedies.search import TriedPoints
-from friso.remedies.variables import BANDWIDTH, crossover
+from friso.remedies.variables import BANDWIDTH, loop_bandwidth
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
@@ -238,7 +238,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
 def _edges(tuning: Advice) -> str:
     """Where hunting ends in bandwidth, and up to where there is margin."""
     edge, comfortable = tuning.case.judgement.margin, tuning.limits.highest_comfortable
-    present = crossover(tuning.stage)
+    present = loop_bandwidth(tuning.stage)
     parts = []
     if edge is not None:
         ends, needed = (with_unit(factor * edge.quiet * present, "Hz") for factor in (1.0, tuning.goal.distance))
@@ -282,7 +282,7 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
     name, low, high = window.name, window.low, window.high
     unit = ""
     if window.name == BANDWIDTH:
-        present = crossover(outcome.remedy.stage)
+        present = loop_bandwidth(outcome.remedy.stage)
         low, high, unit = low * present, high * present, "Hz"
     else:
         keys = outcome.remedy.stage.numeric_keys()

@@ -11,9 +11,9 @@ from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
 from friso.identification.logs.libraries import content_by
-from friso.identification.logs.measured_response import MeasuredResponse, checked, response_unit
+from friso.identification.logs.measured_response import MeasuredResponse, check_response, response_unit
 from friso.identification.logs.text import unique
-from friso.identification.logs.units import factor
+from friso.identification.logs.units import unit_factor
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
 """Function types of record 6."""
@@ -78,7 +78,7 @@ def _unit(data: dict[str, Any]) -> str:
 
 def _seconds(data: dict[str, Any]) -> np.ndarray:
     """The instants; in seconds unless their label states another unit of time."""
-    return _axis(data) * (factor(label(data, "abscissa_axis_units_lab"), "s") or 1.0)
+    return _axis(data) * (unit_factor(label(data, "abscissa_axis_units_lab"), "s") or 1.0)
 
 
 def _axis(data: dict[str, Any]) -> np.ndarray:
@@ -111,7 +111,7 @@ def read_response_uff(path: Path) -> MeasuredResponse:
     read = ("format: UFF, dataset 58", f"frequency response {unit_in_words}", f"{frequency.size} frequencies")
     response = np.asarray(data["data"], dtype=complex) * scale
     name = label(data, "id1") or path.stem
-    return checked(MeasuredResponse(frequency, response, coherence, name, read, unit), path)
+    return check_response(MeasuredResponse(frequency, response, coherence, name, read, unit), path)
 
 
 def _holds_response(path: Path) -> bool:

@@ -16,7 +16,7 @@ from friso.stage import Stage
 from friso.stage.transmission import moving_mass
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log, stopped
-from friso.studies.rig.sizes import freed, interval, locked, longest_travel, pace, travel
+from friso.studies.rig.sizes import freed, interval, locked_stage, longest_travel, pace, travel
 from friso.studies.rig.slow_sliding import Slow, slow_sliding
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import legs
@@ -52,19 +52,21 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """Passes at two speeds there and back, the joint free and locked; at many, and slow sliding, with it locked. Raises
     InputError for a stage without joint."""
     cases = []
-    for number, (name, machine) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
+    for number, (name, machine) in enumerate((("free", freed(stage)), ("locked", locked_stage(stage)))):
         progress(number, 4, f"constant speed, joint {name}")
         cases.append(_passes(name, machine, seed))
     progress(2, 4, "many speeds, joint locked, faster controller")
-    many = many_speeds(locked(stage), seed)
+    many = many_speeds(locked_stage(stage), seed)
     progress(3, 4, "slow sliding, joint locked")
-    slow = slow_sliding(locked(stage), [place.log for place in many.places], seed)
+    slow = slow_sliding(locked_stage(stage), [place.log for place in many.places], seed)
     progress(4, 4, "")
     logs = tuple(recorded.log for recorded in (*cases, *many.places, *slow))
-    return Outcome("constant-speed", stage, seed, logs, ConstantSpeedResult(speeds(stage), tuple(cases), many, slow))
+    return Outcome(
+        "constant-speed", stage, seed, logs, ConstantSpeedResult(pass_speeds(stage), tuple(cases), many, slow)
+    )
 
 
-def speeds(stage: Stage) -> tuple[float, ...]:
+def pass_speeds(stage: Stage) -> tuple[float, ...]:
     """The speeds [m/s], the slow one first."""
     return tuple(longest_travel(stage) * pace(stage) / periods for periods in DURATIONS)
 
@@ -75,14 +77,14 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
     if not len(cart):
         raise stopped(log)
     place = friction_position(log.log, mass, pace(stage))
-    true = mean_friction(stage, np.array(speeds(stage)), np.linspace(cart.min(), cart.max(), 1000))
+    true = mean_friction(stage, np.array(pass_speeds(stage)), np.linspace(cart.min(), cart.max(), 1000))
     return Passes(name, log, place, friction_velocity(log.log, mass), true)
 
 
 def _passes_log(name: str, stage: Stage, seed: int) -> RigLog:
     """The log of passes there and back at both speeds."""
     period, parts = 1 / pace(stage), [(0.0, STANDS / pace(stage))]
-    for speed, periods in zip(speeds(stage), DURATIONS, strict=True):
+    for speed, periods in zip(pass_speeds(stage), DURATIONS, strict=True):
         for velocity in (speed, -speed):
             parts += [(velocity, periods * period), (0.0, STANDS * period)]
     task = legs(travel(stage)[0], parts)

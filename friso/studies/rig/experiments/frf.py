@@ -15,9 +15,9 @@ from friso.identification.response.mass_line import mass_lines
 from friso.identification.response.response import FrequencyResponse
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.studies.rig.excitation import excite, loop, plant
+from friso.studies.rig.excitation import estimate_plant, excite, loop
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked, pace, quicker, travel
+from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked_stage, pace, quicker, travel
 from friso.virtual_rig.run import run
 from friso.virtual_rig.task import standing
 
@@ -93,7 +93,7 @@ def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
     return float(settings[first - 1]) if first else np.nan
 
 
-def nearest(loop: MeasuredLoop) -> float:
+def crossing_near_target(loop: MeasuredLoop) -> float:
     """The crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
     crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
@@ -101,7 +101,7 @@ def nearest(loop: MeasuredLoop) -> float:
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """All plants and loops, and the stable settings. Raises InputError for a stage without a joint."""
-    fixed, free = locked(jointed(stage)), freed(stage)
+    fixed, free = locked_stage(jointed(stage)), freed(stage)
     places = np.linspace(*travel(stage), PLACES)
     progress(0, 4, f"plant, joint locked, at {PLACES} places")
     held = [plant_log(fixed, f"locked_{n + 1:02d}", place, seed + n) for n, place in enumerate(places)]
@@ -157,22 +157,22 @@ def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
 
 def locked_plant(logs: list[RigLog]) -> Plant:
     """The averaged response, and its lowest mass line."""
-    averaged = plant(logs)
+    averaged = estimate_plant(logs)
     lines = mass_lines(averaged)
     nothing = Estimate.unknown("mass", "kg", "mass line", "the response shows no mass line")
     mass, band = (lines[0].value, (lines[0].low, lines[0].high)) if lines else (nothing, (np.nan, np.nan))
-    return Plant(tuple(plant([log]) for log in logs), averaged, np.nan, mass, band)
+    return Plant(tuple(estimate_plant([log]) for log in logs), averaged, np.nan, mass, band)
 
 
 def free_plant(logs: list[RigLog]) -> Plant:
     """The averaged response; its first mode is where it is the largest against a mass."""
-    averaged, flat = plant(logs), logs[0].stage.flat()
+    averaged, flat = estimate_plant(logs), logs[0].stage.flat()
     above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
     level = np.abs(averaged.accelerations().response)
     low = averaged.frequency < above / BESIDE
     first = float(averaged.frequency[low][np.argmax(level[low])])
     band = (BESIDE * first, above / BESIDE)
-    return Plant(tuple(plant([log]) for log in logs), averaged, first, mass_between(averaged, *band), band)
+    return Plant(tuple(estimate_plant([log]) for log in logs), averaged, first, mass_between(averaged, *band), band)
 
 
 def mass_between(response: FrequencyResponse, low: float, high: float) -> Estimate:
@@ -192,7 +192,7 @@ def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
     recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
     logs = [rig_log(recorded, row, "", None, stage, seed) for row in range(len(ratios))]
     if stage.flat()["joint.locked"]:
-        return np.array([mass_between(plant([log]), 2 * pace(stage), 10 * pace(stage)).value for log in logs])
+        return np.array([mass_between(estimate_plant([log]), 2 * pace(stage), 10 * pace(stage)).value for log in logs])
     return np.array([free_plant([log]).mass.value for log in logs])
 
 

@@ -17,15 +17,15 @@ from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
     at_crossovers,
+    concatenate_runs,
     distance,
-    follow,
-    joined,
     move,
     numbers_of,
     on_rails,
     once,
     rails,
     released,
+    run_moves,
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, rig_log
@@ -112,7 +112,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     moves = {}
     for case, variant in stages.items():
         numbers = numbers_of(seed, len(frequencies), len(seeds))
-        runs = follow(variant, move(stage), numbers, changes, progress, f"moves, joint {case}")
+        runs = run_moves(variant, move(stage), numbers, changes, progress, f"moves, joint {case}")
         moves[case] = runs.shaped(len(frequencies), len(seeds))
     started = _releases(stages["locked"], seed, frequencies, seeds, progress)
     rail = int(np.argmax(moves["locked"].counted[SHOWN[0]]))
@@ -145,8 +145,8 @@ def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarra
     changes = on_rails(stage, at_crossovers(stage, frequencies), seeds)
     numbers = numbers_of(seed, len(frequencies), len(seeds))
     tasks = [released(stage, share * distance(stage)) for share in DISPLACEMENTS]
-    parts = [follow(stage, task, numbers, changes, progress, "releases, joint locked") for task in tasks]
-    return joined(parts).shaped(len(DISPLACEMENTS), len(frequencies), len(seeds))
+    parts = [run_moves(stage, task, numbers, changes, progress, "releases, joint locked") for task in tasks]
+    return concatenate_runs(parts).shaped(len(DISPLACEMENTS), len(frequencies), len(seeds))
 
 
 def _startable(

@@ -23,15 +23,15 @@ from friso.stage import Stage
 from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
+    concatenate_runs,
     crossover,
     distance,
-    follow,
-    joined,
     move,
     numbers_of,
     once,
     rails,
     released,
+    run_moves,
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, rig_log
@@ -187,8 +187,8 @@ def started(
 ) -> RailRuns:
     """What became of machines, shape (count,), at the first start after which each swings on; else after the move."""
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
-    runs = [follow(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
-    all_runs = joined(runs).shaped(len(tasks), count)
+    runs = [run_moves(stage, _longer(task), [seed] * count, changes, progress, label) for task in tasks]
+    all_runs = concatenate_runs(runs).shaped(len(tasks), count)
     first = np.argmax(all_runs.swings, axis=0)
     return RailRuns(
         **{entry.name: getattr(all_runs, entry.name)[first, np.arange(count)] for entry in fields(RailRuns)}
@@ -208,7 +208,7 @@ def varied(
     count = len(next(iter(cases.values())))
     changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     changes["rail.seed"] = np.tile(seeds, count)
-    followed = follow(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, label)
+    followed = run_moves(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, label)
     sides = distance(stage) + np.array([-swing / 2, swing / 2])
     flat, runs = stage.flat(), range(count * len(seeds))
     at = [friction_factors(flat | {key: values[run] for key, values in changes.items()}, sides)[0] for run in runs]

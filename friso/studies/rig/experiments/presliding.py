@@ -12,12 +12,12 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
-from friso.identification.readings.at_bearing import between
+from friso.identification.readings.at_bearing import machine_between
 from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.excitation import Excitation, excite
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import locked, pace, travel
+from friso.studies.rig.sizes import locked_stage, pace, travel
 from friso.virtual_rig.run import as_built_keys
 
 PLACES = 3
@@ -43,14 +43,14 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     if "friction.bristle_stiffness" not in flat:
         actual = f"model = {flat.get('friction.model', 'none')!r}"
         raise InputError("friction.model", actual, "friction with bristles", 'model = "lugre"')
-    held = locked(stage) if stage.joint else stage
+    held = locked_stage(stage) if stage.joint else stage
     places = np.linspace(*travel(stage), PLACES)
     logs = []
     for number, place in enumerate(places):
         progress(number, PLACES, f"place {number + 1} of {PLACES}")
         logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
     progress(PLACES, PLACES, "")
-    contact = between(as_built_keys(stage))
+    contact = machine_between(as_built_keys(stage))
     results = tuple(bristles_from_presliding(log.log, contact) for log in logs)
     true = (flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0))
     return Outcome("presliding", stage, seed, tuple(logs), Bristles(results, *map(float, true)), _notes(stage))

@@ -58,7 +58,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         actual = f"model = {stage.flat().get('friction.model', 'none')!r}"
         raise InputError("friction.model", actual, "friction with a static level", 'model = "lugre"')
     progress(0, 1, f"slow motion on {RAILS} rails")
-    logs = slow_motion(stage, seed)
+    logs = slow_legs(stage, seed)
     progress(1, 1, "")
     flat = freed(stage).flat()
     results = tuple(
@@ -80,7 +80,7 @@ def slow_speed(stage: Stage) -> float:
     return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADS
 
 
-def slow_motion(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
+def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
     """Logs of slow legs there and back, on rails drawn from one seed after the other, all from the same place."""
     free, period, slow = freed(stage), 1 / pace(stage), slow_speed(stage)
     parts = [(0.0, STANDS * period / 4)]

@@ -15,12 +15,12 @@ from friso.studies.rig.moves_on_rails import (
     RailRuns,
     crossover,
     crossover_key,
-    follow,
     move,
     numbers_of,
     on_rails,
     once,
     rails,
+    run_moves,
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, rig_log
@@ -92,7 +92,7 @@ def stroke_crossover(
         crossover_key(stage): np.tile(frequencies, len(sizes)),
     }
     numbers = numbers_of(seed, len(sizes) * len(frequencies), len(seeds))
-    runs = follow(stage, move(stage), numbers, on_rails(stage, cases, seeds), progress, "moves, joint free")
+    runs = run_moves(stage, move(stage), numbers, on_rails(stage, cases, seeds), progress, "moves, joint free")
     return StrokeCrossover(
         sizes, frequencies, seeds, crossover(stage), runs.shaped(len(sizes), len(frequencies), len(seeds))
     )

@@ -7,7 +7,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import ALPHA, BETA
 from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import counts, free_square, share, table, trend, trend_text
+from friso.studies.thesis.maps import free_square, overlap, peak_counts, trend, trend_text, verdict_table
 
 _GAP = 1.0
 """Gap between static and Coulomb friction from which hunting was seen [N] (claim F12A)."""
@@ -17,8 +17,8 @@ _GAP = 1.0
 def gap_makes_hunting(evidence: Evidence) -> Finding:
     """The smallest gap at which runs keep moving, and how the count goes with the gap."""
     axes = ("friction.static", "friction.coulomb")
-    static, coulomb, moving, _ = table(evidence.maps["friction"], *axes)
-    peaks = counts(evidence.maps["friction"], *axes)
+    static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], *axes)
+    peaks = peak_counts(evidence.maps["friction"], *axes)
     gap = static[:, None] - coulomb[None, :]
     smallest = float(gap[moving].min()) if moving.any() else np.nan
     rises = trend(gap[moving], peaks[moving])
@@ -54,8 +54,8 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
 def control_is_no_cure(evidence: Evidence) -> Finding:
     """How the count goes with alpha and beta, and whether either brings all runs to rest."""
     axes = (ALPHA, BETA)
-    alpha, beta, moving, valid = table(evidence.maps["control"], *axes)
-    peaks = counts(evidence.maps["control"], *axes)
+    alpha, beta, moving, valid = verdict_table(evidence.maps["control"], *axes)
+    peaks = peak_counts(evidence.maps["control"], *axes)
     ones = np.ones(moving.shape)
     with_beta = _along(beta[None, :] * ones, peaks, moving)
     with_alpha = _along((alpha[:, None] * ones).T, peaks.T, moving.T)
@@ -79,7 +79,7 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
                 "every alpha and every beta has cells that keep moving, and the largest square at rest covers few "
                 f"cells (at most {percent(FEW)})",
                 free_lines == 0 and square <= FEW,
-                f"{percent(share(moving, valid))} of the cells keep moving; {free_lines} lines and a square of "
+                f"{percent(overlap(moving, valid))} of the cells keep moving; {free_lines} lines and a square of "
                 f"{percent(square, 3)} "
                 "come to rest",
             ),

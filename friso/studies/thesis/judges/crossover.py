@@ -5,7 +5,7 @@ from __future__ import annotations
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, share_text, table
+from friso.studies.thesis.maps import ends, share_text, verdict_table
 from friso.studies.thesis.studies import SOFT, thesis_rig
 
 _AXES = (CROSSOVER, "joint.stroke")
@@ -17,7 +17,7 @@ _SAME = 0.15
 @judges("F16A", figure="16A", needs=("isolator-crossover",))
 def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
     """The crossover below which the isolated rig keeps moving, at each stroke."""
-    crossover, stroke, moving, valid = table(evidence.maps["isolator-crossover"], *_AXES)
+    crossover, stroke, moving, valid = verdict_table(evidence.maps["isolator-crossover"], *_AXES)
     limits = ends(crossover, moving)
     long, longest = stroke >= stroke[-1] / 2, stroke >= 0.75 * stroke[-1]
     third, fourth = limits[long & ~longest].mean(), limits[longest].mean()
@@ -47,7 +47,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
 def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     """The limits of both stiffnesses, stroke by stroke."""
     names = ("isolator-crossover", "isolator-crossover-soft")
-    maps = [table(evidence.maps[name], *_AXES) for name in names]
+    maps = [verdict_table(evidence.maps[name], *_AXES) for name in names]
     stiff, soft = (ends(crossover, moving) for crossover, _, moving, _ in maps)
     stroke = maps[0][1]
     long = stroke >= stroke[-1] / 2

@@ -10,7 +10,7 @@ from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges, number_text
-from friso.studies.thesis.maps import begins, ends, table
+from friso.studies.thesis.maps import begins, ends, verdict_table
 from friso.studies.thesis.studies import thesis_rig
 
 _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
@@ -34,7 +34,7 @@ def rules_of_design(evidence: Evidence) -> Finding:
 
 def _soft(evidence: Evidence) -> Part:
     """Whether a joint that is softer than one that does, does too."""
-    stiffness, stroke, moving, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    stiffness, stroke, moving, _ = verdict_table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
     enough = stroke >= _STROKE
     softest = ~moving[0, enough]
     limit = begins(stiffness, moving)[enough]
@@ -92,7 +92,7 @@ def _far() -> Part:
 
 def _stroke(evidence: Evidence) -> Part:
     """The stroke beyond which nothing keeps moving at 8 Hz."""
-    stiffness, stroke, moving, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    stiffness, stroke, moving, _ = verdict_table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
     needed = float(ends(stroke, moving[nearest][:, None])[0])
     return Part(
@@ -106,7 +106,7 @@ def _stroke(evidence: Evidence) -> Part:
 
 
 def _gap(evidence: Evidence) -> Part:
-    static, coulomb, moving, _ = table(evidence.maps["friction"], "friction.static", "friction.coulomb")
+    static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], "friction.static", "friction.coulomb")
     gap = static[:, None] - coulomb[None, :]
     smallest = float(gap[moving].min()) if moving.any() else np.nan
     return Part(
@@ -131,9 +131,9 @@ def _locked_edge() -> str:
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     """From where on the isolated and the locked rig come to rest."""
-    crossover, stroke, moving, _ = table(evidence.maps["isolator-crossover"], CROSSOVER, "joint.stroke")
+    crossover, stroke, moving, _ = verdict_table(evidence.maps["isolator-crossover"], CROSSOVER, "joint.stroke")
     free = float(np.mean(ends(crossover, moving)[stroke >= _STROKE]))
-    crossover, mass, moving, _ = table(evidence.maps["system"], CROSSOVER, "mass")
+    crossover, mass, moving, _ = verdict_table(evidence.maps["system"], CROSSOVER, "mass")
     nearest = int(np.abs(mass - 1.7).argmin())
     locked = float(ends(crossover, moving)[nearest])
     return (

@@ -80,7 +80,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     """The crossings of the locked rig, sliding, at the thesis's settings."""
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
-    tuned = {f: nearest(loop, f) for f, loop in settings.items()}
+    tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
     lowest, highest = min(settings), max(settings)
     further = _further(settings[highest], highest)
     near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
@@ -146,7 +146,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
     """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
-    crossing = {name: nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
+    crossing = {name: crossing_nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
     crossed = ", ".join(f"{name} {number_text(f, unit='Hz')}" for name, f in crossing.items())
     highest = analysis.free.unsampled
     return Finding(
@@ -156,7 +156,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
                 f"about {_CROSSES:g} Hz (from {_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
                 all(about(f, _CROSSES) for f in crossing.values()),
                 f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
-                f"{nearest(analysis.identified, _CROSSES):.3g} Hz",
+                f"{crossing_nearest(analysis.identified, _CROSSES):.3g} Hz",
             ),
             Part(
                 f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
@@ -171,14 +171,14 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
     )
 
 
-def nearest(margins: Margins, frequency: float) -> float:
+def crossing_nearest(margins: Margins, frequency: float) -> float:
     """The crossing of 0 dB closest to a frequency [Hz]; NaN without any."""
     return min(margins.crossovers, key=lambda f: abs(np.log(f / frequency)), default=np.nan)
 
 
 def _further(margins: Margins, setting: float) -> tuple[float, ...]:
     """Crossings of 0 dB above that of the crossover tuned for [Hz]."""
-    return tuple(f for f in margins.crossovers if f > nearest(margins, setting))
+    return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
 
 
 def _listed(frequencies: tuple[float, ...]) -> str:

@@ -6,20 +6,20 @@ import numpy as np
 
 from friso.quantities import percent
 from friso.studies.thesis.claims import FEW, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import share, table
+from friso.studies.thesis.maps import overlap, verdict_table
 from friso.studies.thesis.studies import STUDIES
 
 
 @judges("F15A", figure="15A", needs=("isolator-masses",))
 def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
     """Cells that are otherwise than the marker."""
-    cart, stage, moving, valid = table(evidence.maps["isolator-masses"], "masses.cart", "masses.stage")
+    cart, stage, moving, valid = verdict_table(evidence.maps["isolator-masses"], "masses.cart", "masses.stage")
     marker = STUDIES["isolator-masses"].marker
     row = int(np.argmin(np.abs(cart - marker["masses.cart"])))
     column = int(np.argmin(np.abs(stage - marker["masses.stage"])))
     other = moving != moving[row, column]
     ratio = cart[:, None] / stage[None, :]
-    text = f"{percent(share(other, valid), 3)} of {valid.sum()} cells differ from the marker's; "
+    text = f"{percent(overlap(other, valid), 3)} of {valid.sum()} cells differ from the marker's; "
     text += f"cart-to-stage mass ratio {ratio.min():.2g} to {ratio.max():.2g}"
     if (other & valid).any():
         text += f"; the others at {ratio[other & valid].min():.2g} to {ratio[other & valid].max():.2g}"
@@ -27,7 +27,7 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
         (
             Part(
                 f"the marker's masses come to rest, and few cells (at most {percent(FEW)}) keep moving",
-                bool(not moving[row, column] and share(other, valid) <= FEW),
+                bool(not moving[row, column] and overlap(other, valid) <= FEW),
                 text,
             ),
         )
@@ -38,8 +38,8 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
 def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
     """Cells that keep moving with the isolator, and the behaviour of those that do with the joint locked."""
     axes = ("friction.static", "friction.coulomb")
-    static, coulomb, moving, valid = table(evidence.maps["isolator-friction"], *axes)
-    _, _, locked, _ = table(evidence.maps["friction"], *axes)
+    static, coulomb, moving, valid = verdict_table(evidence.maps["isolator-friction"], *axes)
+    _, _, locked, _ = verdict_table(evidence.maps["friction"], *axes)
     back = moving & valid
     where = ""
     if back.any():
@@ -51,7 +51,7 @@ def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
                 "with the isolator the stage comes to rest for all valid pairs of friction forces",
                 not back.any(),
                 f"{back.sum()} of {valid.sum()} cells keep moving; of the {locked.sum()} that do with the joint locked "
-                f"{percent(share(moving, locked), 3)}",
+                f"{percent(overlap(moving, locked), 3)}",
                 where,
             ),
         )

@@ -7,7 +7,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, free_square, share, share_text, table, trend, trend_text
+from friso.studies.thesis.maps import ends, free_square, overlap, share_text, trend, trend_text, verdict_table
 from friso.studies.thesis.studies import STUDIES
 
 _ENDS = 20.0
@@ -17,7 +17,9 @@ _ENDS = 20.0
 @judges("F11A", figure="11A", needs=("path",))
 def path_is_no_cure(evidence: Evidence) -> Finding:
     """Scattered cells that settle below a hyperbola of acceleration and its time, none above it."""
-    acceleration, time, moving, valid = table(evidence.maps["path"], "motion.acceleration", "motion.acceleration_time")
+    acceleration, time, moving, valid = verdict_table(
+        evidence.maps["path"], "motion.acceleration", "motion.acceleration_time"
+    )
     moved = (acceleration > 0)[:, None] & (time > 0)[None, :] & valid
     lines = [*moving[acceleration > 0][:, time > 0], *moving[acceleration > 0][:, time > 0].T]
     free_lines = sum(not line.any() for line in lines)
@@ -25,14 +27,14 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
     speed = acceleration[:, None] * time[None, :]
     resting = moved & ~moving
     bound = float(speed[resting].max(initial=0.0))
-    above = share(speed > bound, moved)
+    above = overlap(speed > bound, moved)
     return Finding(
         (
             Part(
                 "every acceleration and every acceleration time that moves the stage has cells that keep moving, and "
                 f"the largest square at rest covers few cells (at most {percent(FEW)})",
                 free_lines == 0 and square <= FEW,
-                f"{percent(share(moving, moved))} of the paths that move the stage keep it moving; {free_lines} "
+                f"{percent(overlap(moving, moved))} of the paths that move the stage keep it moving; {free_lines} "
                 f"lines and a square of {percent(square, 3)} come to rest",
             ),
             Part(
@@ -50,7 +52,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
     """The highest crossover that keeps moving, over all masses and for each."""
-    crossover, mass, moving, _ = table(evidence.maps["system"], CROSSOVER, "mass")
+    crossover, mass, moving, _ = verdict_table(evidence.maps["system"], CROSSOVER, "mass")
     by_mass = ends(crossover, moving)
     highest, falls = by_mass.max(), trend(mass, by_mass)
     marker = moving[:, np.argmin(np.abs(mass - STUDIES["system"].marker["mass"]))]

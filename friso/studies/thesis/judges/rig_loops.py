@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.quantities import percent
 from friso.studies.rig.excitation import SLIDING
-from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, highest_stable, nearest
+from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, crossing_near_target, highest_stable
 from friso.studies.thesis.as_built import AS_BUILT, RigLoops
 from friso.studies.thesis.claims import ABOUT, Evidence, Part, about, number_text
 
@@ -36,7 +36,7 @@ def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
 
 
 def _crossings(loops: RigLoops) -> Part:
-    read = {loop.tuned: nearest(loop) for loop in loops.locked}
+    read = {loop.tuned: crossing_near_target(loop) for loop in loops.locked}
     return Part(
         f"measured on the rig as built, every open loop crosses 0 dB about where it is tuned (within {ABOUT:g})",
         all(about(crossed, tuned) for tuned, crossed in read.items()),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sympy as sp
 
-from friso.frequency.stiffness import in_series, sensitivity
+from friso.frequency.stiffness import in_series, series_sensitivity
 from friso.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso.studies.thesis.linear import PLANT, Springs
 
@@ -13,7 +13,7 @@ K_F, K_J = sp.symbols("k_f k_j", positive=True)
 PRINTED_STIFFNESS = in_series(K_F, K_J)
 """Eq. 1 as printed."""
 
-PRINTED_SENSITIVITY = sensitivity(K_F, K_J)
+PRINTED_SENSITIVITY = series_sensitivity(K_F, K_J)
 """Eq. 2 as printed, with its eta."""
 
 _EXACT = 1e-9

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.studies.thesis.claims import ABOUT, ORDER, TREND, Evidence, Finding, Part, Response, judges
-from friso.studies.thesis.maps import begins, ends, table, trend, trend_text
+from friso.studies.thesis.maps import begins, ends, trend, trend_text, verdict_table
 from friso.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _LARGE_DAMPING = 1e2
 def stiffness_has_a_limit(evidence: Evidence) -> Finding:
     """The stiffness above which the isolated rig keeps moving, at each stroke."""
     runs = evidence.maps["isolator-stiffness"]
-    stiffness, stroke, moving, _ = table(runs, "joint.stiffness", "joint.stroke")
+    stiffness, stroke, moving, _ = verdict_table(runs, "joint.stiffness", "joint.stroke")
     limits = begins(stiffness, moving)
     works = ~moving[0]  # strokes at which the softest joint of the range comes to rest
     rises = trend(stroke[works], limits[works])
@@ -82,7 +82,9 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     """The stroke from which runs come to rest where the limiter is damped much, and the amplitude."""
-    damping, stroke, moving, _ = table(evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke")
+    damping, stroke, moving, _ = verdict_table(
+        evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke"
+    )
     needed = np.exp(ends(np.log(stroke), moving.T))
     large, small = needed[damping >= _LARGE_DAMPING], needed[damping < _SMALL_DAMPING]
     at_large = float(np.median(large))

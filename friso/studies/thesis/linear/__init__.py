@@ -12,8 +12,8 @@ from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
 from friso.studies.thesis.linear.loops import SETTINGS, CrossoverLoops, loops_of
 from friso.studies.thesis.linear.plants import PARASITIC, LimitCase, Springs, limit_cases_of, springs_of
-from friso.studies.thesis.linear.speeds import Speeds, speeds_of
-from friso.studies.thesis.linear.trials import FURTHER, Contact, identified, soft_contact
+from friso.studies.thesis.linear.speeds import Speeds, loop_over_speed
+from friso.studies.thesis.linear.trials import FURTHER, Contact, identified_loop, soft_contact
 from friso.studies.thesis.studies import LOCKED
 
 __all__ = [
@@ -85,7 +85,7 @@ def _analysed(stage_file: str) -> Linear:
         springs=springs_of(stage.flat()),
         free=loops_of(stage, (SETTINGS[0],)),
         locked=loops_of(stage.replace(dict(LOCKED)), SETTINGS),
-        speeds=speeds_of(stage.flat()),
-        identified=identified(stage),
+        speeds=loop_over_speed(stage.flat()),
+        identified=identified_loop(stage),
         contact=soft_contact(stage),
     )

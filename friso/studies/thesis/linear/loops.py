@@ -10,11 +10,11 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import HIGHEST, end_of, searched, stable_crossovers
+from friso.frequency.crossover import HIGHEST, range_end, searched_crossovers, stable_crossovers
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import controller, loops, modes, plants
+from friso.frequency.family import controller_response, loops, plant_poles, plants
 from friso.frequency.margins import DENSITY, Margins, frequencies, margins, with_resonances
-from friso.frequency.members import joined, limit_cases
+from friso.frequency.members import concatenate_families, limit_cases
 from friso.frequency.ranges import ranges_below
 from friso.stage import Stage
 
@@ -66,7 +66,7 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
     """The loops of a stage, tuned to the crossovers `settings` [Hz]."""
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
-    resonances = modes(flat, joined([*limit_cases(flat).values()]))
+    resonances = plant_poles(flat, concatenate_families([*limit_cases(flat).values()]))
     omega = with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [resonances])
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
@@ -92,11 +92,11 @@ def _single(flat: Mapping[str, Any]) -> float | None:
     where the end of the search comes first, 0 without any such crossover."""
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])
-    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [modes(flat, member)])
+    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [plant_poles(flat, member)])
     bare = plants(flat, member, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
-        above = np.array([np.abs(bare * controller(_tuned(flat, f), omega)) > 1 for f in crossover])
+        above = np.array([np.abs(bare * controller_response(_tuned(flat, f), omega)) > 1 for f in crossover])
         return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
 
     at = np.geomspace(LOWEST, 0.999 * HIGHEST, STEPS)
@@ -106,9 +106,9 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 
 def _highest(flat: Mapping[str, Any]) -> float | None:
     """The crossover [Hz] up to which all limit cases are stable; None at the end of the search, 0 where none is."""
-    ranges = stable_crossovers(flat, joined([*limit_cases(flat).values()]))
-    end = end_of(ranges, flat[CROSSOVER]) or 0.0
-    return None if end == searched(flat)[1] else end
+    ranges = stable_crossovers(flat, concatenate_families([*limit_cases(flat).values()]))
+    end = range_end(ranges, flat[CROSSOVER]) or 0.0
+    return None if end == searched_crossovers(flat)[1] else end
 
 
 def _edge(flat: Mapping[str, Any]) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from friso.frequency.drive import DriveTiming
-from friso.frequency.family import modes, plants
+from friso.frequency.family import plant_poles, plants
 from friso.frequency.margins import DENSITY, frequencies
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, STAGE, plant
@@ -81,7 +81,7 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
 
 
 def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
-    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [modes(flat, member)])
+    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [plant_poles(flat, member)])
     resonances, antiresonances = (_peaks(flat, member, omega, sign) for sign in (1, -1))
     at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))
     omega_at = np.array([2 * np.pi * at])

@@ -45,7 +45,7 @@ class Speeds:
     fast: float
 
 
-def speeds_of(flat: Mapping[str, Any]) -> Speeds:
+def loop_over_speed(flat: Mapping[str, Any]) -> Speeds:
     """The loop of a stage over the speed of its cart."""
     unstable = {touched: _unstable(flat, touched) for touched in (False, True)}
     tenth = 2 * np.pi * flat[CROSSOVER] * np.array([0.1, 10.0])

@@ -39,7 +39,7 @@ class Contact:
     undamped: Margins
 
 
-def identified(stage: Stage) -> Margins:
+def identified_loop(stage: Stage) -> Margins:
     """The loop of the sliding cart, its joint free, with the masses that were identified."""
     return _sliding(stage.replace(dict(IDENTIFIED)))
 

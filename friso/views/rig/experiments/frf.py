@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
-from friso.studies.rig.experiments.frf import RATIOS, Frf, MeasuredLoop, Plant, nearest
+from friso.studies.rig.experiments.frf import RATIOS, Frf, MeasuredLoop, Plant, crossing_near_target
 from friso.studies.rig.outcome import Outcome
 from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
@@ -39,7 +39,9 @@ def sentences(outcome: Outcome) -> list[str]:
     measured = [loop for loop in result.loops if loop.measured]
     last = measured[-1]
     others = [crossing.value for crossing in last.crossings if crossing.value > 2 * last.tuned]
-    tuned = listed([f"{with_unit(loop.tuned, 'Hz')} at {with_unit(nearest(loop), 'Hz')}" for loop in measured], "and")
+    tuned = listed(
+        [f"{with_unit(loop.tuned, 'Hz')} at {with_unit(crossing_near_target(loop), 'Hz')}" for loop in measured], "and"
+    )
     unmeasured = [f"{loop.tuned:.3g} Hz" for loop in result.loops if not loop.measured]
     unstable = f" Tuned to {listed(unmeasured, 'and')} the closed loop is not stable." if unmeasured else ""
     above = f"once more at {with_unit(max(others), 'Hz')}" if others else "nowhere above"

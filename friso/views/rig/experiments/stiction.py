@@ -16,7 +16,7 @@ from friso.views.rig.outcome_view import OutcomeView
 def sentences(outcome: Outcome) -> list[str]:
     """The results in sentences."""
     result: Stiction = outcome.result
-    forces, within = result.forces, held(result)
+    forces, within = result.forces, rails_within_interval(result)
     rails = len(result.by_rail)
     truth = range_with_unit(float(result.true.min()), float(result.true.max()), "N")
     if not len(forces):
@@ -32,7 +32,7 @@ def sentences(outcome: Outcome) -> list[str]:
     ]
 
 
-def held(result: Stiction) -> np.ndarray:
+def rails_within_interval(result: Stiction) -> np.ndarray:
     """On which rails the interval holds the middle of the true static friction, shape (rails,)."""
     middles = result.true.mean(axis=1)
     return np.array([slips.static.holds(middle) for slips, middle in zip(result.by_rail, middles, strict=True)])
