@@ -27,7 +27,7 @@ import friso
 from friso.app import uploads
 from friso.app.gate import Access
 from friso.app.lines import command_line, python_line
-from friso.app.machine import Machine, shown
+from friso.app.machine import Machine, machine_on_page
 from friso.app.serve import listening
 from friso.app.server import application
 from friso.app.work import Workshop
@@ -322,7 +322,7 @@ def test_a_machine_has_the_keys_of_its_file_with_what_they_take(served: Served) 
 @pytest.mark.parametrize("name", [name for name in friso.answers.starting.example_names() if "/" not in name])
 def test_every_example_is_shown(name: str) -> None:
     path = Path(friso.example(name))
-    part = shown(Machine(path.read_text(encoding="utf-8"), path.name))
+    part = machine_on_page(Machine(path.read_text(encoding="utf-8"), path.name))
     written = friso.load(path).as_written()
     tables = {table["name"]: table for table in part["tables"] if table["present"]}
     assert {name for name, value in written.items() if isinstance(value, dict)} == set(tables)

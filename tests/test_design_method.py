@@ -14,7 +14,7 @@ from friso.design_method import relax as relax_module
 from friso.design_method.choice import chosen, confirmed
 from friso.design_method.controller import choose_controller, comfortable_below, dampings
 from friso.design_method.edges import Corners, edges_over, rigid
-from friso.design_method.front import Candidate, front, judged
+from friso.design_method.front import Candidate, evaluate_geometries, front
 from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
 from friso.design_method.method import NoDesign, fit_leaves, leaves
 from friso.design_method.modal import Modal
@@ -23,7 +23,7 @@ from friso.design_method.prepare import prepared, with_leaves
 from friso.design_method.relax import relaxed_requirements
 from friso.design_method.requirements import PARASITIC, RESERVE, LeafTask, requirements
 from friso.design_method.spec import Spec, load_spec
-from friso.design_method.verification import RTOL, MachineOutcomes, tried, verification
+from friso.design_method.verification import RTOL, MachineOutcomes, move_machines, verification
 from friso.equations.breakaway import least_breakaway
 from friso.frequency.crossover import limits, settled_margin
 from friso.frequency.tuning import Tuning
@@ -79,14 +79,14 @@ def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> No
     assert np.all(np.diff(stiffness) >= 0)
     assert np.all(np.diff(frequency) >= -1e-9 * frequency[:-1])
     wanted = [requirement for requirement in requirements(task) if requirement.name != PARASITIC]
-    result = judged(
+    result = evaluate_geometries(
         task, wanted, sizes_of([candidate.geometry for candidate in candidates]), [e.geometry.sheet for e in candidates]
     )
     assert np.all(result.excess <= 1 + 1e-9)
     low, high = box(SPEC)
     rng, bought = np.random.default_rng(0), sheets(SPEC)
     sizes = low + (high - low) * rng.random((20_000, 3))
-    tried_ = judged(task, wanted, sizes, [bought[k] for k in rng.integers(len(bought), size=len(sizes))])
+    tried_ = evaluate_geometries(task, wanted, sizes, [bought[k] for k in rng.integers(len(bought), size=len(sizes))])
     allowed = np.all(tried_.excess <= 1, axis=1)
     assert allowed.any()
     better = np.interp(tried_.stiffness[allowed] * 1.1, stiffness, frequency, left=np.inf)
@@ -305,7 +305,7 @@ def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
     rig = friso.load(EXAMPLES / "thesis_rig.toml")
     flat = rig.flat()
     for held, hunts in ((True, True), (False, False)):
-        result = tried({**flat, "joint.locked": held}, 1, 1e-6)
+        result = move_machines({**flat, "joint.locked": held}, 1, 1e-6)
         assert result.tried == 1
         assert (result.words[0] == "swings") == hunts
     within, _ = measured_run(rig.replace({"joint.locked": False}), RTOL).settling_time
@@ -325,7 +325,7 @@ def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatc
     assert low == 0
     assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
     worst = outcomes.free.worst
-    again = tried({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
+    again = move_machines({**outcomes.worst.flat(), "joint.locked": False}, 1, float(SPEC.position.window))
     assert again.settling[0] == pytest.approx(outcomes.free.settling[worst], rel=1e-3)
 
 

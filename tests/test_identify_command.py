@@ -25,7 +25,7 @@ from friso.identification import method
 from friso.identification.logs.log import Log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import profile as profiles
-from friso.stage.correlations import beside, read_correlations
+from friso.stage.correlations import correlations_file, read_correlations
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
@@ -105,7 +105,7 @@ def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
 def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapshots: Snapshots) -> None:
     out, answer = done
     files = {Path(item) for item in answer["files"]}
-    assert {out / "identified.toml", out / "identify.html", beside(out / "identified.toml")} <= files
+    assert {out / "identified.toml", out / "identify.html", correlations_file(out / "identified.toml")} <= files
     assert all(entry.stat().st_size > 0 for entry in files)
     assert {file.suffix for file in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
     page = (out / "identify.html").read_text()
@@ -124,7 +124,7 @@ def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(
     assert abs(machine.flat["masses.cart"] - middle) < 2 * half
     assert half < 0.05 * middle
     assert "log" in stage.source
-    correlations = read_correlations(beside(done[0] / "identified.toml"), stage)
+    correlations = read_correlations(correlations_file(done[0] / "identified.toml"), stage)
     assert {*correlations.keys} <= uncertain.keys()
     assert len(correlations.keys) >= 3
 

@@ -24,7 +24,7 @@ from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.identifiable import Identified
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import LINEARITY, record
-from friso.identification.sources import named, read_all
+from friso.identification.sources import log_with_signals, read_all
 from friso.views.identify.document import identify_document
 from friso.views.identify.words import answer, headline
 
@@ -104,7 +104,9 @@ def volts(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Identificatio
     path = tmp_path_factory.mktemp("volts") / "volts.csv"
     csv(path, "time [s],position [m],command [V]", log.time, log["position"], log["force"] / PER_VOLT)
     mapping = Mapping(roles={"force": "command"}, experiment="moves")
-    return path, identify([(named(path, mapping, "moves"), "moves")], settings=AnalysisSettings(bandwidth=5.0))
+    return path, identify(
+        [(log_with_signals(path, mapping, "moves"), "moves")], settings=AnalysisSettings(bandwidth=5.0)
+    )
 
 
 def test_a_force_in_volts_yields_estimates_per_volt(volts: tuple[Path, Identification]) -> None:

@@ -162,7 +162,7 @@ def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
         one = measured_cycles.started(even, 1, {}, 1, silent, "")
         cases = {f"rail.{kind}_deviation": np.array([0.0, 0.1]) for kind in ("static", "coulomb")}
 
-        several, asymmetry = measured_cycles.varied(
+        several, asymmetry = measured_cycles.moves_on_varied_rails(
             even, 1, cases, np.arange(1.0, 5.0), float(one.swing[0]), silent, ""
         )
     assert one.above[0] == pytest.approx(one.below[0], rel=0.1)

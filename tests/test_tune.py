@@ -30,7 +30,7 @@ from friso.remedies.relax import relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, sensitivity
 from friso.remedies.suggestion import suggestion
-from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moved, quantile
+from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.variables import BANDWIDTH, loop_bandwidth
 from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals
 from friso.stage.controllers import as_tuned
@@ -100,7 +100,7 @@ def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> N
 
 def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     fast = rigid.replace({"controller.crossover": "20 Hz"})
-    moves = moved(Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal)
+    moves = moves_of_points(Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal)
     alone = measured_run(fast)
     assert moves.settling[0, 0] == pytest.approx(alone.settling_time[0][0], rel=1e-9)
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)

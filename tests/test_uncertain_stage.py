@@ -13,7 +13,14 @@ from scipy.stats import kstest, norm, spearmanr, truncnorm
 from friso.answers.inputs import read_stage
 from friso.intervals import COVERAGE, UncertainValue
 from friso.stage import Stage, load, numeric_keys, parse_set, save
-from friso.stage.correlations import Correlations, beside, correlations_text, draw, laid_over, read_correlations
+from friso.stage.correlations import (
+    Correlations,
+    correlations_file,
+    correlations_text,
+    draw,
+    laid_over,
+    read_correlations,
+)
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
 COULOMB, STATIC, VISCOUS = "friction.coulomb", "friction.static", "friction.viscous"
@@ -155,7 +162,7 @@ def pair(value: float, keys: tuple[str, ...] = (COULOMB, VISCOUS)) -> Correlatio
 
 def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path, refused: Refused) -> None:
     stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m")
-    path = beside(tmp_path / "identified.toml")
+    path = correlations_file(tmp_path / "identified.toml")
     assert path.name == "identified.correlations.toml"
     path.write_text(correlations_text(pair(-0.8), stage))
     correlations = read_correlations(path, stage)

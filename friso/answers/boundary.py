@@ -34,7 +34,7 @@ class BoundaryAnswer(Answer):
     @cached_property
     def keys(self) -> tuple[ShownKey, ...]:
         """The keys, in the units in which their ranges were given."""
-        return tuple(map(_shown, self.result.space.ranges, self.texts))
+        return tuple(map(_in_its_unit, self.result.space.ranges, self.texts))
 
     def sentences(self) -> Sequence[str]:
         """Where hunting ends, in one sentence."""
@@ -129,7 +129,7 @@ def boundary(
     return BoundaryAnswer(chosen, traced, [*ranges.values()], stem_of(stage))
 
 
-def _shown(swept: KeyRange, text: str) -> ShownKey:
+def _in_its_unit(swept: KeyRange, text: str) -> ShownKey:
     """A key in the unit in which its range was given, that of the last value."""
     from friso.views.boundary.words import ShownKey
 

@@ -26,11 +26,14 @@ def dataset_of(document: Mapping[str, Any]) -> xr.Dataset:
     flat = {label: dict(_leaves(record)) for label, record in records.items()}
     keys = list(dict.fromkeys(key for leaves in flat.values() for key in leaves))
     variables = {
-        _named(key)[0]: (name, _column([leaves.get(key) for leaves in flat.values()]), _named(key)[1]) for key in keys
+        _name_and_units(key)[0]: (name, _column([leaves.get(key) for leaves in flat.values()]), _name_and_units(key)[1])
+        for key in keys
     }
     single = {key: value for key, value in document.items() if isinstance(value, _LEAF) and value is not None}
     variables |= {
-        _named(key)[0]: ((), value, _named(key)[1]) for key, value in single.items() if not isinstance(value, str)
+        _name_and_units(key)[0]: ((), value, _name_and_units(key)[1])
+        for key, value in single.items()
+        if not isinstance(value, str)
     }
     coords = {name: list(flat)} if name else {}
     return xr.Dataset(variables, coords, {key: value for key, value in single.items() if isinstance(value, str)})
@@ -58,7 +61,7 @@ def _leaves(record: Mapping[str, Any], before: str = "") -> Any:
             yield f"{before}{key}", value
 
 
-def _named(key: str) -> tuple[str, dict[str, str]]:
+def _name_and_units(key: str) -> tuple[str, dict[str, str]]:
     """A key without its unit, and the unit as an attribute."""
     name, unit = unit_of_key(key)
     return name, {"units": unit} if unit else {}

@@ -181,7 +181,7 @@ def identify(
     axis_kind = axis_of_all([file.source for file in inputs], assumed)
     speak_of(axis_kind)
     sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
-    others = _others(inputs[len(paths) :])
+    others = _logs_to_predict(inputs[len(paths) :])
     check_predictions(sources, others, assumed)
     from friso.identification.method import identify as identification
     from friso.identification.method import predict as predicted
@@ -212,7 +212,7 @@ def _settings(bandwidth: str | float | None, band: str | None, period: str | flo
     return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
 
 
-def _others(inputs: Sequence[LogFile]) -> list[Log]:
+def _logs_to_predict(inputs: Sequence[LogFile]) -> list[Log]:
     """The logs to be predicted. Raises InputError."""
     logs = [item.source for item in inputs if isinstance(item.source, Log)]
     if len(logs) < len(inputs):

@@ -12,7 +12,7 @@ from typing import Any, TypeAlias
 from friso.errors import InputError, StageError
 from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage, load, parse_set
-from friso.stage.correlations import Correlations, beside, read_correlations
+from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.files import load_changed
 from friso.stage.plausible import implausible_values
 from friso.stage.rig import AS_BUILT
@@ -85,8 +85,8 @@ def read_stage(
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:
     """How the uncertain keys of a stage hang together, as a file beside its stage file says. Raises InputError."""
     correlations = Correlations()
-    if not isinstance(source, Stage | Mapping) and beside(Path(source)).exists():
-        correlations = read_correlations(beside(Path(source)), load(source))
+    if not isinstance(source, Stage | Mapping) and correlations_file(Path(source)).exists():
+        correlations = read_correlations(correlations_file(Path(source)), load(source))
     return correlations.among(stage.uncertain())
 
 

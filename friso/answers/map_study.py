@@ -154,7 +154,7 @@ def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content
     from friso.views.map.page import map_files
 
     files = map_files(runs, metric, f"friso simulate --cell {store} {{indices}}")
-    return {_beside(store, form): content for form, content in files.items()}
+    return {_path_beside(store, form): content for form, content in files.items()}
 
 
 def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
@@ -181,7 +181,7 @@ def own_views(store: Path) -> list[str]:
     next run may replace them."""
     from friso.views.map.page import FORMS
 
-    return [_beside(store, form).name for form in FORMS]
+    return [_path_beside(store, form).name for form in FORMS]
 
 
 def _claimed(store: Path) -> list[str]:
@@ -194,6 +194,6 @@ def _claimed(store: Path) -> list[str]:
         return []
 
 
-def _beside(store: Path, form: str) -> Path:
+def _path_beside(store: Path, form: str) -> Path:
     stem = store.with_suffix("") if store.suffix == ".zarr" else store
     return stem.with_name(f"{stem.name}.{form}")

@@ -40,7 +40,7 @@ class OutputFolder:
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
         if not (self.is_own or overwrite):
-            holds = f"made by friso {maker}" if maker else f"with {_listed(_entries(folder))} in it"
+            holds = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
             replaced = "which replaces files of the same name"
             expected = f"a new or empty folder, one that friso {command} made, or --overwrite, {replaced}"
             raise InputError("--out", f"{folder}, {holds}", expected, f"--out {folder}-2")
@@ -60,7 +60,7 @@ class OutputFolder:
                 raise InputError("--out", actual, "another folder", f"--out {self.folder}-2")
         others = [name for name in existing if name not in self.files]
         if others and not self.overwrite:
-            actual = f"{self.folder}, with {_listed(others)}, which friso {self.command} has not written"
+            actual = f"{self.folder}, with {_first_names(others)}, which friso {self.command} has not written"
             raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
 
     def write(
@@ -133,7 +133,7 @@ def _entries(folder: Path) -> list[str]:
     return [name for name in names if name != UNFINISHED and not name.startswith(DRAFTS)]
 
 
-def _listed(names: Sequence[str]) -> str:
+def _first_names(names: Sequence[str]) -> str:
     """The first of some names, and how many there are more."""
     more = len(names) - _LISTED
     return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")

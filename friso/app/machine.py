@@ -72,7 +72,7 @@ def _has(tables: Mapping[str, Any], key: str) -> bool:
     return name in tables[table] if table in tables and name else table in tables
 
 
-def shown(machine: Machine) -> dict[str, Any]:
+def machine_on_page(machine: Machine) -> dict[str, Any]:
     """What a page shows of a machine: its tables with their keys, in the order of the stage file."""
     stage = machine.stage
     flat, written, uncertain = stage.flat(), stage.as_written(), stage.uncertain()

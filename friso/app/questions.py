@@ -81,7 +81,7 @@ def parts_of(
 def machine(asked: Asked, work: Work) -> Iterator[Part]:
     """The keys of the machine."""
     asked.chosen()
-    yield {"kind": "answer", **machines.shown(asked.machine)}
+    yield {"kind": "answer", **machines.machine_on_page(asked.machine)}
 
 
 def run(asked: Asked, work: Work) -> Iterator[Part]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.design_method.front import Candidate, judged
+from friso.design_method.front import Candidate, evaluate_geometries
 from friso.design_method.geometry import Geometry, mechanisms, round_geometries, sizes_of
 from friso.design_method.requirements import LeafTask, Requirement, buckling_share, load_stress, requirements
 from friso.leaf_springs.beams import BeamFailure, beams
@@ -84,7 +84,7 @@ def _in_order(
     sizes = list({geometry: None for start in near for geometry in round_geometries(task.spec, start, STEP)})
     if not sizes:
         return
-    judgement = judged(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])
+    judgement = evaluate_geometries(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])
     for k in np.argsort(judgement.stiffness):
         if np.all(judgement.excess[k] <= 1):
             yield sizes[k], judgement.excess[k]

@@ -76,7 +76,7 @@ def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
 
     class Leaves(Problem):
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-            judgement = judged(task, needs, np.exp(x[:, :3]), [bought[int(k)] for k in x[:, 3]])
+            judgement = evaluate_geometries(task, needs, np.exp(x[:, :3]), [bought[int(k)] for k in x[:, 3]])
             out["F"] = np.stack([np.log(judgement.stiffness), -np.log(judgement.frequency)], axis=1)
             out["G"] = np.log(judgement.excess)
 
@@ -89,7 +89,7 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     bought = sheets(task.spec)
 
     def objective(x: np.ndarray) -> np.ndarray:
-        judgement = judged(task, needs, np.exp(x[:3]).T, [bought[int(k)] for k in x[3]])
+        judgement = evaluate_geometries(task, needs, np.exp(x[:3]).T, [bought[int(k)] for k in x[3]])
         return np.log(judgement.excess).max(axis=1)
 
     low, high = _ends(task)
@@ -110,7 +110,7 @@ class Judged:
     excess: np.ndarray
 
 
-def judged(task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
+def evaluate_geometries(task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
     """Geometries by closed forms."""
     many = mechanisms(task.flat, sizes, bought)
     excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.design_method.population import Population, typical_move
 from friso.design_method.spec import Spec
-from friso.design_method.verification import tried
+from friso.design_method.verification import move_machines
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.stage import Stage
 
@@ -42,6 +42,6 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     )
     machines = {key: value[number] for key, value in population.keys.items()}
     runs = {**flat, **machines, **typical_move(spec), CROSSOVER: crossover, "joint.stroke": stroke}
-    outcome = tried(runs, len(number), float(spec.position.window), patient=False)
+    outcome = move_machines(runs, len(number), float(spec.position.window), patient=False)
     share = np.where(outcome.completed, outcome.restless, np.nan).reshape(shape).mean(axis=2)
     return HuntingMap(crossovers, strokes, share)

@@ -122,12 +122,12 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
     outcomes: list[MachineOutcomes] = []
     for name, held in (("joint free", False), ("joint locked", True)):
         keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
-        outcomes.append(tried(keys, machines.count, window, progress, name))
+        outcomes.append(move_machines(keys, machines.count, window, progress, name))
     free, locked = outcomes
     return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
 
 
-def tried(
+def move_machines(
     flat: dict[str, Any],
     count: int,
     window: float,
@@ -137,18 +137,18 @@ def tried(
 ) -> MachineOutcomes:
     """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
     again, for longer."""
-    first = _followed(flat, count, window, FOLLOWED, progress, label)
+    first = _followed_moves(flat, count, window, FOLLOWED, progress, label)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
-        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, silent, label)
+        longer = _followed_moves(keys, again.size, window, LONGER * FOLLOWED, silent, label)
         better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
         for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
     return first
 
 
-def _followed(
+def _followed_moves(
     flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, label: str
 ) -> MachineOutcomes:
     """The moves, each followed for a time [s] after its last corner."""

@@ -99,11 +99,11 @@ def as_built(form: AsBuilt) -> Model:
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in LEVELS}
     states = tuple(replace(part, derivative=_shaken(part).xreplace(varied)) for part in model.states)
     outputs = {n: replace(output, expression=output.expression.xreplace(varied)) for n, output in model.outputs.items()}
-    kinks = tuple(_varied(kink, varied) for kink in model.kinks)
+    kinks = tuple(_kink_along_rail(kink, varied) for kink in model.kinks)
     return replace(model, states=states, outputs=outputs, kinks=kinks, jumps=resets(kinks), clock=clock)
 
 
-def _varied(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
+def _kink_along_rail(kink: Kink, varied: Mapping[Any, Any]) -> Kink:
     """A kink whose levels vary along the rail; on which side a run begins is told before anything is looked up, by the
     levels as they are given."""
     from friso.equations.component import Kink, Switch

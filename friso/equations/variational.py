@@ -37,7 +37,12 @@ def variational(model: Model, keys: Sequence[str] = ()) -> Model:
     small = beside | {key(name): key(along(name)) for name in keys}
     deviations = tuple(
         State(
-            small[part.symbol], _along(part.derivative, small), part.unit, part.scale, Role.DEVIATION, controlled=False
+            small[part.symbol],
+            _directional_derivative(part.derivative, small),
+            part.unit,
+            part.scale,
+            Role.DEVIATION,
+            controlled=False,
         )
         for part in model.states
     )
@@ -50,7 +55,7 @@ def variational(model: Model, keys: Sequence[str] = ()) -> Model:
 Small = Mapping[sp.Symbol, sp.Symbol]
 
 
-def _along(expression: sp.Expr, small: Small) -> sp.Expr:
+def _directional_derivative(expression: sp.Expr, small: Small) -> sp.Expr:
     """Derivative of an expression along the deviation."""
     terms = (sp.diff(expression, x) * deviation for x, deviation in small.items())
     return sum(terms, start=sp.S.Zero)
@@ -60,7 +65,7 @@ def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Exp
     """By how much the deviations jump at a kink: (f+ - f-) times their share across it over the speed of crossing."""
     speed = sp.diff(kink.surface, TIME)
     speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
-    share = _along(kink.surface, small) / speed
+    share = _directional_derivative(kink.surface, small) / speed
     if isinstance(kink, Switch):
         return _saltation_with_reset(model, kink, small, share)
     across = {
@@ -81,7 +86,7 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
         if x not in becomes and not rate.free_symbols & {switch.beyond, *becomes}:
             continue
         new = becomes.get(x, x)
-        carried = _along(new, small)
+        carried = _directional_derivative(new, small)
         moved = sum((sp.diff(new, y) * before[y] for y in before), start=sp.S.Zero)
         jumps[small[x]] = carried - small[x] + (cast(sp.Expr, rate.xreplace(behind)) - moved) * share
     return jumps

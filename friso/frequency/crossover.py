@@ -43,8 +43,8 @@ JUST = 1e-5
 
 @dataclass(frozen=True)
 class Limits:
-    """The crossovers [Hz], from `searched_crossovers`, at which a stage is `stable` and those with a `comfortable` modulus
-    margin, as ranges, in all limit cases: stuck under any bias force or sliding fast, its limiter free or touched.
+    """The crossovers [Hz], from `searched_crossovers`, at which a stage is `stable` and those with a `comfortable`
+    modulus margin, as ranges, in all limit cases: stuck under any bias force or sliding fast, limiter free or touched.
 
     Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
     stable and comfortable ones end it, possibly with the search (None if there is none). `first_lost` is the state that

@@ -54,7 +54,7 @@ def _motor_state(stages: Ensemble, which: int) -> int:
     return names.index(MOTOR_STATES[which]) if stages.structure.transmission else 0
 
 
-def _moved(stages: Ensemble) -> Iterator[np.ndarray]:
+def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
     """Each state moved a little from rest at the reference, all others at rest, (count, states)."""
     for k, scale in enumerate(stages.scales.T):
         moved = np.zeros(stages.scales.shape)
@@ -67,7 +67,7 @@ def _rates(stages: Ensemble) -> np.ndarray:
     flank = np.zeros((stages.count, len(stages.kernel.states)))
     if stages.structure.plays:  # the loop is open within a backlash
         flank[:, _motor_state(stages, 0)] = stages.flat[BACKLASH]
-    moved = ((flank + step, flank - step) for step in _moved(stages))
+    moved = ((flank + step, flank - step) for step in _displaced_states(stages))
     columns = [(stages.rates(ahead) - stages.rates(behind)) / (2 * STEP) for ahead, behind in moved]
     return np.stack(columns, axis=2) / stages.scales[:, :, None]
 
@@ -85,7 +85,7 @@ def _sliding(stages: Ensemble, stuck: np.ndarray) -> np.ndarray:
         if output not in kernel.outputs:
             continue
         unit = stages.scales[:, body]
-        for k, step in enumerate(_moved(stages)):
+        for k, step in enumerate(_displaced_states(stages)):
             change = _force(stages, step, output) - _force(stages, -step, output)
             matrix[:, body, k] += change / (2 * STEP * own * unit)
         matrix[:, body, body] -= _viscous(stages, FAST * unit, output) / own

@@ -57,7 +57,7 @@ def _timing(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alte
     def best(tried: Iterable[tuple[int, int]]) -> tuple[int, int]:
         for lag, width in tried:
             with suppress(InputError):
-                fits[lag, width] = _moved(log, inverse, cart_share, lag, width)
+                fits[lag, width] = _with_timing(log, inverse, cart_share, lag, width)
         return min(fits, key=lambda choice: fits[choice].error)
 
     period = 1 / (inverse.bandwidth * log.sample_time)
@@ -67,7 +67,9 @@ def _timing(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alte
     wider = abs(width) // 2 | 1
     lag, width = best((lag, (1 if width > 0 else -1) * (abs(width) + sign * (wider - 1))) for sign in (-1, 1))
     lag, width = filtered = best((lag + more, width) for more in (-max(abs(lag) // 4, 1), max(abs(lag) // 4, 1)))
-    believed = fits[filtered].error < BETTER * min(fits[plain].error, _alike(log, inverse, cart_share, *filtered))
+    believed = fits[filtered].error < BETTER * min(
+        fits[plain].error, _error_of_equal_averages(log, inverse, cart_share, *filtered)
+    )
     choice = filtered if believed else plain
     if choice != (0, 1):
         yield Alternative(_timing_sentence(*choice, log.sample_time), fits[choice])
@@ -78,14 +80,14 @@ def _doubling(most: float) -> list[int]:
     return [2**power for power in range(int(np.log2(most)) + 1)] if most >= 1 else []
 
 
-def _moved(log: Log, inverse: InverseModel, cart_share: float, lag: int, width: int) -> InverseModel:
+def _with_timing(log: Log, inverse: InverseModel, cart_share: float, lag: int, width: int) -> InverseModel:
     """The inverse model with the force so many samples later, and the motion averaged over so many; of a negative
     `width` the force instead."""
     moved = _force_moved(log, lag, max(-width, 1))
     return inverse_model(moved, inverse.bandwidth, False, cart_share, averaged=max(width, 1))
 
 
-def _alike(log: Log, inverse: InverseModel, cart_share: float, lag: int, width: int) -> float:
+def _error_of_equal_averages(log: Log, inverse: InverseModel, cart_share: float, lag: int, width: int) -> float:
     """The error with both averaged alike, where the force is averaged: that alone takes what is fast out of it."""
     if width >= 0:
         return np.inf
@@ -117,7 +119,7 @@ def _with_columns(log: Log, inverse: InverseModel, cart_share: float) -> Iterato
     """What a force that drifts, one that depends on the place, and one that the reference prescribes explain."""
     time = log.time - log.time.mean()
     sets = [{TIME: time}, _places(log, len(inverse.measured)), _of_reference(log, inverse.bandwidth)]
-    for extra, words in zip(sets, (_drift, _along, _feed_forward), strict=True):
+    for extra, words in zip(sets, (_drift_sentence, _place_sentence, _feedforward_sentence), strict=True):
         if extra:
             with suppress(InputError):
                 model = inverse_model(log, inverse.bandwidth, False, cart_share, extra=extra)
@@ -147,17 +149,17 @@ def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
     return columns
 
 
-def _drift(model: InverseModel, log: Log) -> str:
+def _drift_sentence(model: InverseModel, log: Log) -> str:
     return f"a force that drifts by {model.value(TIME):.2g} {log.unit('force')}/s explains most of it"
 
 
-def _along(model: InverseModel, log: Log) -> str:
+def _place_sentence(model: InverseModel, log: Log) -> str:
     levels = [value for name, value in model.solution.items() if name.startswith(PLACE.format(""))]
     size = f"{np.ptp([0.0, *levels]):.2g} {log.unit('force')}"
     return f"a force that differs along the way, by {size}, explains most of it"
 
 
-def _feed_forward(model: InverseModel, log: Log) -> str:
+def _feedforward_sentence(model: InverseModel, log: Log) -> str:
     mass = f"{-model.value(ACCELERATION):.2g} {unit_of('kg', log)}"
     coulomb = f"{-model.value(DIRECTION):.2g} {log.unit('force')}"
     return (

@@ -35,7 +35,7 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         elif certain:
             answer, agrees = (shown or certain)[0], True
         else:
-            answer, agrees = _left(key, estimates_of_key)
+            answer, agrees = _intersection(key, estimates_of_key)
         answers.append(answer)
         if not agrees:
             sentences.append(
@@ -124,7 +124,7 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     return Mean(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), max(float(equal) - 1, 1.0))
 
 
-def _left(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
+def _intersection(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """What several that do not show it leave possible: what they have in common, or the hull where that is nothing."""
     bounding = [
         estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)

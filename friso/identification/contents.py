@@ -18,7 +18,7 @@ from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
-from friso.identification.sources import named, unnamed
+from friso.identification.sources import log_with_signals, unnamed
 
 BINS = 24
 """Parts of a channel whose means make its small plot."""
@@ -106,7 +106,7 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:
     """The log as it would be identified, its kind, and why. Raises LogError, GapsError for what is open."""
     if mapping.experiment is not None:
-        return named(path, mapping, mapping.experiment), mapping.experiment, "as specified"
+        return log_with_signals(path, mapping, mapping.experiment), mapping.experiment, "as specified"
     return unnamed(path, mapping)
 
 

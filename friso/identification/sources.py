@@ -109,7 +109,7 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
     mapping = options.over(stored)
     if mapping.experiment is not None:
         KINDS.checked(mapping.experiment, "--as", "--as {}")
-        log = named(path, mapping, mapping.experiment)
+        log = log_with_signals(path, mapping, mapping.experiment)
         before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
         return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping, earlier=stored.beside(options))
     log, kind, reason = unnamed(path, mapping)
@@ -132,7 +132,7 @@ def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
         gaps.append(error)
     if not (kind and not KINDS[kind].si):
         try:
-            log = named(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
+            log = log_with_signals(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
         except GapsError as error:
             gaps += [gap for gap in error.gaps if gap.example not in [other.example for other in gaps]]
     if gaps or log is None:
@@ -153,7 +153,7 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
     return None if mapping == Mapping() else place_for(path, folder)
 
 
-def named(path: Path, mapping: Mapping, kind: str) -> Log:
+def log_with_signals(path: Path, mapping: Mapping, kind: str) -> Log:
     """The log with the signals that the kind of experiment needs."""
     chosen = KINDS[kind]
     return read_log(path, mapping, chosen.si, chosen.needed(mapping.roles), chosen.foreign)

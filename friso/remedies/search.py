@@ -12,7 +12,7 @@ from scipy.optimize import differential_evolution
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
-from friso.remedies.trials import Moves, attraction, modulus_margins, moved, quantile
+from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.stage import Stage
 
 SEED = 27
@@ -138,8 +138,10 @@ class Search:
         stable = np.flatnonzero(margin > goal.margin / 2)
         columns = [np.full(count, np.inf) for _ in range(4)]
         if stable.size:
-            moves: Moves = moved(self.remedy, shares[stable], self.machines, goal)
-            slower_moves: Moves = moved(self.remedy, shares[stable], self.machines, goal, slower=goal.distance)
+            moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal)
+            slower_moves: Moves = moves_of_points(
+                self.remedy, shares[stable], self.machines, goal, slower=goal.distance
+            )
             values = (moves.settling, moves.looser, slower_moves.looser, moves.force)
             for column, value in zip(columns, values, strict=True):
                 column[stable] = quantile(value, goal.share)

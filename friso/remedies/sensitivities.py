@@ -123,7 +123,7 @@ def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | 
                 "keys", f"{name} = 0", "keys that are not 0: they are changed by shares", "friction.static"
             )
     values = np.array([flat[name] for name in names])
-    flat = _varied(flat, names)
+    flat = _with_equations_of(flat, names)
     hunts = can_hunt(flat)
     return Sensitivities(
         stage,
@@ -150,7 +150,7 @@ def _keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     return tuple(name for name in contained if name.startswith(TABLES) and flat[name])
 
 
-def _varied(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
+def _with_equations_of(flat: Mapping[str, Any], keys: Sequence[str]) -> dict[str, Any]:
     """The same stage with equations that contain those of the keys that are decisive, as an exponent that is a whole
     number is not. Raises InputError for one that they never contain."""
     decisive = [name for name in keys if name in decisive_keys(flat)]

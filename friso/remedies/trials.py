@@ -51,7 +51,7 @@ def quantile(values: np.ndarray, share: float) -> np.ndarray:
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
-def moved(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0) -> Moves:
+def moves_of_points(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal, slower: float = 1.0) -> Moves:
     """The moves of points, as shares of the ranges of a remedy (points, variables), with a bandwidth lower by a factor
     `slower`."""
     count = len(shares) * machines.count

@@ -17,7 +17,7 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moved, quantile, timing
+from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
 from friso.remedies.variables import loop_bandwidth
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
@@ -115,7 +115,7 @@ def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> P
     if flat.get("joint.locked") is False:
         stiffness = in_series(stiffness, flat["joint.stiffness"])
     return Performance(
-        moved(remedy, ONE, machines, goal),
+        moves_of_points(remedy, ONE, machines, goal),
         modulus_margins(remedy, ONE, machines, drive),
         attraction(remedy, ONE, machines, goal),
         settled_margin({**flat, **timing(drive)}),

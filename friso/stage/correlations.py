@@ -80,7 +80,7 @@ def _problem(matrix: np.ndarray, size: int) -> str:
     return ""
 
 
-def beside(path: str | os.PathLike[str]) -> Path:
+def correlations_file(path: str | os.PathLike[str]) -> Path:
     """Where the correlations of a stage file stand: stage.toml has stage.correlations.toml."""
     return Path(path).with_suffix(".correlations.toml")
 

@@ -165,7 +165,7 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
     except RecursionError:
         raise InputError("", "tables nested too deeply", expected, example) from None
     except tomllib.TOMLDecodeError as error:
-        actual = f"not TOML: {_shown(text, str(error))}"
+        actual = f"not TOML: {_syntax_error(text, str(error))}"
         raise InputError("", actual, "tables in brackets, then key = value", example) from None
     except ValueError:  # Python's own
         raise InputError("", "not TOML: a whole number of thousands of digits", expected, example) from None
@@ -182,7 +182,7 @@ _WIDTH = 100
 """How much of a line is shown, at most."""
 
 
-def _shown(text: str, message: str) -> str:
+def _syntax_error(text: str, message: str) -> str:
     """What is wrong with a TOML text, and the line with a caret below the place."""
     place = _PLACE.search(message)
     if place is None:

@@ -73,7 +73,7 @@ def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = F
     try:
         if isinstance(values, str) and ".." in values:
             return _range(name, values, reader, log)
-        return _listed(name, values, reader)
+        return _axis_of_values(name, values, reader)
     except InputError as error:
         raise error.under(name) from None
 
@@ -155,7 +155,7 @@ def _count(text: str, digits: str | None) -> int | None:
     return count
 
 
-def _listed(name: str, values: Values, reader: _Reader) -> SweptAxis:
+def _axis_of_values(name: str, values: Values, reader: _Reader) -> SweptAxis:
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
         si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
     elif isinstance(values, str):

@@ -79,7 +79,7 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     path = np.array([point.vector for point in branch.points])
     placed = [(float(k), point, np.nan, "") for k, point in enumerate(branch.points)]
     placed += [
-        (_along(path, spot.point.vector), spot.point, spot.error, spot.kind)
+        (_path_coordinate(path, spot.point.vector), spot.point, spot.error, spot.kind)
         for spot in special
         if 0 <= spot.point.place <= 1
     ]
@@ -89,7 +89,7 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     ]
 
 
-def _along(path: np.ndarray, vector: np.ndarray) -> float:
+def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
     """How far along a path, in legs, a point on it lies."""
     before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
     leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))

@@ -46,7 +46,7 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
     """Put what `fill` writes in place of the store at `path`, whose lock is held, and which is deleted once that stands
     there. Raises OSError, with the store as it was."""
     with _made_aside(path, fill) as new:
-        old = _beside(path, _OLD)
+        old = _free_name(path, _OLD)
         if not MOVES_OPEN_FOLDERS:
             lock.release()  # whoever takes it now keeps the folder from being renamed
         rename_folder(path, old)
@@ -101,7 +101,7 @@ def lock_store(path: Path) -> Iterator[FileLock]:
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
     """What `fill` has written, to be moved away. Ctrl-C waits for its end: else the threads of Zarr would go on writing
     into what is deleted here."""
-    draft = _beside(path)
+    draft = _free_name(path)
     try:
         draft.mkdir(parents=True)
         with FileLock(draft / LOCK):  # locked, it is no leftover
@@ -113,6 +113,6 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
         shutil.rmtree(draft, ignore_errors=True)
 
 
-def _beside(path: Path, suffix: str = "") -> Path:
+def _free_name(path: Path, suffix: str = "") -> Path:
     """A name that is free."""
     return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")

@@ -85,13 +85,13 @@ def environment() -> Environment:
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
-        finalize=_shown,
+        finalize=_escaped_text,
     )
     templates.tests["starting"] = str.startswith
     return templates
 
 
-def _shown(value: Any) -> Any:
+def _escaped_text(value: Any) -> Any:
     """What a template puts into a page: texts escaped, markup of friso's own as it is."""
     return value if isinstance(value, Markup) or not isinstance(value, str) else escaped(value)
 

@@ -118,7 +118,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
         return _nothing(why)
     cutoff, looked_for = cutoff_of(record), between.delay is None
     tried = [(cutoff, looked_for), (CHECKED * cutoff, looked_for), *([] if looked_for else [(cutoff, True)])]
-    best, *others = (_settled(_seen(record, top), between, top, late) for top, late in tried)
+    best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
     even = (best.left + LINEARITY) * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
@@ -164,7 +164,7 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
 
 
-def _settled(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
+def _converged_fit(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
     """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`), the
     delay is that which fits best."""
     fit = _fit(record, between, cutoff, between.mass, late)

@@ -156,9 +156,9 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STARTS])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
     lower = _fitted(_equation(record, between, contact, CHECKED * cutoff, sizes), [best])
-    shifts = [lower - best, _moved(np.column_stack([jacobian, equation.late]), residual)[:5]]
+    shifts = [lower - best, _parameter_change(np.column_stack([jacobian, equation.late]), residual)[:5]]
     for other in _off(between, contact):
-        shifts.append(_moved(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
+        shifts.append(_parameter_change(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
     left = float(residual.std() / equation.friction.std())
     covariance = jackknife(jacobian, -residual)[:3, :3]
     estimates, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
@@ -166,7 +166,7 @@ def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristl
     curves = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
     held = [HELD] if record.bent is None and between.joint else []
     notes = (*held, *([] if between.mode else [RIGID]))
-    return SlowSliding(_judged(estimates, left, curves[1]), correlation, *curves, contact.exponent, notes)
+    return SlowSliding(_estimates_shown(estimates, left, curves[1]), correlation, *curves, contact.exponent, notes)
 
 
 def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
@@ -176,7 +176,7 @@ def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassO
     return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
 
 
-def _moved(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+def _parameter_change(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """By how much a residual, shape (m,), moves what is fitted, whose derivatives are of shape (m, p)."""
     return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
@@ -245,7 +245,7 @@ def _estimates(
     return tuple(estimates), correlation_of(covariance, shifts, even)
 
 
-def _judged(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
+def _estimates_shown(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
     """The estimates as far as the motion determines them, whose model leaves a share of the friction unexplained."""
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())

@@ -92,7 +92,7 @@ def stiffness_from_steps(log: Log) -> StepStiffness:
     ]
     spans = [s for part in log.segments for s in _plateaus(log, part, CUTOFF)]
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
-    settled = [_settled(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
+    settled = [_settled_window(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
     fixed, notes = _fixed(log, position, windows)
     warnings = list(notes)
@@ -143,7 +143,7 @@ def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> floa
     return float(np.polyfit(levels[:, 0], levels[:, 1], 1)[0])
 
 
-def _settled(
+def _settled_window(
     log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float, secant: float
 ) -> Window | None:
     """The part of a plateau that has settled: the deflection hardly drifts, and the force drifts by no more than goes

@@ -73,7 +73,7 @@ def fit_identifiable(
         if explains(full, noise):
             return _believed(full, core, covered, progress, explained=True)
     progress(3, STEPS, "moves: all parameters along the log")
-    along = _along(follows, plain, core, covered, progress)
+    along = _identifiable_on_log(follows, plain, core, covered, progress)
     if loop is None:
         return along
     progress(STEPS - 1, STEPS, "moves: the closed loop from there")
@@ -89,7 +89,7 @@ def explains(fit: OutputErrorFit, noise: float) -> bool:
     return bool(fit.problem.closed and np.sqrt(fit.cost) < EXPLAINED * noise)
 
 
-def _along(
+def _identifiable_on_log(
     follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress
 ) -> Identified:
     """What the stage that follows the log shows."""

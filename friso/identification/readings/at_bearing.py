@@ -196,9 +196,9 @@ def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np
     gives to the whole moving mass, shape (n,) each: inertia is the mass times that. `mass` [kg] counts where a contact
     gives way, by the force that goes through it."""
     time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
-    force, before = _arrived(time, record.force, between), between.beyond * acceleration
+    force, before = _force_after_delay(time, record.force, between), between.beyond * acceleration
     if between.mode is not None:
-        before = before + between.mode.share * (_followed(time, acceleration, between.mode) - acceleration)
+        before = before + between.mode.share * (_mode_acceleration(time, acceleration, between.mode) - acceleration)
     gives = (force - mass * before) / between.contact if record.bent is None else record.bent
     body = record.position - gives
     return body, force, before + (1 - between.beyond) * rate_of(time, rate_of(time, body))
@@ -222,7 +222,7 @@ def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarr
     return bent if size > max(STANDS_OUT * noise, MOVES * position.std(), GIVES * gives) else None
 
 
-def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
+def _force_after_delay(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
     """The force [N] that a command [N], shape (n,), has become: late by the delay and by the current loop."""
     late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
     if not np.isfinite(between.bandwidth):
@@ -232,7 +232,7 @@ def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndar
     return lfilter(b, a, late, zi=lfilter_zi(b, a) * late[0])[0]
 
 
-def _followed(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
+def _mode_acceleration(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
     omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
     fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * FINER + 1))

@@ -74,7 +74,7 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
     past = [driven[OWN - lag : -lag] for lag in range(1, OWN + 1)]
     first = int(direct)
     other = [answer[OWN - lag : len(answer) - lag] for lag in range(first, OTHER + first)]
-    before, after = (_left(target, columns) for columns in (past, past + other))
+    before, after = (_residual_power(target, columns) for columns in (past, past + other))
     free = len(target) - OWN - OTHER - 1
     if not after > 0:
         return 1.0, 0.0
@@ -82,7 +82,7 @@ def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[flo
     return float(stats.f.sf(statistic, OTHER, free)), float(1 - after / before)
 
 
-def _left(target: np.ndarray, columns: list[np.ndarray]) -> float:
+def _residual_power(target: np.ndarray, columns: list[np.ndarray]) -> float:
     """Sum of squares that a regression on columns, and a constant, leaves."""
     matrix = np.stack([np.ones(len(target)), *columns], axis=1)
     matrix /= np.linalg.norm(matrix, axis=0)

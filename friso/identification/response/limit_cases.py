@@ -36,7 +36,7 @@ def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
     ordered = tuple(sorted(lines, key=lambda line: line.low))
     if modes is None and len(response.frequency) >= 12:
         modes = fit_modes(response)
-    pairs = _named(modes)
+    pairs = _resonances(modes)
     case = _case(ordered, pairs)
     return Visible(
         case, ordered, modes, (*(_words(line) for line in ordered), *_mode_words(pairs), _verdict(case, pairs))
@@ -49,7 +49,7 @@ def _sign(response: FrequencyResponse) -> float | None:
     return max(lines, key=lambda line: line.octaves).sign if lines else None
 
 
-def _named(modes: Modes | None) -> Mapping[str, float]:
+def _resonances(modes: Modes | None) -> Mapping[str, float]:
     """Frequencies [Hz] of resonances and antiresonances by name, by frequency."""
     if modes is None:
         return {}

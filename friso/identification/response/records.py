@@ -123,11 +123,11 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
         periods = find_periods(record.driving, periods.samples)
         driving = _harmonics(record.driving, periods)
     driven, reaction = (_harmonics(signal, periods) for signal in (record.input, record.output))
-    alike = _alike(driving)
+    alike = _same_excitation(driving)
     excited = _excited(driving[alike])
     if not excited.any():
         raise InputError("excitation", "no line above the noise", "a periodic input with lines", "a multisine")
-    first = _settled(reaction[alike][:, excited])
+    first = _transient_periods(reaction[alike][:, excited])
     stationary = np.flatnonzero(alike)[first:]
     warnings = (*warnings, *_left_out(alike, first))
     if len(stationary) < 2:
@@ -188,7 +188,7 @@ def drift(signal: np.ndarray, samples: int) -> np.ndarray:
     return np.where(numbers < at[0], ends[0](numbers), np.where(numbers > at[-1], ends[1](numbers), inside))
 
 
-def _alike(driving: np.ndarray) -> np.ndarray:
+def _same_excitation(driving: np.ndarray) -> np.ndarray:
     """Which periods have the same external signal as most."""
     middle = np.median(np.real(driving), axis=0) + 1j * np.median(np.imag(driving), axis=0)
     off = np.sqrt(np.mean(np.abs(driving - middle) ** 2, axis=1))
@@ -209,7 +209,7 @@ def _excited(driving: np.ndarray) -> np.ndarray:
     return excited
 
 
-def _settled(reaction: np.ndarray) -> int:
+def _transient_periods(reaction: np.ndarray) -> int:
     """The number of leading periods that are transient, given the output (periods, lines); at least three stay.
 
     Each period is compared with the later half of the others, which show what is usual. Without a transient

@@ -56,7 +56,7 @@ def explained(
     ]
     groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}
     responses = {factor: multisine(group, channels=measured.channels) for factor, group in groups.items()}
-    return Explanation(responses, _left(drag, measured.between(*limits), responses[1.0]))
+    return Explanation(responses, _unexplained(drag, measured.between(*limits), responses[1.0]))
 
 
 def slid(
@@ -79,7 +79,7 @@ def slid(
     return positions, velocities
 
 
-def _left(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
+def _unexplained(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse) -> float:
     """The share of the departure from the mass line that the simulation leaves, in units of the deviations."""
     real, imaginary = (
         np.interp(measured.frequency, simulated.frequency, part(simulated.response)) for part in (np.real, np.imag)

@@ -87,7 +87,7 @@ class Later:
 
 
 @np.errstate(all="ignore")
-def followed(recorded: Recorded, within: float) -> Later:
+def staying_in_position(recorded: Recorded, within: float) -> Later:
     """For the runs of a chunk, whether they stay in position, `within` [m]."""
     deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE

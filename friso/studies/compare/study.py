@@ -20,9 +20,9 @@ from friso.studies.compare.measures import (
     LoopRobustness,
     MachineMeasures,
     concatenate_chunks,
-    followed,
     linear_loops,
     measure_chunk,
+    staying_in_position,
 )
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
@@ -238,7 +238,7 @@ class _Work:
         task = replace(self.task, duration=LONGER * self.task.duration)
         count = min(FOLLOWED, self.machines.count)
         return concatenate_chunks(
-            [followed(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
+            [staying_in_position(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
         )
 
     def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[Recorded]:

@@ -71,7 +71,7 @@ def _stuck(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     return from_rest(stages, np.tile(DISTANCES, count))
 
 
-def _moved(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
+def _random_moves(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     """Moves there and back, a Sobol sample of their sizes and times."""
     ends = np.log([SIZES, TIMES]).T
     size, time = np.exp(qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *ends)).T
@@ -86,4 +86,4 @@ def _moved(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:
     return Begin(motion, None, back + 2 * duration)
 
 
-_STUCK, _MOVED = (_stuck, len(DISTANCES)), (_moved, MOVES)
+_STUCK, _MOVED = (_stuck, len(DISTANCES)), (_random_moves, MOVES)

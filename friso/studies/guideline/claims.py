@@ -64,7 +64,7 @@ def _gap(worked: Worked) -> GuidelineClaim:
         f"locked, at {CLAIMED_AT:g} Hz a cycle attracts from a gap of {words}; by the law this gap grows with the "
         "force and the crossover",
         f"{GAP[0]:g} to {GAP[1]:g} N at each static friction",
-        _judged([gap.within(*GAP) for gap in gaps]),
+        _judgement([gap.within(*GAP) for gap in gaps]),
     )
 
 
@@ -81,7 +81,7 @@ def _share_below_limit(worked: Worked) -> GuidelineClaim:
         "the mass ratio does not affect the isolator",
         f"edge by the share of the stage in the mass: {ends}{spread}",
         f"an edge below {CLAIMED_AT:g} Hz, where the thesis evaluates its isolator, for all shares tried",
-        _judged([_verdict(edge < CLAIMED_AT, edge) for edge in edges]),
+        _judgement([_verdict(edge < CLAIMED_AT, edge) for edge in edges]),
     )
 
 
@@ -94,7 +94,7 @@ def _mass(worked: Worked) -> GuidelineClaim:
     )
     falls = [_verdict(after < before, before, after) for before, after in pairwise(edges)]
     falls = falls if None in falls else [all(falls)]
-    return GuidelineClaim("Fig. 11B", "more mass helps", text, "the edge falls monotonically", _judged(falls))
+    return GuidelineClaim("Fig. 11B", "more mass helps", text, "the edge falls monotonically", _judgement(falls))
 
 
 def _stiffness(worked: Worked) -> GuidelineClaim:
@@ -102,7 +102,7 @@ def _stiffness(worked: Worked) -> GuidelineClaim:
     soft, stiff = (cases[stiffness] for stiffness in STIFFNESSES)
     lower = _verdict(soft.ranked < stiff.ranked, soft.ranked, stiff.ranked)
     text = f"edge {_edge(soft)} at {STIFFNESSES[0] / 1e3:g} N/mm, {_edge(stiff)} at {STIFFNESSES[1] / 1e3:g} N/mm"
-    return GuidelineClaim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judged([lower]))
+    return GuidelineClaim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judgement([lower]))
 
 
 def _stroke(worked: Worked) -> GuidelineClaim:
@@ -116,7 +116,7 @@ def _stroke(worked: Worked) -> GuidelineClaim:
         f"edge {words}",
         f"at {STROKES[0]:g} mm below {CLAIMED_AT:g} Hz and within {percent(NEAR - 1)} of that at {STROKES[2]:g} mm; at "
         f"{STROKES[1]:g} mm within {percent(SAME)} of it",
-        _judged(
+        _judgement(
             [
                 _verdict(short < CLAIMED_AT, short),
                 _verdict(short < NEAR * longest, short, longest),
@@ -142,7 +142,7 @@ def _edges(worked: Worked) -> GuidelineClaim:
         text,
         f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of {ABOUT:g} of both "
         "numbers",
-        _judged(near),
+        _judgement(near),
     )
 
 
@@ -151,7 +151,7 @@ def _verdict(holds: bool, *edges: float) -> bool | None:
     return None if np.isnan(edges).any() else bool(holds)
 
 
-def _judged(parts: Sequence[bool | None]) -> str:
+def _judgement(parts: Sequence[bool | None]) -> str:
     if not parts or None in parts:
         return UNKNOWN
     return HOLDS if all(parts) else IN_PART if any(parts) else DIFFERS

@@ -171,7 +171,7 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, tally)
     tally.add(0, "laws and simulations")
     few = max(8, int(samples * CHECKED))
-    locked_fit = _locked(rigid, concatenate_sweeps(rigid_test, beside, beside_test), few)
+    locked_fit = _locked_fit(rigid, concatenate_sweeps(rigid_test, beside, beside_test), few)
     free_fit = _free(free, free_test, locked_fit.law, few)
     tally.add(0, "worked steps")
     laws = Laws(locked_fit.law, free_fit.law)
@@ -220,7 +220,7 @@ def _compile() -> None:
     kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 
 
-def _locked(fit: Sweep, test: Sweep, few: int) -> Fit:
+def _locked_fit(fit: Sweep, test: Sweep, few: int) -> Fit:
     used, held = fit.usable, test.usable
     law = fit_law(LOCKED_LAW, used.values, used.edge)
     errors = Errors.between(law.edge(held.values), held.edge)

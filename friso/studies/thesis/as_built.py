@@ -24,7 +24,7 @@ from friso.studies.rig.experiments.frf import (
     stable_settings,
 )
 from friso.studies.rig.experiments.in_position import InPosition, in_position
-from friso.studies.rig.experiments.measured_cycles import MOTORS, on_rail, started, varied
+from friso.studies.rig.experiments.measured_cycles import MOTORS, moves_on_varied_rails, on_rail, started
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover, stroke_crossover
 from friso.studies.rig.moves_on_rails import (
     RailRuns,
@@ -137,7 +137,7 @@ def cycles(stage: Stage) -> CyclesOnRails:
     swing = float(run.swing[0]) if run.swings[0] else 0.01 * distance(machine)
     flat = machine.flat()
     cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
-    rails, asymmetry = varied(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
+    rails, asymmetry = moves_on_varied_rails(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
     changes = {
         "drive.motor_constant_ratio": np.array([MOTORS[1] * flat.get("drive.motor_constant_ratio", 1.0)]),
         "friction.coulomb": np.array([COULOMB_LEVEL * flat["friction.coulomb"]]),

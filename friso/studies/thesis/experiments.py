@@ -175,7 +175,9 @@ def joint_steps(stage: Stage) -> JointSteps:
     to all steps is the sum of those to each."""
     fixed = stage.replace({"masses.cart": FIXED_CART, "joint.stroke": STROKE, "joint.locked": False})
     duration = STANDS * (len(STEPS) + 1)
-    run = simulate(_moved(fixed, kind="step", size=f"{STEP!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME)
+    run = simulate(
+        _with_motion(fixed, kind="step", size=f"{STEP!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME
+    )
     count, signals = round(STANDS / SAMPLE_TIME), {}
     for name in ("reference", "position", "force"):
         step, total = run[name].values, np.zeros(count * (len(STEPS) + 1))
@@ -207,13 +209,13 @@ def constant_speed(stage: Stage, speeds: tuple[float, ...] = SPEEDS) -> Constant
 
 def _ramp(stage: Stage, speed: float, duration: float) -> Log:
     run = simulate(
-        _moved(stage, kind="ramp", velocity=f"{speed!r} m/s", duration=f"{duration!r} s"), sample_time=SAMPLE_TIME
+        _with_motion(stage, kind="ramp", velocity=f"{speed!r} m/s", duration=f"{duration!r} s"), sample_time=SAMPLE_TIME
     )
     roles = {role: run[role].values for role in ("reference", "position", "cart_position", "force")}
     return record(f"{speed * 1e3:g} mm/s", SAMPLE_TIME, **roles)
 
 
-def _moved(stage: Stage, **motion: Any) -> Stage:
+def _with_motion(stage: Stage, **motion: Any) -> Stage:
     """The stage with a motion of another kind, of which other keys are left out."""
     rows = "\n".join(f'{key} = "{value}"' for key, value in motion.items())
     text = stage.to_toml()

@@ -105,7 +105,7 @@ def reproduce(
     varied: list[tuple[Variant, Mapping[str, Finding]]] = []
     for variant in variants:
         tally.add(1, f"{variant.parameter} {variant.value}")
-        varied.append((variant, _findings(entries, _varied(studies, points, rtol, variant, baseline))))
+        varied.append((variant, _findings(entries, _with_variant(studies, points, rtol, variant, baseline))))
     behind: dict[str, CyclesOnMap] = {}
     for study in studies if with_cycles else ():
         tally.add(1, f"hunting cycles, {study.name}")
@@ -120,7 +120,7 @@ def _verdicts(
     entries: Mapping[str, Registered], baseline: Evidence, varied: Sequence[tuple[Variant, Mapping[str, Finding]]]
 ) -> tuple[Verdict, ...]:
     fine, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
-    return tuple(_judged(claim, baseline, fine, coarse, varied) for claim in claims())
+    return tuple(_judge(claim, baseline, fine, coarse, varied) for claim in claims())
 
 
 def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
@@ -152,7 +152,9 @@ def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str
     return {claim: entry.judge(evidence) for claim, entry in entries.items()}
 
 
-def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence) -> Evidence:
+def _with_variant(
+    studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence
+) -> Evidence:
     """The evidence with one variant; what it does not touch is the baseline's."""
     tolerance = variant.rtol or rtol
     touched = [study for study in studies if variant.touches(study)]
@@ -217,7 +219,7 @@ def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
     return float((loose["keeps_moving"] != tight["keeps_moving"]).mean()), float(other_count.mean())
 
 
-def _judged(
+def _judge(
     claim: Claim,
     baseline: Evidence,
     fine: Mapping[str, Finding],

@@ -51,13 +51,17 @@ class Verdict:
         opened = "No open parameter of the thesis enters this claim."
         if self.tried:
             turns = (
-                f"the judgement changes with {_listed(self.depends_on)}" if self.depends_on else "no judgement changes"
+                f"the judgement changes with {_by_parameter(self.depends_on)}"
+                if self.depends_on
+                else "no judgement changes"
             )
             opened = f"Parameters left open by the thesis, varied one at a time ({self.tried} values): {turns}."
-        return f"{opened} Method: the judgement changes with {_listed(self.hangs_on)}." if self.hangs_on else opened
+        return (
+            f"{opened} Method: the judgement changes with {_by_parameter(self.hangs_on)}." if self.hangs_on else opened
+        )
 
 
-def _listed(dependences: Iterable[Dependence]) -> str:
+def _by_parameter(dependences: Iterable[Dependence]) -> str:
     """Each parameter once, with what is judged at which value."""
     by_name: dict[str, list[str]] = {}
     for dependence in dependences:

@@ -38,7 +38,7 @@ def stability(bode: Bode) -> list[str]:
         margins = bode.settled[1]
         state = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
         return [f"The loop is {state}."]
-    sentences = [_settled(bode)]
+    sentences = [_worst_settled_state(bode)]
     if bode.stable:
         worst, margins = bode.worst
         where = f"{place(worst, bode)}, {_margin(margins)}"
@@ -46,7 +46,7 @@ def stability(bode: Bode) -> list[str]:
     return [*sentences, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
 
 
-def _settled(bode: Bode) -> str:
+def _worst_settled_state(bode: Bode) -> str:
     """The worst of the settled states, which is the answer to most questions."""
     member, margins = bode.settled
     states = f"all settled states ({SETTLED})" if has_friction(bode) else "all limit cases"

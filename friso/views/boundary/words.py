@@ -171,7 +171,7 @@ def _between(change: Change, key: ShownKey) -> str:
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
     branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
-    return [*(text for _, text in turns), *(_followed(line, key, traced.space) for line in branches)]
+    return [*(text for _, text in turns), *(_branch_sentence(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: ShownKey) -> str:
@@ -194,7 +194,7 @@ _VERBS = {
 }
 
 
-def _followed(line: Line, key: ShownKey, space: Space) -> str:
+def _branch_sentence(line: Line, key: ShownKey, space: Space) -> str:
     """Over which values a branch was followed, and how it ends."""
     pair = "Asymmetric cycles, which bound the basin of the hunting cycle where they repel,"
     name = pair if line.shape == "asymmetric" else "Hunting cycles"
@@ -215,7 +215,7 @@ def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]
     text += [BASIN] if any(line.shape == "asymmetric" for line in curves) else []
-    return [*text, *_corners(traced, keys), *_lost(traced, keys)]
+    return [*text, *_corners(traced, keys), *_untraced(traced, keys)]
 
 
 def _curve(line: Line, keys: tuple[ShownKey, ...], space: Space) -> str:
@@ -235,7 +235,7 @@ def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
 
 
-def _lost(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
+def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 

@@ -48,7 +48,7 @@ def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
     if not with_trace:
         return ()
     motion = (_overview(with_trace), _shares(with_trace), _joint(with_trace), _friction(with_trace))
-    figures = (_settled(with_trace), *cycle_figures(with_trace), *motion)
+    figures = (_settling_figure(with_trace), *cycle_figures(with_trace), *motion)
     return tuple(figure for figure in figures if figure.panels)
 
 
@@ -88,7 +88,7 @@ def _late(trace: xr.Dataset) -> float:
 _TIME = Axis("Time", "s")
 
 
-def _settled(cases: list[ShownCase]) -> Figure:
+def _settling_figure(cases: list[ShownCase]) -> Figure:
     """Deviation after the move with the counted peaks (thesis, Fig. 5), and how each case settles."""
     start, end = _window(cases)
     lines, peaks = [], []

@@ -108,7 +108,7 @@ def laws_rows(laws: VerdictsByLaw) -> list[tuple[str, list[str]]]:
             (f"{label}: edge", [_edge(laws, verdict, case) for verdict in laws.verdicts]),
         ]
     rows.append(("Varied (left open)", [_drawn(verdict) for verdict in laws.verdicts]))
-    rows.append(("Not reproduced", [_lost(verdict) for verdict in laws.verdicts]))
+    rows.append(("Not reproduced", [_not_kept(verdict) for verdict in laws.verdicts]))
     rows.append(("Passive only if", [verdict.conversion.active or "it is" for verdict in laws.verdicts]))
     return [(axis_shown().text(name), texts) for name, texts in rows]
 
@@ -135,7 +135,7 @@ def _drawn(verdict: LawVerdict) -> str:
     return ", ".join(key.removeprefix("friction.") for key in keys) or NOTHING
 
 
-def _lost(verdict: LawVerdict) -> str:
+def _not_kept(verdict: LawVerdict) -> str:
     return ", ".join(SHOWN[item.kind] for item in verdict.conversion.lost) or NOTHING
 
 

@@ -55,12 +55,15 @@ def _decided(cycle: Cycle) -> str:
     return f"{'half a' if cycle.symmetric else 'a whole'} period ({method})"
 
 
-def _others(case: Case) -> str:
+def _further_cycles(case: Case) -> str:
     judgement = case.judgement
-    return "; ".join(_other(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle) or NOTHING
+    return (
+        "; ".join(_further_cycle(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle)
+        or NOTHING
+    )
 
 
-def _other(cycle: Cycle) -> str:
+def _further_cycle(cycle: Cycle) -> str:
     kind = "symmetric" if cycle.symmetric else "asymmetric"
     return f"{kind}, {plus_minus(cycle.amplitude, 'm', 4)}, {'attracts' if cycle.attracts else 'repels'}"
 
@@ -144,7 +147,7 @@ _COLUMNS: dict[str, Callable[[Case], str]] = {
     "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
     "Hunting multiplier": _of_the_cycle(_multiplier),
     "Multiplier taken over": _of_the_cycle(_decided),
-    "Other hunting cycles": _others,
+    "Other hunting cycles": _further_cycles,
     "Observed in simulations": _observed,
     "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
     "Edge of hunting": _edge,

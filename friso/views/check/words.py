@@ -131,7 +131,7 @@ def _transient(case: Case) -> str:
 
 def _settling(case: Case) -> str:
     hunting = case.judgement.hunting
-    says = f"settles: {_unmoved(case)}." if case.unmoved else _settled(case)
+    says = f"settles: {_unmoved(case)}." if case.unmoved else _settling_sentence(case)
     return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
 
 
@@ -140,7 +140,7 @@ def _unmoved(case: Case) -> str:
     return f"this motion does not move the stage (it exerts at most {force}; break-away takes {least})"
 
 
-def _settled(case: Case) -> str:
+def _settling_sentence(case: Case) -> str:
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
     if fine is not None:
         return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}."

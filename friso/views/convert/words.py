@@ -32,7 +32,7 @@ def conversion_sentences(conversion: LawConversion) -> list[str]:
     law, lost = conversion.law, conversion.lost
     name = conversion.stage.name or "the stage"
     if lost:
-        says = [f"{name} under {law}: {listed([_lost(item) for item in lost], 'and')}."]
+        says = [f"{name} under {law}: {listed([_change(item) for item in lost], 'and')}."]
     else:
         says = [f"{name} under {law} shows the same in measurements."]
     says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
@@ -41,7 +41,7 @@ def conversion_sentences(conversion: LawConversion) -> list[str]:
     return says
 
 
-def _lost(item: MeasuredChange) -> str:
+def _change(item: MeasuredChange) -> str:
     before, after = (with_unit(value, item.unit) for value in (item.before, item.after))
     return f"{SHOWN[item.kind]} is not kept ({before} becomes {after})"
 

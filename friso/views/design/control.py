@@ -78,7 +78,7 @@ def parallel_gains(design: Design) -> tuple[float, float, float]:
 
 def _not_higher(design: Design) -> str:
     bounds, crossover = upper(design), design.controller.crossover
-    text = f"Upper limits: {_listed(bounds)}."
+    text = f"Upper limits: {_bounds(bounds)}."
     short = 1 - crossover / bounds[0].value
     if short < ROUNDED:
         return text
@@ -92,10 +92,10 @@ def _not_lower(design: Design) -> str:
     bounds = lower(design)
     if not bounds:
         return "Nothing limits it from below, but a higher crossover settles faster."
-    return f"Lower limits: {_listed(bounds)}; above these, a higher crossover settles faster."
+    return f"Lower limits: {_bounds(bounds)}; above these, a higher crossover settles faster."
 
 
-def _listed(bounds: list[CrossoverBound]) -> str:
+def _bounds(bounds: list[CrossoverBound]) -> str:
     return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
 
 

@@ -21,17 +21,17 @@ Field = TypeVar("Field", bound=Coloured)
 
 def drawable(figure: Figure) -> Figure:
     """The figure with prefixed units, thinned series, limits as series, and markers that can be drawn."""
-    return _shown(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
+    return _escaped_part(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
 
 
-def _shown(part: Any) -> Any:
+def _escaped_part(part: Any) -> Any:
     """A part of a figure whose texts are escaped: they may come from a file."""
     if isinstance(part, str):
         return escaped(part)
     if isinstance(part, tuple):
-        return tuple(map(_shown, part))
+        return tuple(map(_escaped_part, part))
     if is_dataclass(part) and not isinstance(part, type):
-        return replace(part, **{field.name: _shown(getattr(part, field.name)) for field in fields(part)})
+        return replace(part, **{field.name: _escaped_part(getattr(part, field.name)) for field in fields(part)})
     return part
 
 

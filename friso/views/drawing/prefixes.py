@@ -61,7 +61,7 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     factor, text = choose(np.array([value]), unit)
     number = value * factor
     if number == 0 or 1e-3 <= abs(number) < 1e5:
-        return f"{_rounded(number, digits)} {text}"
+        return f"{_significant(number, digits)} {text}"
     return f"{number:.{digits - 1}e} {text}"
 
 
@@ -82,7 +82,7 @@ def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
     factor, text = choose(np.array([low, high]), unit)
     if 0 < low * factor < 0.01:
         return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
-    return f"{_rounded(low * factor, digits)} to {_rounded(high * factor, digits)} {text}"
+    return f"{_significant(low * factor, digits)} to {_significant(high * factor, digits)} {text}"
 
 
 def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
@@ -121,7 +121,7 @@ def listed(parts: Sequence[str], word: str) -> str:
     return f" {word} ".join(part for part in (", ".join(parts[:-1]), *parts[-1:]) if part)
 
 
-def _rounded(number: float, digits: int) -> str:
+def _significant(number: float, digits: int) -> str:
     """`digits` significant digits without an exponent: 1234.5 stays 1234 rather than become 1.23e+03."""
     if number == 0:
         return "0"

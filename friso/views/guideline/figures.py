@@ -49,10 +49,16 @@ FINER = 10
 
 def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
     """All charts, in the order of the page."""
-    return _locked(guideline), _free(guideline), _stroke(guideline), _against(guideline), _thesis_rig(guideline)
+    return (
+        _edge_of_rigid_masses(guideline),
+        _free(guideline),
+        _stroke(guideline),
+        _against(guideline),
+        _thesis_rig(guideline),
+    )
 
 
-def _locked(guideline: Guideline) -> Figure:
+def _edge_of_rigid_masses(guideline: Guideline) -> Figure:
     """The edge of rigid masses over the ratio of their two rates."""
     sweep = guideline.locked.test.usable
     slip, drop = np.exp(guideline.locked.law.log_rates(sweep.values))

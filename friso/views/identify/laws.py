@@ -21,7 +21,7 @@ def law_sentence(comparison: LawComparison) -> str:
             f"None of the laws predicts the record: {best.law}, the best, is off by {_error_share(best)} of the "
             "friction where it was not fitted."
         )
-    names = _listed(supported)
+    names = _laws_with_errors(supported)
     if len(supported) == len(comparison.predictions):
         return (
             f"The record does not tell the laws apart: {names} predict what they were not fitted to. Loops of force "
@@ -29,9 +29,8 @@ def law_sentence(comparison: LawComparison) -> str:
         )
     others = [law for law in comparison.predictions if law not in supported]
     verb = "predicts" if len(supported) == 1 else "predict"
-    return (
-        f"The record supports {names}, which {verb} best what was left out of the fit; {_listed(others)} predict worse."
-    )
+    worse = _laws_with_errors(others)
+    return f"The record supports {names}, which {verb} best what was left out of the fit; {worse} predict worse."
 
 
 def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
@@ -75,7 +74,7 @@ def _error_share(prediction: LawPrediction) -> str:
     return percent(prediction.error)
 
 
-def _listed(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
+def _laws_with_errors(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
     return ", ".join(f"{law.law} (off by {_error_share(law)})" for law in laws)
 
 

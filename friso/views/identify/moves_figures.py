@@ -90,7 +90,7 @@ def _traces(moves: IdentifiedMoves, name: str) -> Figure:
     )
     panels = (
         Panel("", TIME, Axis("Force", moves.force_unit), _both(time, force, force - moves.fit.residual, "needed")),
-        _left(time, moves.fit.residual, moves.force_unit),
+        _difference(time, moves.fit.residual, moves.force_unit),
     )
     return Figure(f"{name}_traces", "Measured and simulated force", caption, panels)
 
@@ -104,7 +104,7 @@ def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, .
         Panel("", TIME, Axis("Position", "m"), _both(time, position, simulated.position, "simulated")),
         Panel("", TIME, Axis("Measured − simulated", "m"), (apart,)),
         Panel("", TIME, Axis("Force", log.unit("force")), _both(time, force, expected, "simulated")),
-        _left(time, force - expected, log.unit("force")),
+        _difference(time, force - expected, log.unit("force")),
     )
 
 
@@ -112,7 +112,7 @@ def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Se
     return Series(time, measured, "measured", GREY, width=1.6), Series(time, simulated, word, BLUE, width=0.9)
 
 
-def _left(time: Array, left: Array, unit: str) -> Panel:
+def _difference(time: Array, left: Array, unit: str) -> Panel:
     return Panel("", TIME, Axis("Measured − simulated", unit), (Series(time, left, "", VERMILLION, width=0.9),))
 
 

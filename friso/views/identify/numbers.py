@@ -90,7 +90,7 @@ def with_interval(estimate: Estimate) -> str:
     return f"{value_text(estimate)} ({interval_text(estimate).removesuffix(unit).rstrip()})"
 
 
-def listed(estimates: Sequence[Estimate]) -> str:
+def estimates_in_words(estimates: Sequence[Estimate]) -> str:
     """Several in a sentence, by name."""
     return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
 

@@ -9,7 +9,7 @@ from friso.axis import axis_shown
 from friso.identification.method import Identification, Prediction
 from friso.identification.sources import LogFile
 from friso.identification.stage_file import with_origins
-from friso.stage.correlations import beside, correlations_text
+from friso.stage.correlations import correlations_file, correlations_text
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.identify.figures import identify_figures
@@ -38,7 +38,7 @@ def identify_files(
     figures = identify_figures(identification, predictions)
     return {
         STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
-        beside(Path(STAGE)).name: correlations,
+        correlations_file(Path(STAGE)).name: correlations,
         "identify.html": identify_html(identification, logs, predictions, figures),
         **pictures(figures),
     }

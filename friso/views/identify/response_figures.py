@@ -66,7 +66,7 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
     if driven and bench.modes is not None:
         curves.append(("modes", ORANGE, "dashed", bench.modes.predict(fine)))
     (angle,) = phases([response.response])
-    aligned = [_beside(hertz, angle, fine, np.degrees(np.unwrap(np.angle(curve[3])))) for curve in curves]
+    aligned = [_phase_turns(hertz, angle, fine, np.degrees(np.unwrap(np.angle(curve[3])))) for curve in curves]
     band = response.band()
     half = np.degrees((band.phase_high - band.phase_low) / 2)
     lowest = 0.3 * float(np.abs(response.response).min())
@@ -88,7 +88,7 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
     return above, below
 
 
-def _beside(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
+def _phase_turns(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
     """Phases of a fit [deg] in the turn in which the measured ones are."""
     off = np.interp(fine, hertz, measured) - fitted
     return fitted + 360 * np.round(np.median(off) / 360)

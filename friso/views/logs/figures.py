@@ -30,9 +30,9 @@ def _figure(content: LogContent, number: int) -> Figure:
 
 def _panel(channel: ChannelContent) -> Panel:
     time = channel.time
-    timed = time is not None and time.size == channel.values.size and not np.isnan(_shown(time)).all()
-    x = _shown(time) if timed and time is not None else np.arange(channel.values.size, dtype=float)
-    values = _shown(channel.values)
+    timed = time is not None and time.size == channel.values.size and not np.isnan(_within_range(time)).all()
+    x = _within_range(time) if timed and time is not None else np.arange(channel.values.size, dtype=float)
+    values = _within_range(channel.values)
     words = f"{channel.name}: {channel.role.replace('_', ' ')}" if channel.role else channel.name
     if np.isnan(values[np.isfinite(channel.values)]).any():
         words += f" (values beyond {LARGEST:g} not drawn)"
@@ -40,7 +40,7 @@ def _panel(channel: ChannelContent) -> Panel:
     return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))
 
 
-def _shown(values: np.ndarray) -> np.ndarray:
+def _within_range(values: np.ndarray) -> np.ndarray:
     """The values that a picture can show, which no instrument exceeds; NaN for others, 0 for what is next to it."""
     sizes = np.abs(values)
     return np.where(sizes <= LARGEST, np.where(sizes < 1 / LARGEST, 0.0, values), np.nan)

@@ -134,14 +134,14 @@ def _gridded(runs: xr.Dataset, key: Hashable) -> CellAxis:
     unit, log = unit_of(coordinate), coordinate.attrs.get("scale") == "log"
     if coordinate.dtype.kind not in "iuf":
         words = tuple(_word(str(key), value) for value in coordinate.values)
-        return _named(key, words, np.arange(len(words)))
+        return _axis_of_words(key, words, np.arange(len(words)))
     values, places = np.unique(np.asarray(coordinate.values, dtype=float), return_index=True)
     if log and values[0] <= 0:  # no logarithmic axis reaches zero: cells of equal width, each under its value
-        return _named(key, tuple(_value(value, unit) for value in values), places)
+        return _axis_of_words(key, tuple(_value(value, unit) for value in values), places)
     return CellAxis(str(key), quantity(key), unit, log, values, (), places)
 
 
-def _named(key: Hashable, words: tuple[str, ...], places: np.ndarray) -> CellAxis:
+def _axis_of_words(key: Hashable, words: tuple[str, ...], places: np.ndarray) -> CellAxis:
     return CellAxis(str(key), quantity(key), "", False, np.arange(float(len(words))), words, places)
 
 

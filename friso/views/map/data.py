@@ -80,7 +80,7 @@ def _axis(axis: CellAxis, positions: np.ndarray) -> dict[str, Any]:
         "unit": unit,
         "log": axis.log,
         "words": list(axis.words),
-        "values": [_rounded(value * factor) for value in values],
+        "values": [_shortened(value * factor) for value in values],
     }
 
 
@@ -107,7 +107,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
         "log": colouring.log,
         "low": scaled.low,
         "high": scaled.high,
-        "stops": [[_rounded(place), colour] for place, colour in scaled.stops],
+        "stops": [[_shortened(place), colour] for place, colour in scaled.stops],
         "ticks": list(scaled.ticks),
         "texts": list(scaled.texts),
         "kinds": kinds,
@@ -131,7 +131,7 @@ def _short(values: Array) -> np.ndarray:
     return (np.round(values * scaled) / scaled).astype("<f4")
 
 
-def _rounded(value: float) -> float:
+def _shortened(value: float) -> float:
     return float(f"{value:.6g}")
 
 

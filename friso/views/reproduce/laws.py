@@ -27,10 +27,10 @@ def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
 
 def laws_rows(laws: ConclusionsByLaw) -> list[tuple[str, list[str]]]:
     """For every claim, how it is judged under each law."""
-    return [(c.claim.id, [_judged(c, law) for law in laws.laws]) for c in laws.conclusions]
+    return [(c.claim.id, [_judgement_by_law(c, law) for law in laws.laws]) for c in laws.conclusions]
 
 
-def _judged(conclusion: ConclusionByLaw, law: str) -> str:
+def _judgement_by_law(conclusion: ConclusionByLaw, law: str) -> str:
     turned = conclusion.turned(law)
     return f"{conclusion.judgement(law)}: {'; '.join(turned)}" if turned else str(conclusion.judgement(law))
 

@@ -41,10 +41,10 @@ def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
         )
         for number, (name, title, caption) in _SHOWN.items()
     }
-    return figures | {"22": _locked(reproduction.linear.locked), "23": _free(reproduction.linear.free)}
+    return figures | {"22": _locked_loops(reproduction.linear.locked), "23": _free(reproduction.linear.free)}
 
 
-def _locked(loops: CrossoverLoops) -> Figure:
+def _locked_loops(loops: CrossoverLoops) -> Figure:
     caption = "The loop of the model with its joint locked, sliding, at the crossovers at which the thesis measured it."
     return _of_loops("22", "open loop, joint locked, at several crossovers", caption, loops)
 

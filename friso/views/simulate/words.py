@@ -20,7 +20,7 @@ def conclusion(name: str, measures: Measures, final: float) -> str:
         CREEPS: lambda: (
             f"creeps: {with_unit(abs(final), 'm')} off its reference at the end of the run, without a lasting swing"
         ),
-        RESTS: lambda: f"rests {_settled(measures)}",
+        RESTS: lambda: f"rests {_settling(measures)}",
     }
     outcome = str(measures.outcome[0])
     if outcome not in clauses:
@@ -28,7 +28,7 @@ def conclusion(name: str, measures: Measures, final: float) -> str:
     return f"{name}: {clauses[outcome]()}."
 
 
-def _settled(measures: Measures) -> str:
+def _settling(measures: Measures) -> str:
     """How long after the last corner of the reference the stage stays within the bands."""
     into_1um, into_10um = (_value(time) for time in measures.settling_time)
     text = f"within {with_unit(BAND, 'm')} of its reference, {with_unit(into_10um, 's')} after its last corner"

@@ -44,7 +44,7 @@ RTOL = 1e-7
 
 def figures(tuning: Advice) -> list[Figure]:
     """The response, the settling times and the sensitivities."""
-    lines = shown(tuning)
+    lines = drawn_stages(tuning)
     panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(lines))
     caption = (
         "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
@@ -66,7 +66,7 @@ ShownRemedy = tuple[Stage, RemedyOutcome | None, RemedyLine]
 Lines = Sequence[ShownRemedy]
 
 
-def shown(tuning: Advice) -> list[ShownRemedy]:
+def drawn_stages(tuning: Advice) -> list[ShownRemedy]:
     """The stages that are drawn: as it is, and with each remedy that has settings."""
     lines: list[ShownRemedy] = [(tuning.stage, None, RemedyLine("as it is", INK, "solid"))]
     for outcome in tuning.outcomes:

@@ -58,7 +58,9 @@ def _walk(node: Any, name: str, walk: _Contents) -> None:
     """Take the channels, numbers and objects of a node of the tree (dict, list, array, str)."""
     if isinstance(node, dict) and OBJECT in node:
         walk.objects.append(f"{name} ({node[OBJECT]})")
-    elif isinstance(node, dict) and {"X", "Y"} <= set(node) and any("Data" in curve for curve in _listed(node["Y"])):
+    elif (
+        isinstance(node, dict) and {"X", "Y"} <= set(node) and any("Data" in curve for curve in _structures(node["Y"]))
+    ):
         walk.channels += _dspace(node, name)
     elif isinstance(node, dict) and {"time", "signals"} <= set(node):
         walk.channels += _with_time(node, name, walk)
@@ -89,16 +91,16 @@ def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
         walk.notes.append(f"left out: {name}, an array of {' x '.join(map(str, values.shape))}")
 
 
-def _listed(node: Any) -> list[dict[str, Any]]:
+def _structures(node: Any) -> list[dict[str, Any]]:
     """A structure array as a list of structures, one alone too."""
     return [item for item in (node if isinstance(node, list) else [node]) if isinstance(item, dict)]
 
 
 def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
     """The channels of a dSPACE recording: `Y(i).Data` over `X(XIndex).Data` in seconds."""
-    axes = _listed(node["X"])
+    axes = _structures(node["X"])
     out = []
-    for i, curve in enumerate(_listed(node["Y"])):
+    for i, curve in enumerate(_structures(node["Y"])):
         values = np.atleast_1d(np.squeeze(np.asarray(curve["Data"], dtype=float)))
         index = int(np.asarray(curve.get("XIndex", 1)).ravel()[0]) - 1 if np.size(curve.get("XIndex", 1)) else 0
         axis = axes[index].get("Data") if 0 <= index < len(axes) else None
@@ -114,7 +116,7 @@ def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel
     """The channels of Simulink's structure with time: `signals(i).values` over `time` in seconds."""
     time = np.squeeze(np.asarray(node["time"], dtype=float))
     out = []
-    for i, curve in enumerate(_listed(node["signals"])):
+    for i, curve in enumerate(_structures(node["signals"])):
         source = f"{name}.signals({i + 1})"
         values = np.squeeze(np.asarray(curve.get("values", []), dtype=float))
         values = values.T if values.ndim == 2 and values.shape[0] != time.size else values

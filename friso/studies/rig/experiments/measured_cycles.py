@@ -133,7 +133,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     logs, notes = [], ()
     if result.slowest is None:
         notes = ("no varied rail has a slower cycle of a similar swing",)
-    for name, machine, number in _shown(locked, seed, result.slowest):
+    for name, machine, number in _logged_machines(locked, seed, result.slowest):
         recorded = once(machine, _longer(move(machine)), [number])
         logs.append(rig_log(recorded, 0, name, "moves", machine, number))
     return Outcome("measured-cycles", stage, seed, tuple(logs), result, notes)
@@ -156,16 +156,18 @@ def compare_cycles(
     seeds = even.flat()["rail.seed"] + np.arange(float(machines))
     first, second = (axis.ravel() for axis in np.meshgrid(deviations, long, indexing="ij"))
     cases = {"rail.static_deviation": first, "rail.coulomb_deviation": first, "rail.correlation_length": second}
-    field, asymmetry = varied(even, seed, cases, seeds, swing, progress, "rails with a random field")
+    field, asymmetry = moves_on_varied_rails(even, seed, cases, seeds, swing, progress, "rails with a random field")
     shape = (len(deviations), len(long), machines)
     pitch = stage.flat().get("rail.rolling_pitch", PITCH * swing)
     rolling = even.replace({"rail.rolling_pitch": f"{pitch!r} m"})
     waves = {"rail.first_harmonic": np.array(harmonics)}
-    rolled, rolled_asymmetry = varied(rolling, seed, waves, seeds, swing, progress, "rails with rolling elements")
+    rolled, rolled_asymmetry = moves_on_varied_rails(
+        rolling, seed, waves, seeds, swing, progress, "rails with rolling elements"
+    )
     result = CycleComparison(
         plain, np.array(deviations), long, field.shaped(*shape), asymmetry.reshape(shape), np.array(harmonics), pitch,
         rolled.shaped(len(harmonics), machines), rolled_asymmetry.reshape(len(harmonics), machines),
-        levels(even, seed, progress), others(even, seed, progress), (_trace(even, seed), None), None,
+        levels(even, seed, progress), single_changes(even, seed, progress), (_trace(even, seed), None), None,
     )  # fmt: skip
     return _with_slowest(result, even, seed, seeds)
 
@@ -195,7 +197,7 @@ def started(
     )
 
 
-def varied(
+def moves_on_varied_rails(
     stage: Stage,
     seed: int,
     cases: Mapping[str, np.ndarray],
@@ -227,7 +229,7 @@ def levels(stage: Stage, seed: int, progress: Progress) -> RailRuns:
     return cycles.shaped(len(MOTORS), len(STATIC), len(COULOMB))
 
 
-def others(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
+def single_changes(stage: Stage, seed: int, progress: Progress) -> dict[str, RailRuns]:
     """Cycles with one thing changed, by its name."""
     flat = stage.flat()
     mass = flat[TUNED_MASS]
@@ -281,7 +283,9 @@ def _trace(stage: Stage, seed: int) -> Trace:
     return Trace(recorded.time, recorded.logged["position"][0] - recorded.logged["reference"][0, -1])
 
 
-def _shown(stage: Stage, seed: int, slowest: tuple[float, float, float] | None) -> list[tuple[str, Stage, int]]:
+def _logged_machines(
+    stage: Stage, seed: int, slowest: tuple[float, float, float] | None
+) -> list[tuple[str, Stage, int]]:
     """Name, stage and seed of the noise of each log."""
     even = on_rail(stage)
     first = even.flat()["rail.seed"]

@@ -22,8 +22,8 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
     gap = static[:, None] - coulomb[None, :]
     smallest = float(gap[moving].min()) if moving.any() else np.nan
     rises = trend(gap[moving], peaks[moving])
-    at_static = _along(gap, peaks, moving)
-    at_coulomb = _along(gap.T, peaks.T, moving.T)
+    at_static = _mean_rank_correlation(gap, peaks, moving)
+    at_coulomb = _mean_rank_correlation(gap.T, peaks.T, moving.T)
     at_fixed = {"F_s": at_static, "F_c": at_coulomb}
     flat = ", ".join(
         f"{name} (mean rank correlation {correlation:.2f})"
@@ -57,8 +57,8 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
     alpha, beta, moving, valid = verdict_table(evidence.maps["control"], *axes)
     peaks = peak_counts(evidence.maps["control"], *axes)
     ones = np.ones(moving.shape)
-    with_beta = _along(beta[None, :] * ones, peaks, moving)
-    with_alpha = _along((alpha[:, None] * ones).T, peaks.T, moving.T)
+    with_beta = _mean_rank_correlation(beta[None, :] * ones, peaks, moving)
+    with_alpha = _mean_rank_correlation((alpha[:, None] * ones).T, peaks.T, moving.T)
     free_lines = int((~moving.any(axis=0)).sum() + (~moving.any(axis=1)).sum())
     square = free_square(moving, valid)
     return Finding(
@@ -87,7 +87,7 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
     )
 
 
-def _along(x: np.ndarray, y: np.ndarray, moving: np.ndarray) -> float:
+def _mean_rank_correlation(x: np.ndarray, y: np.ndarray, moving: np.ndarray) -> float:
     """Mean over the rows of the rank correlation of x and y, all of one shape, over the cells that keep moving."""
     trends = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, moving, strict=True))])
     return float(trends[np.isfinite(trends)].mean()) if np.isfinite(trends).any() else np.nan

@@ -50,7 +50,7 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
 def _beyond(locked: CrossoverLoops) -> str:
     """What crosses 0 dB besides, at the highest setting."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
-    return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_listed(further)})"
+    return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_frequencies(further)})"
 
 
 def _stable_at_speeds(speeds: Speeds) -> Part:
@@ -96,7 +96,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
             Part(
                 "at the highest setting it crosses 0 dB again above, at the lowest it does not",
                 bool(further and not _further(settings[lowest], lowest)),
-                f"tuned to {highest:g} Hz: {_listed(further)}",
+                f"tuned to {highest:g} Hz: {_frequencies(further)}",
                 why=why,
             ),
             Part(
@@ -118,8 +118,8 @@ def _why_elsewhere(contact: Contact) -> str:
     return (
         "no mode of the locked model lies there. The contact of cart and stage would with k_l of "
         f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
-        f"{_listed(soft)} with the limiter damping of the rig, {_listed(undamped)} with {LITTLE}. Or it is the frame "
-        "of the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model"
+        f"{_frequencies(soft)} with the limiter damping of the rig, {_frequencies(undamped)} with {LITTLE}. Or it is "
+        "the frame of the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model"
     )
 
 
@@ -181,7 +181,7 @@ def _further(margins: Margins, setting: float) -> tuple[float, ...]:
     return tuple(f for f in margins.crossovers if f > crossing_nearest(margins, setting))
 
 
-def _listed(frequencies: tuple[float, ...]) -> str:
+def _frequencies(frequencies: tuple[float, ...]) -> str:
     return f"{' and '.join(f'{f:.4g}' for f in frequencies)} Hz" if frequencies else "none"
 
 

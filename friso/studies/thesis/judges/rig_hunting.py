@@ -33,7 +33,7 @@ _RECOVERED = 0.5
 """Share of a difference from which a thing is taken for its cause."""
 
 
-def _counted(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
+def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
     """On how many runs peaks are counted, of how many."""
     done = ~runs.failed[which]
     return int((runs.counted[which] & done).sum()), int(done.sum())
@@ -47,7 +47,7 @@ def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
 
 def judged_move(moves: MovesOnRails) -> Finding:
     """The finding from the moves on several rails."""
-    locked, free = _counted(moves.locked, 0), _counted(moves.free)
+    locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
     return Finding(
         (
             Part(
@@ -69,7 +69,7 @@ def locked_needs_crossover(evidence: Evidence) -> Finding:
 
 def judged_crossovers(moves: MovesOnRails) -> Finding:
     """The finding from moves and releases with the joint locked."""
-    low, middle, high = (_counted(moves.locked, row) for row in range(3))
+    low, middle, high = (_runs_with_peaks(moves.locked, row) for row in range(3))
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
     lasts = moves.released.counted & moves.released.swings
     started = int((lasts.any(axis=0) & settle).sum())

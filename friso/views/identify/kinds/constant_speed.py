@@ -27,7 +27,7 @@ from friso.views.drawing.figure import (
 )
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import WAYS, Facts, KindView
-from friso.views.identify.numbers import digits, listed, with_interval, within
+from friso.views.identify.numbers import digits, estimates_in_words, with_interval, within
 
 
 def _facts(result: FrictionAtSpeeds) -> Facts:
@@ -54,7 +54,7 @@ def _direction_text(direction: Direction) -> str:
     reasons = {estimate.reason: None for estimate in several if not estimate.determined}
     names = [within(estimate.name) for estimate in several if not estimate.determined]
     missing = f"not shown: {', '.join(names)} ({'; '.join(reasons)})" if names else ""
-    return "; ".join(text for text in (listed(visible), missing) if text)
+    return "; ".join(text for text in (estimates_in_words(visible), missing) if text)
 
 
 def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import ends_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
 from friso.views.identify.moves_figures import FORCE, moves_figures, record_panels
-from friso.views.identify.numbers import digits, listed, with_interval, within
+from friso.views.identify.numbers import digits, estimates_in_words, with_interval, within
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
@@ -69,7 +69,7 @@ def _errors(moves: IdentifiedMoves) -> str:
 
 
 def _inverse_text(model: InverseModel) -> str:
-    return f"{listed(model.estimates)}; force error {percent(model.error, 3)}"
+    return f"{estimates_in_words(model.estimates)}; force error {percent(model.error, 3)}"
 
 
 def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:

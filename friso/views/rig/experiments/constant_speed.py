@@ -160,7 +160,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
             "crossover_hz": result.many.crossover,
             "places": [_place_numbers(place) for place in result.many.places],
         },
-        "slow_sliding": [_shown(sliding.result.estimates) for sliding in result.slow],
+        "slow_sliding": [_estimates_document(sliding.result.estimates) for sliding in result.slow],
     }
 
 
@@ -173,11 +173,11 @@ def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
         "friction_n": place.friction.tolist(),
         "true_speeds_m_per_s": place.speeds.tolist(),
         "true_dynamic_friction_n": place.true.tolist(),
-        **_shown(both),
+        **_estimates_document(both),
     }
 
 
-def _shown(estimates: Sequence[Estimate]) -> dict[str, Any]:
+def _estimates_document(estimates: Sequence[Estimate]) -> dict[str, Any]:
     return {
         "shown": {
             e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in estimates if e.determined

@@ -45,7 +45,7 @@ def sentences(outcome: Outcome) -> list[str]:
         _rolling(result),
         _irregular(result),
         _levels(result),
-        _others(result),
+        _other_changes(result),
     ]
 
 
@@ -133,7 +133,7 @@ def _level(motor: Any, row: Any, column: Any) -> str:
     return named if MOTORS[motor] == 1 else f"motor giving {MOTORS[motor]:.2g} of its force, {named}"
 
 
-def _others(result: CycleComparison) -> str:
+def _other_changes(result: CycleComparison) -> str:
     parts = []
     for name, runs in result.others.items():
         slow, swing = float(result.slower(runs)[0]), float(result.larger(runs)[0])
