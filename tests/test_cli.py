@@ -43,6 +43,11 @@ def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]
     assert document["cases"]["given"] == document["cases"]["free"]
 
 
+def test_check_json_has_the_condition_that_a_law_which_gives_energy_back_does_not_meet(checked: dict[str, Any]) -> None:
+    """Thesis, Table 2: sigma_2 is far below sigma_1 (F_s - F_c)/F_c = 316.2 (3 - 1)/1 N*s/m."""
+    assert "632.5 N*s/m" in (checked["friction_passive_where"] or "")
+
+
 def test_check_json_has_the_cycle_and_what_starts_it(checked: dict[str, Any]) -> None:
     cases = copy.deepcopy(checked["cases"])
     locked, free = cases["locked"], cases["free"]

@@ -85,6 +85,13 @@ class CheckAnswer(Answer):
             tables.append(AnswerTable("Across friction laws", laws_columns(self.laws), laws_rows(self.laws)))
         return tables
 
+    def details(self) -> Sequence[str]:
+        """Whether the friction law may give energy back."""
+        from friso.stage.tables import passive_where
+        from friso.views.convert.words import activity_sentences
+
+        return activity_sentences(passive_where(self.stage.flat()))
+
     @cached_property
     def traced(self) -> Mapping[str, Case]:
         """The cases with their time responses, which figures show."""

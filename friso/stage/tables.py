@@ -103,6 +103,12 @@ def friction_law(name: str) -> type[FrictionSection]:
     return cast(type[FrictionSection], FRICTION.named(name))
 
 
+def passive_where(flat: Mapping[str, Any]) -> str:
+    """The condition of passivity that the friction law of a stage, given as flat SI values, does not meet; "" where it
+    is passive, or does not say."""
+    return friction_law(flat["friction.model"]).active(flat)
+
+
 def friction_laws() -> dict[str, type[FrictionSection]]:
     """The registered laws by name."""
     return cast(dict[str, type[FrictionSection]], FRICTION.classes)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.asking import ask
+from friso.cli.asking import Details, ask
 from friso.cli.command import HUNTS, Command
 from friso.cli.common import AsJson, Overrides, StageFile, Tolerance
 from friso.cli.output import OutFolder, Overwrite
@@ -39,6 +39,7 @@ def check(
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
+    details: Details = False,
 ) -> None:
     """Does the stage hunt: as given, and with its joint locked and free.
 
@@ -47,7 +48,7 @@ def check(
     from friso.answers.check import check as question
 
     options = {"set": overrides, "rtol": rtol, "draws": draws, "seed": seed, "laws": laws}
-    shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
+    shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
     ask("check", question, stage_file, **options, **shown, what="what attracts the stage")
 
 

@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.frequency.friction import steady_force
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest_name, numeric_fields
-from friso.stage.tables import FrictionSection, friction_law, friction_laws
+from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
 
 ELEMENTS = 6
 """Elements of a law that has several, unless told otherwise."""
@@ -122,7 +122,7 @@ def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConvers
         _number("damping", "N*s/m", before.damping, after.damping),
         _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
-    return LawConversion(made, source, before, after, items, law.left_open(before), law.active(flat))
+    return LawConversion(made, source, before, after, items, law.left_open(before), passive_where(flat))
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:

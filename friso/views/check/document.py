@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from friso.stage.tables import passive_where
 from friso.views.check.laws import laws_document
 from friso.views.check.words import answer
 from friso.views.documents import plain_json
@@ -36,6 +37,7 @@ def check_document(
         {
             "conclusion": " ".join(answer(cases)),
             "stage": cases["given"].stage.name,
+            "friction_passive_where": passive_where(cases["given"].stage.flat()) or None,
             "cases": document,
             **({"isolator": _isolator(isolator)} if isolator else {}),
             **({"laws": laws_document(laws)} if laws else {}),

@@ -36,9 +36,12 @@ def conversion_sentences(conversion: LawConversion) -> list[str]:
     else:
         says = [f"{name} under {law} shows the same in measurements."]
     says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
-    if conversion.active:
-        says.append(f"The law may give energy back, which no friction does. It is passive where {conversion.active}.")
-    return says
+    return [*says, *activity_sentences(conversion.active)]
+
+
+def activity_sentences(condition: str) -> list[str]:
+    """That a law may give energy back, with the `condition` of passivity that it does not meet; "": it is passive."""
+    return [f"The law may give energy back, which no friction does. It is passive where {condition}."] * bool(condition)
 
 
 def _change(item: MeasuredChange) -> str:
