@@ -12,9 +12,10 @@ from refusals import Refused
 import friso
 from friso.design_method.geometry import Geometry, Sheet, box, round_geometries, sheets
 from friso.design_method.outline import outline
-from friso.design_method.population import corners, random_machines, typical_move
-from friso.design_method.prepare import assumed, prepared, with_leaves
+from friso.design_method.population import corners, sampled, typical_move
+from friso.design_method.prepare import assumed, by_rules, prepared, with_leaves
 from friso.design_method.spec import Spec, load_spec, read_spec
+from friso.frequency.bandwidth import loop_bandwidth
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = EXAMPLES / "specs" / "thesis.toml"
@@ -168,10 +169,18 @@ def test_the_outline_of_a_specification_is_one(rig: friso.Stage) -> None:
     prepared(stage, spec)
 
 
-def test_gains_instead_of_a_crossover(rig: friso.Stage, refused: Refused) -> None:
-    gains = {"kind": "pid", "kp": "3 N/m", "ki": "4 N/(m*s)", "kd": "6 N*s/m", "tau": "1 ms"}
-    with refused("controller"):
-        prepared(rig.replace({"controller": gains}), load_spec(SPEC))
+def test_other_controllers_give_way_to_the_rules_at_their_bandwidth(rig: friso.Stage) -> None:
+    """Of a rigid stage too, whose specification is made from it."""
+    cascade = {"kind": "cascade", "kv": "10 1/s", "kp": "85 N*s/m", "velocity_integral_time": "0.1 s"}
+    limited = {**cascade, "force_limit": "200 N"}
+    stage = rig.replace({"controller": limited, "joint": None, "parasitic": None})
+    ruled = by_rules(stage)
+    assert ruled.flat()["controller.crossover"] == pytest.approx(loop_bandwidth(stage), rel=1e-3)
+    assert ruled.flat()["controller.force_limit"] == 200.0
+    assert by_rules(ruled) is ruled
+    spec = read_spec(outline(stage))
+    assert spec.limit == pytest.approx(loop_bandwidth(stage), rel=1e-3)
+    assert prepared(stage, spec).flat()["controller.crossover"] == spec.limit
 
 
 def test_a_prepared_stage_takes_leaves(rig: friso.Stage) -> None:

@@ -11,7 +11,7 @@ from friso.answers.answer import Answer, question
 from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, read_stage
 from friso.design_method.method import Design
 from friso.design_method.outline import outline
-from friso.design_method.prepare import assumed
+from friso.design_method.prepare import assumed, by_rules
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
@@ -144,6 +144,13 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
     if outlined:
         made = "friso init --spec STAGE.toml writes it for you to edit"
         LOGGER.warning(f"no specification: one is made from the stage file; {made}")
+    rules = by_rules(stage)
+    if rules is not stage:
+        hertz = with_unit(rules.flat()["controller.crossover"], "Hz")
+        LOGGER.warning(
+            f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
+            f"controller, whose bandwidth is {hertz}; friso export gains tells its gains"
+        )
     if keys := assumed(stage, spec):
         units = numeric_keys(stage.flat() | keys)
         numbers = ", ".join(f"{key} = {with_unit(value, units[key].unit)}" for key, value in keys.items())

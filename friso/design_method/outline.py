@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from friso.design_method.prepare import check_designable
-from friso.equations.bandwidth import bandwidth
+from friso.frequency.bandwidth import loop_bandwidth
 from friso.intervals import Interval
 from friso.quantities import percent
 from friso.stage import Stage
@@ -15,9 +15,6 @@ FRICTION, MASS = 0.3, 0.05
 TRAVELS = 0.1
 """The shortest move, as a share of the stage file's travel."""
 
-LIMIT = 20.0
-"""Bandwidth limit [Hz] where the controller states none."""
-
 SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
 
 
@@ -27,7 +24,7 @@ def outline(stage: Stage) -> str:
     InputError for a stage that `friso design` cannot design for."""
     check_designable(stage)
     flat = stage.flat()
-    limit = bandwidth(flat) or LIMIT
+    limit = loop_bandwidth(stage)
     friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
     masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
     both = masses if len(masses) == 2 else [f"# {line}   # split, unless both are told" for line in masses]
@@ -39,7 +36,7 @@ def outline(stage: Stage) -> str:
             f'name = "Friction isolator of {stage.name or "the stage"}"',
             "",
             "[machine]                                  # the highest bandwidth that it allows",
-            f'bandwidth_limit = "{limit:g} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',
+            f'bandwidth_limit = "{limit:.4g} Hz"             # the present one; or parasitic_frequencies = ["480 Hz"]',
             "",
             "[friction]                                 # ranges; a key left out stays as in the stage file",
             *friction,

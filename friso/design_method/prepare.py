@@ -5,12 +5,16 @@ from __future__ import annotations
 from friso.design_method.geometry import Geometry, moved_along
 from friso.design_method.isolator import isolated
 from friso.design_method.spec import Spec
-from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, controller_table
 from friso.errors import InputError
+from friso.frequency.bandwidth import loop_bandwidth
 from friso.materials import materials
 from friso.stage import Stage
 
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
+
+LIMITS = ("force_limit", "anti_windup", "anti_windup_time")
+"""Keys of a controller that one by other rules keeps."""
 
 
 def prepared(stage: Stage, spec: Spec) -> Stage:
@@ -18,7 +22,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
     ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
     check_designable(stage)
-    stage = complete_joint(stage, spec)
+    stage = complete_joint(by_rules(stage), spec)
     section = spec.leaves
     low, high = (min(map(float, section.thickness)), section.stroke.high)
     masses: dict[str, str | None] = {
@@ -45,6 +49,16 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in section}
     base = stage.replace(removed | masses | sizes | leaves)
     return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base
+
+
+def by_rules(stage: Stage) -> Stage:
+    """The stage with a controller by van Dijk's rules, whose crossover follows from the design: its own, or else one of
+    the same bandwidth and force limit."""
+    if CROSSOVER in stage.flat():
+        return stage
+    written = stage.as_written()
+    kept = {key: written["controller"][key] for key in LIMITS if key in written["controller"]}
+    return Stage(**{**written, "controller": {**controller_table(f"{loop_bandwidth(stage):.4g} Hz"), **kept}})
 
 
 def complete_joint(stage: Stage, spec: Spec) -> Stage:
@@ -80,9 +94,3 @@ def check_designable(stage: Stage) -> None:
         raise InputError(
             "friction", "none", "friction, without which no isolator is needed", '[friction] model = "lugre" ...'
         )
-    if CROSSOVER not in stage.flat():
-        expected = (
-            "a controller tuned by van Dijk's rules, whose crossover follows from the design: put it in the place of "
-            "the gains, and friso export gains tells those that the design has found"
-        )
-        raise InputError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

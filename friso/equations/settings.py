@@ -34,6 +34,10 @@ DEADBANDS, EXITS = (0.1, 0.9), (1.0, 10.0)
 WINDOWS, FACTORS = (0.5, 100.0), (0.05, 4.0)
 """Ranges of the standstill window, in tolerances, and of the gains in it."""
 
+AMPLITUDES, FREQUENCIES = (0.1, 1.5), (3.0, 30.0)
+"""Ranges of a dither: its amplitude in units of sliding friction, its frequency in units of the mass's on the loop's
+stiffness."""
+
 
 @dataclass(frozen=True)
 class Setting:
@@ -85,12 +89,23 @@ def _standstill(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
     return {"standstill_window": _scaled(within, WINDOWS), "standstill_factor": FACTORS}
 
 
-def _dither(flat: Machine, within: float) -> dict[str, float]:
+def _dithers(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+    return {
+        "dither_amplitude": _scaled(float(sliding(flat)), AMPLITUDES),
+        "dither_frequency": _scaled(_own_frequency(flat), FREQUENCIES),
+    }
+
+
+def _own_frequency(flat: Machine) -> float:
+    """That [Hz] of the moving mass on the proportional stiffness of the loop."""
     proportional, _ = slow_gains(flat)
-    fast = 10 * sqrt(proportional / moving_mass(flat)) / (2 * pi)
+    return sqrt(proportional / moving_mass(flat)) / (2 * pi)
+
+
+def _dither(flat: Machine, within: float) -> dict[str, float]:
     return {
         "dither_amplitude": 0.5 * float(sliding(flat)),
-        "dither_frequency": min(fast, 1 / (20 * flat["drive.sample_time"])),
+        "dither_frequency": min(10 * _own_frequency(flat), 1 / (20 * flat["drive.sample_time"])),
     }
 
 
@@ -128,7 +143,9 @@ SETTINGS: Mapping[str, Setting] = {
         False,
         lambda flat, within: {"stiction_push": 0.8 * float(sliding(flat)), "stiction_push_window": within},
     ),
-    "dither": Setting("m", "dither", "a sinusoidal force of {dither_amplitude} at {dither_frequency}", False, _dither),
+    "dither": Setting(
+        "m", "dither", "a sinusoidal force of {dither_amplitude} at {dither_frequency}", False, _dither, _dithers
+    ),
 }
 """Sizes are our choice: an integral that can just break the machine loose; a leak at a tenth of the integral's corner;
 integrals that pause within half the tolerance until twice the tolerance is exceeded; half the gains within five

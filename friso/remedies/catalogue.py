@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,7 +15,7 @@ from friso.errors import InputError
 from friso.remedies import variables
 from friso.remedies.goal import Goal
 from friso.remedies.variables import Variable, bandwidth_factor, of_key
-from friso.stage import Stage
+from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
@@ -46,31 +46,38 @@ class Remedy:
         return cls(name, stage, (), buys_joint)
 
     def tuned(self, shares: np.ndarray) -> Stage:
-        """The stage at shares of the ranges, (variables,), its numbers rounded to four digits."""
-        return self.stage.with_numbers({k: float(f"{v[0]:.4g}") for k, v in self.changes(shares[None]).items()})
+        """The stage at shares of the ranges, (variables,), its numbers rounded to four digits but where they are the
+        present ones."""
+        numbers = {key: float(values[0]) for key, values in self.changes(shares[None]).items()}
+        present = {variable.name: variable.present for variable in self.variables}
+        return self.stage.with_numbers(
+            {key: value if value == present.get(key) else float(f"{value:.4g}") for key, value in numbers.items()}
+        )
 
 
 def remedies(stage: Stage, goal: Goal) -> list[Remedy]:
     """The remedies that a goal allows, those that change least first."""
     listed: list[Remedy] = []
-    speed = bandwidth_factor(stage, goal.bandwidth_limit)
     if goal.controller:
-        listed += [Remedy("bandwidth", stage, (speed,)), *_gains("gains", stage, speed)]
-        listed += [*_notch(stage, speed), *_against_friction(stage, goal)]
+        listed += [Remedy("bandwidth", stage, (bandwidth_factor(),)), *_gains("gains", stage)]
+        listed += [*_notch(stage), *_against_friction(stage, goal), *_structures(stage)]
     if goal.joint and least_breakaway(stage.flat()) > 0:
-        listed += _isolators(stage, goal, speed)
+        listed += _isolators(stage, goal)
     return listed
 
 
-def _gains(
-    name: str, stage: Stage, speed: Variable, first: tuple[Variable, ...] = (), buys_joint: bool = False
-) -> list[Remedy]:
+def with_bandwidth(remedy: Remedy) -> Remedy:
+    """A remedy together with the bandwidth."""
+    return Remedy(f"{remedy.name}, and bandwidth", remedy.stage, (*remedy.variables, bandwidth_factor()))
+
+
+def _gains(name: str, stage: Stage, first: tuple[Variable, ...] = (), buys_joint: bool = False) -> list[Remedy]:
     """All gains, where there are more than the bandwidth tells."""
-    several = (*first, *variables.gains(stage, speed))
+    several = (*first, *variables.gains(stage))
     return [Remedy(name, stage, several, buys_joint)] if len(several) > 1 else []
 
 
-def _notch(stage: Stage, speed: Variable) -> Iterator[Remedy]:
+def _notch(stage: Stage) -> Iterator[Remedy]:
     """A notch at the parasitic mode, with which the bandwidth can be higher."""
     flat = stage.flat()
     if "parasitic.frequency" not in flat:
@@ -84,7 +91,26 @@ def _notch(stage: Stage, speed: Variable) -> Iterator[Remedy]:
         return
     key = f"{FILTERS_KEY}.{len(filters) + 1}.width"
     width = of_key(key, WIDTHS[0] * frequency, WIDTHS[1] * frequency)
-    yield Remedy("notch at the parasitic mode, and bandwidth", with_notch, (width, speed))
+    yield Remedy("notch at the parasitic mode, and bandwidth", with_notch, (width, bandwidth_factor()))
+
+
+def _structures(stage: Stage) -> Iterator[Remedy]:
+    """The other structures that the controller of the stage can have, each with all its gains."""
+    flat = stage.flat()
+    for name, changes in controller_of(flat).structures(flat).items():
+        try:
+            other = _restructured(stage, changes)
+        except InputError:  # an uncertain key, for instance, that the other one has not
+            continue
+        yield from _gains(name, other)
+
+
+def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
+    """A stage with keys of its controller changed: numbers [SI], texts, or None for those that go."""
+    numbers = {key: value for key, value in changes.items() if isinstance(value, float)}
+    keys = numeric_keys({key: value for key, value in {**stage.flat(), **changes}.items() if value is not None})
+    texts = {key: f"{value!r} {keys[key].unit}" if keys[key].unit else value for key, value in numbers.items()}
+    return stage.replace({**changes, **texts})
 
 
 def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
@@ -101,7 +127,7 @@ def _against_friction(stage: Stage, goal: Goal) -> Iterator[Remedy]:
             yield Remedy(setting.name, stage.with_numbers(numbers), keys)
 
 
-def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Remedy]:
+def _isolators(stage: Stage, goal: Goal) -> Iterator[Remedy]:
     """An isolator, alone and with the gains; leaf springs of the file give way to a joint stated by its numbers."""
     try:
         free = isolated(stage)
@@ -114,4 +140,4 @@ def _isolators(stage: Stage, goal: Goal, speed: Variable) -> Iterator[Remedy]:
     joint = variables.joint_variables(float(least_breakaway(flat)))
     yield Remedy("isolator", free, joint, True)
     if goal.controller:
-        yield from _gains("isolator and gains", free, speed, joint, True)
+        yield from _gains("isolator and gains", free, joint, True)

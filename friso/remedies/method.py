@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import islice
 
 import numpy as np
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.motion import last_corner
+from friso.equations.settings import SETTINGS
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.crossover import Limits, limits
 from friso.hunting.check import Case
 from friso.progress import Progress, silent
-from friso.remedies.catalogue import Remedy, remedies
+from friso.remedies.catalogue import Remedy, remedies, with_bandwidth
+from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
+from friso.remedies.least import MORE, candidates, least_remedy, seek_least
 from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
-from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals, verified
+from friso.remedies.verified import (
+    Performance,
+    RemedyOutcome,
+    missed_parts,
+    performance_of,
+    unmet_goals,
+    unsettled_parts,
+    verified,
+)
 from friso.remedies.window import windows
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
@@ -30,13 +42,16 @@ from friso.studies.compare.options import linear_flat
 TRIES = 3
 """Points of a remedy that are verified at most: the next best ones where the best are not sure to work."""
 
+PAIRS = 2
+"""Settings against friction that are tried together with the bandwidth."""
+
 FRESH = 1000
 """What is added to the seed for the machines that the optimiser does not see."""
 
 
 @dataclass(frozen=True)
 class Advice:
-    """The outcomes of all remedies, those that change least first, for a stage that was checked and measured itself
+    """The outcomes of all remedies, in the order of the catalogue, for a stage that was checked and measured itself
     (`present`); the bandwidths with which it keeps its margin; what its edge of hunting depends on; what to relax where
     nothing works; whether it was interrupted."""
 
@@ -58,9 +73,19 @@ class Advice:
         return bool(unmet_goals(self.case, self.present, self.goal))
 
     @property
+    def least(self) -> RemedyOutcome | None:
+        """The least change that works (see `ChangeSize`)."""
+        return next(iter(self.working), None)
+
+    def size(self, outcome: RemedyOutcome) -> ChangeSize:
+        """How large the change is for a remedy that has settings."""
+        assert outcome.stage is not None
+        return change_size(self.stage, outcome.stage)
+
+    @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """The remedies that work."""
-        return tuple(outcome for outcome in self.outcomes if outcome.certainty == "works")
+        """The remedies that work, those that change least first."""
+        return tuple(sorted((o for o in self.outcomes if o.certainty == "works"), key=self.size))
 
     @property
     def fastest(self) -> RemedyOutcome | None:
@@ -87,36 +112,43 @@ def tune(
     _moves(stage)
     ideal = _ideal(stage)
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + 2)
+    later = (PAIRS + 1) * (budget.generations + 4)  # pairs and the least change, about
+    report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     fresh = draw_fleet(ideal, correlations, budget.fresh, seed + FRESH)
-    machines = draw_fleet(ideal, correlations, budget.machines, seed)
+    machines = machines_of_search(ideal, correlations, budget, seed)
     report("the stage as it is")
     case, present = verified(ideal), performance_of(ideal, fresh, goal, stage)
-    outcomes: list[RemedyOutcome] = []
+    if not unmet_goals(case, present, goal):
+        listed = []  # nothing has to change
+    session = _Session(ideal, stage, goal, machines, fresh, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
-    interrupted, searches = False, list[Search]()
+    interrupted = False
     try:
+        own = [remedy for remedy in listed if remedy.stage is ideal]
+        for remedy in own:
+            session.tries(remedy)
+        session.tries_less()
         for remedy in listed:
-            search = Search(remedy, goal, machines, stage, budget, report)
-            searches = [search]
-            outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))  # as long as it is not there
-            outcomes[-1] = _outcome_of(search, fresh, stage, outcomes)
-            report.after(_steps(remedy, budget))
-        if not any(outcome.certainty == "works" for outcome in outcomes):
+            if remedy not in own:
+                session.tries(remedy)
+        for remedy in pairs(session.outcomes, goal) if chosen is None else ():
+            session.tries(remedy)
+        session.tries_less()
+        if listed and not any(outcome.certainty == "works" for outcome in session.outcomes):
             report("what to relax")
-            relaxed = relaxations(outcomes, goal, machines)
+            relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
     except KeyboardInterrupt:
         interrupted = True
-        outcomes[-1:] = [_so_far(search, outcome) for search, outcome in zip(searches, outcomes[-1:], strict=True)]
+        session.interrupted()
     return Advice(
         ideal,
         goal,
         case,
         present,
         limits(linear_flat(stage, stage.flat())),
-        tuple(outcomes),
+        tuple(session.outcomes),
         relaxed,
         fresh,
         seed,
@@ -125,45 +157,111 @@ def tune(
     )
 
 
-def _outcome_of(search: Search, fresh: Fleet, drive: Stage, outcomes: list[RemedyOutcome]) -> RemedyOutcome:
-    """The best points of a remedy that are verified, or else the best that are not sure to work; `outcomes` ends with
-    what is known of it so far."""
-    remedy, goal = search.remedy, search.goal
-    search.optimise()
-    unsure: RemedyOutcome | None = None
-    for number, shares in enumerate(search.surveyed()):
+def machines_of_search(stage: Stage, correlations: Correlations, budget: Budget, seed: int) -> Fleet:
+    """The machines that searches see: for settings that settle soonest the first of them."""
+    return draw_fleet(stage, correlations, MORE * budget.machines, seed)
+
+
+@dataclass
+class _Session:
+    """The remedies of a stage that are tried one after the other, and their `outcomes` so far; `searching` is the one
+    under way."""
+
+    stage: Stage
+    drive: Stage
+    goal: Goal
+    machines: Fleet
+    fresh: Fleet
+    budget: Budget
+    report: _Report
+    outcomes: list[RemedyOutcome] = field(default_factory=list)
+    searching: Search | None = None
+    tried_less: bool = False
+
+    def tries(self, remedy: Remedy) -> None:
+        """A remedy, for the settings that settle soonest."""
+        search = self._begun(remedy, self.budget.machines)
+        search.optimise()
+        self._ended(search, search.surveyed())
+
+    def tries_less(self) -> None:
+        """The least change of the controller as it is, from the remedy of that which works and changes most; where none
+        works, from what changes least of the others. Once."""
+        working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
+        own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
+        ordered = sorted(own or working, key=self._size, reverse=bool(own))
+        for outcome in ordered[: not self.tried_less]:
+            assert outcome.stage is not None
+            less = least_remedy(self.stage, outcome.stage, outcome.remedy)
+            if less is not None:
+                self.tried_less = True
+                search = self._begun(less, MORE * self.budget.machines)
+                seek_least(search)
+                self._ended(search, candidates(search))
+
+    def interrupted(self) -> None:
+        """What is known of the remedy under way: its best point so far, not verified."""
+        if self.searching is not None and self.outcomes[-1].interrupted:
+            self.outcomes[-1] = _so_far(self.searching, self.outcomes[-1])
+
+    def _size(self, outcome: RemedyOutcome) -> ChangeSize:
+        assert outcome.stage is not None
+        return change_size(self.stage, outcome.stage)
+
+    def _begun(self, remedy: Remedy, machines: int) -> Search:
+        """The search for a remedy, on so many of the machines."""
+        several = self.machines.take(np.arange(machines))
+        search = Search(remedy, self.goal, several, self.drive, self.budget, self.report)
+        self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))  # until it has ended
+        self.searching = search
+        return search
+
+    def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
+        """The first of a few points that is verified, or else the first that is not sure to work."""
+        unsure: RemedyOutcome | None = None
+        for shares in islice(points, TRIES):
+            outcome = self._verified(search, shares)
+            if outcome.certainty == "works":
+                unsure = outcome
+                break
+            unsure = unsure or outcome
+            self.outcomes[-1] = unsure
+        tried = search.points if search.tried else None
+        none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted)
+        self.outcomes[-1] = unsure or none
+        self.report.after(_steps(search.remedy, self.budget))
+
+    def _verified(self, search: Search, shares: np.ndarray) -> RemedyOutcome:
+        """A point on machines that the optimiser did not see and, where these meet the goal, by its cycles."""
+        remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
-        search.report(f"{remedy.name}: cycles")
-        measured = performance_of(tuned, fresh, goal, drive)
-        case = verified(tuned)
-        around = windows(search, shares)
-        outcome = RemedyOutcome(
-            remedy,
-            tuned,
-            measured,
-            case,
-            unmet_goals(case, measured, goal),
-            around,
-            search.points,
-            search.attracted,
-            shares=shares,
-        )
-        if outcome.certainty == "works":
-            return outcome
-        unsure = unsure or outcome
-        outcomes[-1] = unsure
-        if number + 1 == TRIES:
-            break
-    return unsure or RemedyOutcome(remedy, None, None, None, (), (), search.points, search.attracted)
+        self.report(f"{remedy.name}: fresh machines")
+        measured = performance_of(tuned, self.fresh, goal, self.drive)
+        doubted, case = missed_parts(measured, goal), None
+        if not doubted:
+            self.report(f"{remedy.name}: cycles")
+            case = verified(tuned)
+            doubted = unsettled_parts(case, measured, goal)
+        around = () if doubted else windows(search, shares)
+        tried = search.points, search.attracted
+        return RemedyOutcome(remedy, tuned, measured, case, doubted, around, *tried, shares=shares)
+
+
+def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
+    """The settings against friction that came closest to the goal, or met it, each together with the bandwidth."""
+    names = {setting.name for setting in SETTINGS.values()}
+    tried = [outcome for outcome in outcomes if outcome.remedy.name in names and outcome.points]
+    closest = sorted(tried, key=lambda outcome: outcome.least_cost(goal))
+    return [with_bandwidth(outcome.remedy) for outcome in closest[:PAIRS]]
 
 
 def _so_far(search: Search, outcome: RemedyOutcome) -> RemedyOutcome:
     """What is known of a remedy whose search was interrupted: its best point so far, not verified."""
-    if not outcome.interrupted or not search.tried:
+    if not search.tried:
         return outcome
     points = search.points
     best = int(points.cost(search.goal).argmin())
-    if any(broken[best] for broken in points.broken(search.goal).values()):
+    if not points.meets(search.goal)[best]:
         return outcome
     shares = points.shares[best]
     return replace(outcome, stage=search.remedy.tuned(shares), points=points, shares=shares)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,12 +12,15 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
-from friso.remedies.trials import LOOSER, attraction
+from friso.remedies.trials import LOOSER, attraction, moves_of_points
 from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
 
 TRIED, SURVEYED = 3, 4
 """Points whose machines are surveyed, at most, for one relaxation, and how many machines."""
+
+WIDER = (1.5, 2.0, 3.0, 5.0)
+"""Factors of the tolerance that are tried where the moves settle within ten times as much (`LOOSER`)."""
 
 
 @dataclass(frozen=True)
@@ -55,40 +58,62 @@ def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet)
     possible = np.isfinite(factor) & np.isfinite(points.slower)
     few = machines.take(np.arange(min(SURVEYED, machines.count)))
     for parts in (1, 2):
-        kinds: dict[tuple[str, ...], int] = {}
+        tried: dict[tuple[str, ...], int] = {}
+        enough = False
         which = np.flatnonzero(possible & (count == parts))
         for number in which[np.argsort(factor[which], kind="stable")]:
             names = tuple(name for name, values in needed.items() if values[number] > 1)
-            kinds[names] = kinds.get(names, 0) + 1
-            if kinds[names] > TRIED:
+            tried[names] = tried.get(names, 0) + 1
+            if tried[names] > TRIED:
                 continue
             if attraction(remedy, points.shares[[number]], few, goal).clear.all():
-                kinds[names] = TRIED
-                relaxed = tuple(_relaxation(name, points, int(number), goal) for name in names)
-                yield RelaxedGoal(remedy, remedy.tuned(points.shares[number]), relaxed, float(factor[number]))
-        if kinds:
+                tried[names], enough = TRIED, True
+                yield _relaxed_goal(remedy, points.take(np.array([number])), names, goal, machines)
+        if enough:
             return
+
+
+def _relaxed_goal(
+    remedy: Remedy, point: TriedPoints, names: tuple[str, ...], goal: Goal, machines: Fleet
+) -> RelaxedGoal:
+    """The goal with parts relaxed for a point. The tolerance is the first of a few with which the machines settle."""
+    within = next(
+        (part for part in WIDER if "within" in names and _settles(remedy, point, goal, part, machines)), LOOSER
+    )
+    values = {
+        "margin": ("modulus margin", float(point.margin[0]), ""),
+        "settle": ("settling time", float(_time(point)[0]), "s"),
+        "force_limit": ("force of the actuator", float(point.force[0]), "N"),
+        "within": ("deviation that counts as in position", within * goal.within, "m"),
+        "bandwidth_limit": ("limit of the bandwidth", float(point.bandwidth[0]), "Hz"),
+    }
+    relaxed = []
+    for name in names:
+        requirement, needed, unit = values[name]
+        relaxed.append(Relaxation(requirement, name, getattr(goal, name), needed, unit))
+    factor = np.prod([max(part.needed / part.value, part.value / part.needed) for part in relaxed])
+    return RelaxedGoal(remedy, remedy.tuned(point.shares[0]), tuple(relaxed), float(factor))
+
+
+def _settles(remedy: Remedy, point: TriedPoints, goal: Goal, factor: float, machines: Fleet) -> bool:
+    """Whether the machines settle within so many times the tolerance, in the time of the goal if it has one."""
+    time = moves_of_points(remedy, point.shares, machines, replace(goal, within=factor * goal.within)).slowest(goal.share)[0]
+    return bool(np.isfinite(time) and time <= (np.inf if goal.settle is None else goal.settle))
 
 
 def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:
     """The factors by which parts of the goal would have to be relaxed for each point."""
-    time = np.where(np.isfinite(points.settling), points.settling, points.looser)
-    none = np.zeros(len(time))
+    none = np.zeros(len(points.margin))
+    limit = goal.bandwidth_limit
     return {
         "margin": goal.margin / np.maximum(points.margin, 1e-9) * np.where(points.margin > 0, 1, np.inf),
         "within": np.where(np.isfinite(points.settling), 1.0, np.where(np.isfinite(points.looser), LOOSER, np.inf)),
-        "settle": none if goal.settle is None else time / goal.settle,
+        "settle": none if goal.settle is None else _time(points) / goal.settle,
         "force_limit": none if goal.force_limit is None else points.force / goal.force_limit,
+        "bandwidth_limit": none if limit is None else np.nan_to_num(points.bandwidth / limit, nan=np.inf),
     }
 
 
-def _relaxation(part: str, points: TriedPoints, number: int, goal: Goal) -> Relaxation:
-    """What a part of the goal would have to be for a point."""
-    time = points.settling[number] if np.isfinite(points.settling[number]) else points.looser[number]
-    name, needed, unit = {
-        "margin": ("modulus margin", points.margin[number], ""),
-        "settle": ("settling time", time, "s"),
-        "force_limit": ("force of the actuator", points.force[number], "N"),
-        "within": ("deviation that counts as in position", LOOSER * goal.within, "m"),
-    }[part]
-    return Relaxation(name, part, getattr(goal, part), float(needed), unit)
+def _time(points: TriedPoints) -> np.ndarray:
+    """The settling time within the tolerance, or else within the looser one [s]."""
+    return np.where(np.isfinite(points.settling), points.settling, points.looser)

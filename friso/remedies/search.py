@@ -1,18 +1,25 @@
 """The best points of one remedy: differential evolution over whole generations in the engine's lanes, then surveys of
-what attracts the machines."""
+what attracts the machines.
+
+Storn, Price 1997 (doi:10.1023/A:1008202821328), as SciPy has it.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import differential_evolution
 
+from friso.engine.allowance import Exhausted, allowance
+from friso.frequency.bandwidth import loop_bandwidth, loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
+from friso.remedies.variables import BANDWIDTH
 from friso.stage import Stage
 
 SEED = 27
@@ -23,6 +30,15 @@ WORST = 1e3
 
 BATCH, MOST = 3, 8
 """Points whose machines are surveyed at once, and how often at most until the remedy is given up."""
+
+MOST_POINTS = 40
+"""Points of a generation at most."""
+
+WORK = 5e8
+"""Work of a search (see `friso.engine.allowance`): about 6 s on one core. Moves that chatter take most of it."""
+
+SPARE = 1e-3
+"""Share by which a bandwidth stays below its limit: numbers are rounded, and bandwidths taken from a grid."""
 
 APART = 0.03
 """Least distance of points that are surveyed one after the other, as a share of a range."""
@@ -44,7 +60,8 @@ class Budget:
 class TriedPoints:
     """Points that were tried, one a row: their `shares` of the ranges (n, variables), and, each of shape (n,), the
     settling time of the slowest twentieth [s] and within the looser tolerance, the same with the bandwidth lower by the
-    distance from hunting, the largest force [N] and least modulus margin of all but a twentieth."""
+    distance from hunting, the largest force [N] and least modulus margin of all but a twentieth, and the bandwidth [Hz]
+    of the machine of the stage file."""
 
     shares: np.ndarray
     settling: np.ndarray
@@ -52,6 +69,7 @@ class TriedPoints:
     slower: np.ndarray
     force: np.ndarray
     margin: np.ndarray
+    bandwidth: np.ndarray
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
         """The points with these numbers."""
@@ -60,23 +78,37 @@ class TriedPoints:
     def broken(self, goal: Goal) -> dict[str, np.ndarray]:
         """Which points break a constraint of the goal, by its name."""
         return {
+            "bandwidth": np.isfinite(_most(goal.bandwidth_limit)) & ~(self.bandwidth <= _most(goal.bandwidth_limit)),
             "margin": self.margin < goal.margin,
-            "force": self.force > (np.inf if goal.force_limit is None else goal.force_limit),
+            "force": self.force > _most(goal.force_limit),
             "settling": ~np.isfinite(self.settling),
             "distance": ~np.isfinite(self.slower),
-            "settle": np.isfinite(self.settling) & (self.settling > (np.inf if goal.settle is None else goal.settle)),
+            "settle": np.isfinite(self.settling) & (self.settling > _most(goal.settle)),
         }
 
-    def cost(self, goal: Goal) -> np.ndarray:
-        """What is minimised: the settling time, or how far constraints are broken."""
-        limit = np.inf if goal.force_limit is None else goal.force_limit
-        late = np.inf if goal.settle is None else goal.settle
+    def meets(self, goal: Goal) -> np.ndarray:
+        """Which points break no constraint."""
+        return ~np.any([*self.broken(goal).values()], axis=0)
+
+    def cost(self, goal: Goal, wanted: np.ndarray | None = None) -> np.ndarray:
+        """What is minimised: the settling time, or what is `wanted` small instead; or how far it breaks constraints."""
         excess = np.maximum(0, goal.margin - self.margin)
-        excess += np.where(np.isfinite(self.force), np.maximum(0, np.nan_to_num(self.force) / limit - 1), 3.0)
+        excess += np.where(np.isfinite(self.force), _excess(np.nan_to_num(self.force), goal.force_limit), 3.0)
+        excess += np.nan_to_num(_excess(self.bandwidth, goal.bandwidth_limit), nan=3.0)
         excess += ~np.isfinite(self.settling) * 3.0 + ~np.isfinite(self.slower) * 1.0
         time = np.where(np.isfinite(self.settling), self.settling, 100.0)
-        excess += np.maximum(0, time / late - 1)
-        return np.asarray(np.where(excess > 0, WORST * (1 + excess) + time, time))
+        excess += _excess(time, goal.settle)
+        minimised = time if wanted is None else wanted
+        return np.asarray(np.where(self.meets(goal), minimised, WORST * (1 + excess) + time))
+
+
+def _most(limit: float | None) -> float:
+    return np.inf if limit is None else limit
+
+
+def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
+    """By what share values are above a limit."""
+    return np.maximum(0, values / _most(limit) - 1)
 
 
 @dataclass
@@ -100,35 +132,55 @@ class Search:
             *(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True))
         )
 
-    def optimise(self) -> None:
-        """Try points until they get no better."""
+    def optimise(
+        self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
+    ) -> None:
+        """Try points until they get no better, or until that takes too much work: the settling time, or what is
+        `wanted` small, from points (points, variables) to numbers (points,). A search of several variables begins with
+        the points `start`, if any."""
+        with suppress(Exhausted), allowance(WORK):
+            self._optimise(wanted, start)
+
+    def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
         variables = len(self.remedy.variables)
 
         def cost(shares: np.ndarray) -> np.ndarray:
             self.report(f"{self.remedy.name}: settings")
-            self.tried.append(self.measured(np.clip(shares.T, 0, 1)))
-            return self.tried[-1].cost(self.goal)
+            points = np.clip(shares.T, 0, 1)
+            self.tried.append(self.measured(points))
+            return self.tried[-1].cost(self.goal, None if wanted is None else wanted(points))
 
         if variables == 1:
-            cost(np.linspace(0, 1, self.budget.points * 6)[None])
-            best = self.points
-            at = best.shares[int(best.cost(self.goal).argmin()), 0]
-            near = 1 / (self.budget.points * 6)
-            cost(np.clip(np.linspace(at - near, at + near, self.budget.points * 2), 0, 1)[None])
+            count = self.budget.points * 6
+            cost(np.union1d(np.linspace(0, 1, count), self._at_the_limit())[None])
+            points = self.points
+            best = points.cost(self.goal, None if wanted is None else wanted(points.shares)).argmin()
+            at = points.shares[int(best), 0]
+            cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
-        size = min(self.budget.points * variables, 40)
-        start = np.random.default_rng(SEED).random((max(size, 5), variables))
+        size = min(self.budget.points * variables, MOST_POINTS)
+        drawn = np.random.default_rng(SEED).random((max(size, 5), variables))
+        if start is not None:
+            drawn[: len(start)] = start[: len(drawn)]
         differential_evolution(
             cost,
             [(0.0, 1.0)] * variables,
             maxiter=self.budget.generations - 1,
-            init=start,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
+            init=drawn,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
             tol=0.01,
             rng=SEED,
             polish=False,
             vectorized=True,
             updating="deferred",
         )
+
+    def _at_the_limit(self) -> np.ndarray:
+        """Where a remedy of the bandwidth alone is at the limit of that, (1,), or (0,)."""
+        (variable,), limit = self.remedy.variables, self.goal.bandwidth_limit
+        if variable.name != BANDWIDTH or limit is None:
+            return np.zeros(0)
+        share = variable.share(limit * (1 - SPARE) / loop_bandwidth(self.remedy.stage))
+        return np.array([share]) if 0 <= share <= 1 else np.zeros(0)
 
     def measured(self, shares: np.ndarray) -> TriedPoints:
         """Points on the machines: the moves are run only where the loop is stable and has half of the margin."""
@@ -139,30 +191,35 @@ class Search:
         columns = [np.full(count, np.inf) for _ in range(4)]
         if stable.size:
             moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal)
-            slower_moves: Moves = moves_of_points(
-                self.remedy, shares[stable], self.machines, goal, slower=goal.distance
-            )
+            slower_moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal, slower=goal.distance)
             values = (moves.settling, moves.looser, slower_moves.looser, moves.force)
             for column, value in zip(columns, values, strict=True):
                 column[stable] = quantile(value, goal.share)
         settling, looser, slower, force = columns
-        return TriedPoints(shares, settling, looser, slower, force, margin)
+        bandwidth = loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), count)
+        return TriedPoints(shares, settling, looser, slower, force, margin, bandwidth)
+
+    def clear(self, shares: np.ndarray) -> np.ndarray:
+        """With which points (points, variables) nothing attracts the machines, shape (points,)."""
+        self.report(f"{self.remedy.name}: what attracts")
+        machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
+        clear = attraction(self.remedy, shares, machines, self.goal).clear.mean(axis=1) >= self.goal.share
+        self.attracted += int(np.count_nonzero(~clear))
+        return np.asarray(clear)
 
     def surveyed(self) -> Iterator[np.ndarray]:
         """The best points first, shape (variables,), as far as nothing attracts the machines with them; those that
         are alike are taken for one."""
+        if not self.tried:
+            return
         points = self.points
-        free = np.flatnonzero(~np.any([*points.broken(self.goal).values()], axis=0))
+        free = np.flatnonzero(points.meets(self.goal))
         left = points.shares[free[np.argsort(points.settling[free], kind="stable")]]
-        machines = self.machines.take(np.arange(min(self.budget.surveyed, self.machines.count)))
         for _ in range(MOST):
             if not len(left):
                 return
             batch = _apart(left, BATCH)
-            self.report(f"{self.remedy.name}: what attracts")
-            clear = attraction(self.remedy, batch, machines, self.goal).clear.mean(axis=1) >= self.goal.share
-            self.attracted += int(np.count_nonzero(~clear))
-            yield from batch[clear]
+            yield from batch[self.clear(batch)]
             left = left[np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1) > APART]
 
 

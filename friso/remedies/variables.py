@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import bandwidth, sped_up
-from friso.frequency.margins import margins
-from friso.frequency.members import limit_cases
+from friso.equations.bandwidth import sped_up
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
@@ -37,51 +35,48 @@ DAMPING_RATIOS = (0.01, 0.3)
 """Damping ratios of the stage on its joint that are tried."""
 
 
+SNAP = 0.02
+"""Share of the range within which a number is taken to be the present one, where there is one: it is not changed."""
+
+
 @dataclass(frozen=True)
 class Variable:
-    """A number between `low` and `high` (SI), tried evenly in its logarithm."""
+    """A number between `low` and `high` (SI), tried evenly in its logarithm; next to the `present` one (NaN: there is
+    none) it is that."""
 
     name: str
     low: float
     high: float
     change: Change
+    present: float = float("nan")
 
     def at(self, share: np.ndarray) -> np.ndarray:
         """Its values at shares of the range."""
-        return np.asarray(self.low * (self.high / self.low) ** share)
+        value = np.asarray(self.low * (self.high / self.low) ** share)
+        return np.where(np.abs(share - self.share(self.present)) < SNAP, self.present, value)
+
+    def share(self, value: float) -> float:
+        """The share of the range at which it has a value."""
+        return float(np.log(value / self.low) / np.log(self.high / self.low))
 
 
-def of_key(key: str, low: float, high: float) -> Variable:
+def of_key(key: str, low: float, high: float, present: float = float("nan")) -> Variable:
     """A key of the stage file itself."""
-    return Variable(key, low, high, lambda flat, value: {key: value})
+    return Variable(key, low, high, lambda flat, value: {key: value}, present)
 
 
-def bandwidth_factor(stage: Stage, limit: float | None) -> Variable:
-    """How fast the controller is as a whole, as a factor of what it is, up to a limit of the bandwidth [Hz]."""
-    present = loop_bandwidth(stage)
-    high = FASTEST if limit is None or not present > 0 else min(FASTEST, limit / present)
-    return Variable(BANDWIDTH, min(SLOWEST, high / 2), high, sped_up)
+def bandwidth_factor() -> Variable:
+    """How fast the controller is as a whole, as a factor of what it is."""
+    return Variable(BANDWIDTH, SLOWEST, FASTEST, sped_up)
 
 
-def loop_bandwidth(stage: Stage) -> float:
-    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1 while the
-    stage slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it."""
-    flat = stage.flat()
-    stated = bandwidth(flat)
-    if stated is not None:
-        return float(stated)
-    sliding = next(case for name, case in limit_cases(flat).items() if not name.startswith("stuck"))
-    crossings = margins(flat, sliding).crossovers
-    return float(crossings[-1]) if crossings else float("nan")
-
-
-def gains(stage: Stage, bandwidth: Variable) -> tuple[Variable, ...]:
+def gains(stage: Stage) -> tuple[Variable, ...]:
     """The gains of a controller against each other, then its bandwidth."""
     flat, controller = stage.flat(), controller_of(stage.flat())
     shape = [of_key(controller.key(name), low, high) for name, (low, high) in controller.shaped_by.items()]
     keys = [controller.key(name) for name in controller.speeds_up if flat.get(controller.key(name))]
     against = [of_key(key, flat[key] / WIDE, flat[key] * WIDE) for key in keys[1:]]
-    return (*shape, *against, bandwidth)
+    return (*shape, *against, bandwidth_factor())
 
 
 def joint_variables(friction: float) -> tuple[Variable, ...]:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from friso.equations.bandwidth import proportional_stiffness
+from friso.frequency.bandwidth import loop_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.frequency.stiffness import in_series
 from friso.hunting.check import Case, check_given
@@ -18,7 +19,6 @@ from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.search import TriedPoints
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile, timing
-from friso.remedies.variables import loop_bandwidth
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
@@ -80,9 +80,10 @@ class Performance:
 
 @dataclass(frozen=True)
 class RemedyOutcome:
-    """A remedy's best `stage` (None: none was found), measured, and checked; the reasons why that is not sure to work,
-    or does not (empty: it works); the `windows` of its numbers; and all points that were tried, of which `attracted`
-    were given up because something attracted machines with them. `shares` are where in the remedy's ranges it lies.
+    """A remedy's best `stage` (None: none was found), measured, and checked by its cycles unless machines miss the goal
+    as it is; the reasons why that is not sure to work, or does not (empty: it works); the `windows` of its numbers; and
+    all points that were tried, of which `attracted` were given up because something attracted machines with them.
+    `shares` are where in the remedy's ranges it lies.
     """
 
     remedy: Remedy
@@ -104,6 +105,10 @@ class RemedyOutcome:
         if self.stage is None:
             return "does not work"
         return "unsure" if self.doubts else "works"
+
+    def least_cost(self, goal: Goal) -> float:
+        """What the best of the points that were tried costs (see `TriedPoints.cost`); infinite without any."""
+        return np.inf if self.points is None else float(self.points.cost(goal).min())
 
 
 @np.errstate(all="ignore")
@@ -130,6 +135,11 @@ def verified(stage: Stage) -> Case:
 
 def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
     """What of the goal a stage does not meet, or not surely: names of `friso.views.tune.words.DOUBTS`."""
+    return (*unsettled_parts(case, measured, goal), *missed_parts(measured, goal))
+
+
+def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...]:
+    """What the verdict on the stage itself, its bandwidth and its margin leave open."""
     judgement, edge = case.judgement, case.judgement.margin
     listed: list[str] = []
     if judgement.verdict != "settles":
@@ -146,11 +156,16 @@ def unmet_goals(case: Case, measured: Performance, goal: Goal) -> tuple[str, ...
         listed.append("window")
     if case.unstable or measured.own_margin < goal.margin * (1 - ROUNDED):
         listed.append("own margin")
+    return tuple(listed)
+
+
+def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
+    """The parts of the goal that too many machines miss."""
     parts = measured.meets(goal)
-    missed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]
-    if not missed and np.mean(np.all([*parts.values()], axis=0)) < goal.share:
-        missed.append("together")
-    return (*listed, *missed)
+    listed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]
+    if not listed and np.mean(np.all([*parts.values()], axis=0)) < goal.share:
+        listed.append("together")
+    return tuple(listed)
 
 
 ROUNDED = 2e-3

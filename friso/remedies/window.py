@@ -33,7 +33,7 @@ def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
         places = np.union1d(grid, shares[[number]])
         tried = np.repeat(shares[None], len(places), axis=0)
         tried[:, number] = places
-        broken = np.any([*search.measured(tried).broken(search.goal).values()], axis=0)
+        broken = ~search.measured(tried).meets(search.goal)
         at = int(np.searchsorted(places, shares[number]))
         below, above = np.flatnonzero(broken[:at]), np.flatnonzero(broken[at:])
         first = int(below[-1]) + 1 if below.size else 0

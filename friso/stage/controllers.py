@@ -126,6 +126,13 @@ class ControllerSection(AgainstFriction):
         raise NotImplementedError
 
     @classmethod
+    def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
+        """Other structures of the controller of a stage, for `friso tune` to try: what each is, to the keys of the
+        stage file that change for it: numbers [SI] as floats, texts, None for keys that go. None, if a controller does
+        not say."""
+        return {}
+
+    @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
         """The numbers for a drive: its keys that are not 0, then those that every controller has."""
         fields = numeric_fields(cls)

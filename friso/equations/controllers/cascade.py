@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
-from friso.equations.controllers.feedforward import SYMBOLS, fed_forward
+from friso.equations.controllers.feedforward import SYMBOLS, fed_forward, feedforward_of_moves
 from friso.quantities import Number, Quantity, Value, non_negative, positive
 from friso.stage import ControllerSection, Rule, register_controller
 from friso.stage.controllers import Gain
@@ -29,6 +29,10 @@ KP, POSITION_TIME, VELOCITY_TIME, PROPORTIONAL_ON, VELOCITY_FILTER = (
 )
 
 FEEDFORWARD = ("velocity_feedforward", "acceleration_feedforward", "coulomb_feedforward", "viscous_feedforward")
+
+
+SLOWER = 4.0
+"""Integral time in units of 1/kv, of an integral to begin with."""
 
 
 class CascadeTerms(NamedTuple):
@@ -109,6 +113,34 @@ class Cascade(ControllerSection):
             filtered=bool(flat[VELOCITY_FILTER] > 0),
             feedforward=tuple(name for name in FEEDFORWARD if flat[cls.key(name)] > 0),
         )
+
+    @classmethod
+    def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
+        """The integral in the other loop, pseudo-derivative feedback or none, feedforward, and no integral."""
+        listed: dict[str, Mapping[str, Any]] = {}
+        outer, inner = flat.get(POSITION_TIME), flat.get(VELOCITY_TIME)
+        if inner and not outer:
+            moved = {POSITION_TIME: inner, VELOCITY_TIME: None, PROPORTIONAL_ON: "error"}
+            listed["integral in the position loop"] = moved
+        elif outer and not inner:
+            listed["integral in the velocity loop"] = {VELOCITY_TIME: outer, POSITION_TIME: None}
+        elif outer and inner:
+            listed["integral in the velocity loop alone"] = {POSITION_TIME: None}
+        else:
+            listed["with an integral"] = {VELOCITY_TIME: SLOWER / flat[cls.key("kv")]}
+        if inner:
+            other = "error" if flat[PROPORTIONAL_ON] == "measurement" else "measurement"
+            named = {"measurement": "pseudo-derivative feedback", "error": "proportional part on the error"}
+            listed[named[other]] = {PROPORTIONAL_ON: other}
+        ahead: dict[str, Any] = feedforward_of_moves(flat, "viscous_feedforward", "acceleration_feedforward")
+        if not flat[cls.key("velocity_feedforward")]:
+            ahead[cls.key("velocity_feedforward")] = 1.0
+        if ahead:
+            listed["feedforward of the move"] = ahead
+        if outer or inner:
+            gone = {POSITION_TIME: None, VELOCITY_TIME: None, PROPORTIONAL_ON: "error"}
+            listed["no integral"] = {key: value for key, value in gone.items() if key in flat and flat[key] != value}
+        return listed
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:

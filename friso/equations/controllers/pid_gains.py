@@ -7,7 +7,7 @@ from math import sqrt
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
 
-from friso.equations.controllers.feedforward import SYMBOLS, fed_forward
+from friso.equations.controllers.feedforward import SYMBOLS, fed_forward, feedforward_of_moves
 from friso.equations.controllers.pid import Pid
 from friso.quantities import Quantity, Value, any_sign, non_negative
 from friso.stage import Rule, register_controller
@@ -21,6 +21,10 @@ if TYPE_CHECKING:
 KP, KI, KD, TAU, DERIVATIVE_ON = (f"controller.{name}" for name in ("kp", "ki", "kd", "tau", "derivative_on"))
 
 FEEDFORWARD = ("viscous_feedforward", "acceleration_feedforward", "coulomb_feedforward")
+
+
+SLOWER = 4.0
+"""Integral time in units of the derivative time, of an integral to begin with."""
 
 
 class Terms(NamedTuple):
@@ -88,6 +92,25 @@ class PidGains(Pid):
             derivative_on=flat[DERIVATIVE_ON] if derived else "none",
             feedforward=tuple(name for name in FEEDFORWARD if cls.key(name) in flat),
         )
+
+    @classmethod
+    def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
+        """The derivative of the other signal, feedforward, and no integral."""
+        listed: dict[str, Mapping[str, Any]] = {}
+        if flat[KD] and flat[DERIVATIVE_ON] == "error":
+            listed["derivative of the measurement"] = {DERIVATIVE_ON: "measurement"}
+        if flat[KD] and flat[DERIVATIVE_ON] == "measurement" and flat[TAU]:
+            listed["derivative of the error"] = {DERIVATIVE_ON: "error"}
+        ahead = feedforward_of_moves(flat, "viscous_feedforward", "acceleration_feedforward")
+        if ahead and flat[DERIVATIVE_ON] == "measurement":  # whose derivative opposes the move itself
+            ahead[cls.key("viscous_feedforward")] = ahead.get(cls.key("viscous_feedforward"), 0.0) + flat[KD]
+        if ahead:
+            listed["feedforward of the move"] = ahead
+        if flat[KI] and flat[KP]:
+            listed["no integral"] = {KI: None}
+        elif flat[KP] and flat[KD]:
+            listed["with an integral"] = {KI: flat[KP] ** 2 / flat[KD] / SLOWER}
+        return listed
 
     @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:

@@ -60,6 +60,15 @@ class VanDijk(Pid):
         return {TUNED_MASS: moving_mass(flat)}
 
     @classmethod
+    def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
+        """A PID by its gains, as large as those of the rules, its derivative that of the measurement."""
+        k_p, tau_z, tau_i, tau_p = numbers(flat).values()
+        gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
+        gains = {"kp": k_p * (1 + tau_z / tau_i), "ki": k_p / tau_i, "kd": k_p * tau_z, "tau": tau_p}
+        written = {cls.key(name): value for name, value in gains.items()}
+        return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
+
+    @classmethod
     def gains(cls, flat: Mapping[str, Any]) -> tuple[Gain, ...]:
         """Those of Eq. 7 that follow from its keys, and the keys that every controller has."""
         values = numbers(flat)

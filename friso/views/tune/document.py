@@ -22,6 +22,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
             "stage": tuning.stage.name,
             "interrupted": tuning.interrupted,
             "needed": tuning.needed,
+            "least_change": tuning.least.remedy.name if tuning.least else None,
             "seed": tuning.seed,
             "machines": tuning.machines.count,
             "goal": {
@@ -49,16 +50,19 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
 
 
 def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
-    if outcome.stage is None or outcome.measured is None or outcome.case is None:
+    if outcome.stage is None or outcome.measured is None:
         why = unsure_why(outcome) if outcome.interrupted else reason(outcome, tuning)
         return {"works": outcome.certainty, "why": why}
-    edge = outcome.case.judgement.margin
+    judgement = outcome.case.judgement if outcome.case else None
+    edge = judgement.margin if judgement else None
     return {
         "works": outcome.certainty,
         "doubts": [*outcome.doubts],
         "changes": changes(tuning.stage, outcome.stage),
-        "verdict": outcome.case.verdict,
-        "certain": outcome.case.judgement.hunting.certain,
+        "keys_changed": tuning.size(outcome).keys,
+        "factor": tuning.size(outcome).factor,
+        "verdict": outcome.case.verdict if outcome.case else None,
+        "certain": bool(judgement and judgement.hunting.certain),
         "edge_factor": None if edge is None else edge.factor,
         "windows": [asdict(window) for window in outcome.windows],
         **_performance(outcome.measured, tuning),

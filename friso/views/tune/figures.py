@@ -27,6 +27,7 @@ from friso.views.drawing.figure import (
     Axis,
     Dash,
     Figure,
+    Markers,
     Panel,
     Series,
 )
@@ -45,11 +46,12 @@ RTOL = 1e-7
 def figures(tuning: Advice) -> list[Figure]:
     """The response, the settling times and the sensitivities."""
     lines = drawn_stages(tuning)
-    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(lines))
+    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(lines), *_windows(tuning))
     caption = (
         "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
         f"fresh machines in position within {with_unit(tuning.goal.within, 'm')}; the sensitivity of the loop in its "
-        "limit cases, whose largest value is one over the modulus margin."
+        "limit cases, whose largest value is one over the modulus margin; the numbers between which the least change "
+        "works, each varied by itself."
     )
     return [Figure("tune", "Before and after", caption, panels, subject=tuning.stage.name)]
 
@@ -109,6 +111,23 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
             series.append(Series(x, np.repeat(100 * np.arange(len(ordered) + 1) / len(times), 2), *line))
     axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
     return Panel("In position for good", axis, Axis("Share of machines", "%", (-3.0, 103.0)), tuple(series))
+
+
+def _windows(tuning: Advice) -> list[Panel]:
+    """The window of each number of the least change, as factors of what it is tuned to."""
+    least = tuning.least
+    if least is None or not least.windows:
+        return []
+    tuned = [float(v.at(share)) for v, share in zip(least.remedy.variables, least.shares, strict=True)]
+    ends = [(window.low / at, window.high / at) for window, at in zip(least.windows, tuned, strict=True)]
+    names, rows = tuple(window.name for window in least.windows), np.arange(len(ends), dtype=float)
+    series = tuple(
+        Series(np.array(pair), np.full(2, row), "", BLUE, width=6) for row, pair in zip(rows, ends, strict=True)
+    )
+    marks = (Markers(np.ones(len(rows)), rows, "as tuned", INK),)
+    reach = 1.2 * max(1.2, *(max(high, 1 / low) for low, high in ends))
+    x = Axis("Factor of the tuned number", "", (1 / reach, reach), log=True)
+    return [Panel("Where it works", x, Axis("", "", (-0.5, len(rows) - 0.5), words=names), series, marks)]
 
 
 def _sensitivity(lines: Lines) -> Panel:

@@ -4,17 +4,26 @@ from __future__ import annotations
 
 from friso.drives.gains import gains_of
 from friso.remedies.method import Advice
+from friso.remedies.verified import RemedyOutcome
 from friso.views.export.words import rows
 
 
 def gain_lines(tuning: Advice) -> list[str]:
-    """The gains to type in for every remedy that works."""
-    lines = []
-    for outcome in tuning.working:
-        table = rows(gains_of(outcome.stage, {})) if outcome.stage else []
-        gains = [f"{symbol} = {value}{f' ({others})' if others else ''}" for _, (symbol, value, others) in table]
-        if gains:
-            lines.append(
-                f'The gains to type in for "{outcome.remedy.name}" are {", ".join(gains)} (friso export gains).'
-            )
-    return lines
+    """The gains to type in for the least change, and for the remedy that settles soonest."""
+    listed = [outcome for outcome in (tuning.least, tuning.fastest) if outcome]
+    return [
+        f'The gains to type in for "{outcome.remedy.name}" are {gains} (friso export gains).'
+        for number, outcome in enumerate(listed)
+        if outcome not in listed[:number] and (gains := gains_to_type_in(outcome))
+    ]
+
+
+def gain_facts(tuning: Advice) -> list[tuple[str, str]]:
+    """Every remedy that works, with its gains."""
+    return [(outcome.remedy.name, gains) for outcome in tuning.working if (gains := gains_to_type_in(outcome))]
+
+
+def gains_to_type_in(outcome: RemedyOutcome) -> str:
+    """Symbols and values, in all units that drives have for them."""
+    table = rows(gains_of(outcome.stage, {})) if outcome.stage else []
+    return ", ".join(f"{symbol} = {value}{f' ({others})' if others else ''}" for _, (symbol, value, others) in table)

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from friso.remedies.method import Advice
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
 from friso.views.tune.figures import figures as tune_figures
-from friso.views.tune.gain_words import gain_lines
+from friso.views.tune.gain_words import gain_facts
 from friso.views.tune.sensitivity_words import sensitivity_sentences
-from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_lines
+from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_facts
 
 
 def tune_files(tuning: Advice) -> dict[str, Content]:
@@ -26,27 +27,37 @@ def stage_files(tuning: Advice) -> dict[str, Content]:
     for outcome in tuning.outcomes:
         if outcome.stage is None:
             continue
-        slug = outcome.remedy.name.replace(",", "").replace(" ", "-")
+        slug = outcome.remedy.name.replace(",", "").replace(":", "").replace(" ", "-")
         unsure = "" if outcome.certainty == "works" else "-not-sure"
         files[f"tuned-{slug}{unsure}.toml"] = outcome.stage.to_toml()
-    least = tuning.working[:1]
-    return {"tuned.toml": least[0].stage.to_toml() if least and least[0].stage else None, **files}
+    least = tuning.least
+    return {"tuned.toml": least.stage.to_toml() if least and least.stage else None, **files}
+
+
+class Behind(NamedTuple):
+    """What stands behind a title: sentences, and facts by name; `open` where it is seen at once."""
+
+    title: str
+    sentences: Sequence[str]
+    facts: Sequence[tuple[str, str]] = ()
+    open: bool = False
 
 
 def page(tuning: Advice, figures: Sequence[Figure]) -> str:
     """The page with its figures."""
+    behind = [
+        Behind("What does not work, and why", failing(tuning), open=True),
+        Behind("The numbers to type in, in the terms of drives (friso export gains)", (), gain_facts(tuning)),
+        Behind("Where each number may lie, all else being as tuned", (), window_facts(tuning)),
+        Behind("What matters for the edge of hunting", sensitivity_sentences(tuning)),
+        Behind("What is assumed, and how machines were drawn", assumptions(tuning)),
+    ]
     return Report.of_stage(
         "tune",
         tuning.stage,
         figures,
         sentences=answer(tuning),
-        notes=[
-            *failing(tuning),
-            *gain_lines(tuning),
-            *window_lines(tuning),
-            *sensitivity_sentences(tuning),
-            *assumptions(tuning),
-        ],
+        details=[more for more in behind if more.sentences or more.facts],
         columns=COLUMNS,
         rows=rows(tuning),
         computed=f", seed {tuning.seed}",

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 
 from friso.equations.breakaway import breakaway, least_breakaway
+from friso.frequency.bandwidth import loop_bandwidth
 from friso.quantities import percent
+from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice
 from friso.remedies.relax import RelaxedGoal
 from friso.remedies.search import TriedPoints
-from friso.remedies.variables import BANDWIDTH, loop_bandwidth
+from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
+from friso.stage.controllers import CONTROLLER
 from friso.stage.transmission import leading_friction
 from friso.views.drawing.prefixes import NOTHING, listed, share_with_interval, with_unit
 
@@ -47,7 +50,12 @@ COLUMNS = (
     "Stiffness under load",
 )
 
-OPTIONS = {"within": "--within", "settle": "--settle", "force_limit": "--force-limit"}
+OPTIONS = {
+    "within": "--within",
+    "settle": "--settle",
+    "force_limit": "--force-limit",
+    "bandwidth_limit": "--bandwidth-limit",
+}
 """Options that state the parts of a goal."""
 
 ABSENT = "never"
@@ -59,10 +67,13 @@ def time(seconds: float) -> str:
 
 
 def changes(before: Stage, after: Stage) -> list[str]:
-    """The keys that differ, with their values before and after."""
+    """The keys that differ, with their values before and after; words and keys that go are those of the controller."""
     old, new = before.flat(), after.flat()
     keys = numeric_keys(new)
-    return [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
+    numbers = [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
+    own = [key for key in {**new, **old} if key.startswith(f"{CONTROLLER}.")]
+    words = [f'{key} = "{new[key]}"' for key in own if isinstance(new.get(key), str) and new[key] != old.get(key)]
+    return [*words, *numbers, *(f"{key} left out" for key in own if key not in new)]
 
 
 def _changes(key: str, old: Mapping[str, Any], new: Mapping[str, Any], keys: Mapping[str, Any]) -> bool:
@@ -91,10 +102,11 @@ def answer(tuning: Advice) -> list[str]:
         ]
     if not tuning.working:
         return [*lines, *_nothing(tuning)]
-    least, fastest = tuning.working[0], tuning.fastest
+    least, fastest = tuning.least, tuning.fastest
+    assert least is not None
     lines.append(_works(least, tuning, "The least change that works"))
     if fastest is not None and fastest is not least:
-        lines.append(_works(fastest, tuning, "The next best, which settles soonest"))
+        lines.append(_works(fastest, tuning, "What settles soonest"))
     elif len(tuning.working) > 1:
         lines.append(_works(tuning.working[1], tuning, "The next best"))
     return lines
@@ -123,9 +135,17 @@ def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> str:
     assert outcome.stage is not None
     assert outcome.measured is not None
     return (
-        f"{what}: {outcome.remedy.name}. Set {listed(changes(tuning.stage, outcome.stage), 'and')}. "
-        f"{_brings(outcome.measured, tuning)}. {price(outcome.measured, tuning, outcome.remedy.buys_joint)}"
+        f"{what}: set {listed(changes(tuning.stage, outcome.stage), 'and')} ({outcome.remedy.name}; "
+        f"{size_words(tuning.size(outcome))}). {_brings(outcome.measured, tuning)}. "
+        f"{price(outcome.measured, tuning, outcome.remedy.buys_joint)}"
     )
+
+
+def size_words(size: ChangeSize) -> str:
+    """How large a change is."""
+    keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
+    factor = f", by a factor of {size.factor:.3g}{' in all' * (size.keys > 1)}" if size.factor > 1 else ""
+    return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
@@ -170,6 +190,8 @@ def _nothing(tuning: Advice) -> list[str]:
         if outcome.stage is not None
     ]
     lines += [_relax(relaxed) for relaxed in tuning.relaxed]
+    if not (tuning.goal.controller and tuning.goal.joint):
+        lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
     if not tuning.relaxed and not tuning.interrupted:
         lines.append("No relaxation of one part of the goal, or of two, was found with which an option meets it.")
     return lines
@@ -208,7 +230,7 @@ def failing(tuning: Advice) -> list[str]:
 def reason(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Why no setting of a remedy meets the goal."""
     if outcome.points is None:
-        return "It was not tried."
+        return "It was given up: its motions take too much computing."
     points, goal = outcome.points, tuning.goal
     sentence = next(_reasons(points, outcome, goal))
     return f"{sentence}{_edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ''}"
@@ -227,12 +249,20 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         "hunting is too close.",
         "force": "All settings that settle take more force than there is.",
         "settle": "All settings that settle do so too late.",
+        "bandwidth": f"Only settings above your limit of the bandwidth do all of that{_lowest(points, goal)}.",
     }
     for name, sentence in sentences.items():
         left = left & ~broken[name]
         if not left.any():
             yield sentence
     yield f"Something attracts machines, or may, with all of the {outcome.attracted} best settings that were surveyed."
+
+
+def _lowest(points: TriedPoints, goal: Goal) -> str:
+    """The lowest bandwidth of the settings that meet all else."""
+    others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
+    lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
+    return f", the slowest with {with_unit(float(lowest), 'Hz')}" if np.isfinite(lowest) else ""
 
 
 def _edges(tuning: Advice) -> str:
@@ -294,12 +324,16 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
 
 
 def window_lines(tuning: Advice) -> list[str]:
-    """The windows of the remedies that work."""
-    return [
-        f"{outcome.remedy.name} meets the goal, each number by itself, for {'; '.join(_windows(outcome))}."
-        for outcome in tuning.working
-        if outcome.windows
-    ]
+    """The windows of the least change that works."""
+    least = tuning.least
+    if least is None or not least.windows:
+        return []
+    return [f"{least.remedy.name} meets the goal, each number by itself, for {'; '.join(_windows(least))}."]
+
+
+def window_facts(tuning: Advice) -> list[tuple[str, str]]:
+    """The windows of every remedy that works."""
+    return [(outcome.remedy.name, "; ".join(_windows(outcome))) for outcome in tuning.working if outcome.windows]
 
 
 def _windows(outcome: RemedyOutcome) -> list[str]:

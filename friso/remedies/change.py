@@ -1,0 +1,50 @@
+"""How large a change of a stage is: what has to be bought, how many keys change, and by how much."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
+
+PARTS = ("joint.", "flexure.")
+"""Keys of what has to be bought."""
+
+ALIKE = 1e-6
+"""Share by which a number may differ that has not changed."""
+
+
+@dataclass(frozen=True, order=True)
+class ChangeSize:
+    """Changes are compared by whether a part is `bought`, then by the number of `keys` of the controller that change,
+    come or go, then by the `factor` by which those change that had a value, all factors multiplied."""
+
+    bought: bool
+    keys: int
+    factor: float
+
+
+def change_size(before: Stage, after: Stage) -> ChangeSize:
+    """How large the change from one stage to another is."""
+    old, new = before.flat(), after.flat()
+    bought = any(_differ(old.get(key), new.get(key)) for key in {*old, *new} if key.startswith(PARTS))
+    keys = [key for key in {*old, *new} if key.startswith(f"{CONTROLLER}.") and _differ(old.get(key), new.get(key))]
+    return ChangeSize(bought, len(keys), float(np.exp(sum(_octaves(old, new, key) for key in sorted(keys)))))
+
+
+def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:
+    """The logarithm of the factor by which a number changes, upward or downward; 0 for what was none."""
+    before, after = old.get(key), new.get(key)
+    if isinstance(before, str) or isinstance(after, str) or not before or not after or before * after <= 0:
+        return 0.0
+    return abs(float(np.log(after / before)))
+
+
+def _differ(before: Any, after: Any) -> bool:
+    if before is None or after is None or isinstance(before, str) or isinstance(after, str):
+        return bool(before != after)
+    return abs(after - before) > ALIKE * max(abs(before), abs(after))

@@ -1,0 +1,97 @@
+"""The least change of a controller's keys that still meets the goal, from settings that do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.remedies.catalogue import Remedy
+from friso.remedies.search import Search
+from friso.remedies.variables import Variable, of_key
+from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
+
+BEYOND = 2.0
+"""Factor by which keys may go further than in the settings that the search begins with."""
+
+STEPS = (1.0, 1.05, 1.15, 1.3)
+"""Powers of the factors of the least change that are verified, one after the other: the least of all is the one that
+just works on the machines of the search, which is not to say on others."""
+
+MORE = 2
+"""Factor of machines in the moves that are tried, against a search for the settings that settle soonest: the least
+change is at the edge of what works."""
+
+
+def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
+    """The remedy that varies each key of the controller by itself between its value `before` and the one in settings
+    that work, and somewhat further, all else being as `tuned`; None where there are no such keys."""
+    old, new = before.flat(), tuned.flat()
+    variables = [
+        _between(tuned, key, old[key], new[key])
+        for key in tuned.numeric_keys()
+        if key.startswith(f"{CONTROLLER}.") and old.get(key) and new.get(key) and old[key] != new[key]
+    ]
+    if not variables:
+        return None
+    return Remedy(f"{remedy.name}: the least change", tuned, tuple(variables), remedy.buys_joint)
+
+
+def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
+    """A key between two values, and beyond the one that works where a stage may have that."""
+    further = new * BEYOND if new > old else new / BEYOND
+    try:
+        tuned.with_numbers({key: further})
+    except InputError:
+        further = new
+    return of_key(key, min(old, further), max(old, further), old)
+
+
+def seek_least(search: Search) -> None:
+    """Search a remedy of `least_remedy` for the least change: fewer keys first, then smaller factors."""
+    search.optimise(lambda shares: change_costs(search.remedy, shares), _beginnings(search.remedy))
+
+
+def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
+    """How many keys points change, and below 1 by what factor, shape (points,)."""
+    logarithms = np.stack(
+        [
+            np.abs(np.log(variable.at(share) / variable.present))
+            for variable, share in zip(remedy.variables, shares.T, strict=True)
+        ]
+    )
+    total = logarithms.sum(axis=0)
+    return np.asarray(np.count_nonzero(logarithms, axis=0) + total / (1 + total))
+
+
+def _beginnings(remedy: Remedy) -> np.ndarray:
+    """The settings that work with some keys as they were, the fewest changed ones first, wholly and half as far (in the
+    logarithm), shape (points, variables)."""
+    home, works = _ends(remedy).T
+    masks = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)[1:]
+    return np.array([home + part * np.array(mask) * (works - home) for mask in masks for part in (1.0, 0.5)])
+
+
+def _ends(remedy: Remedy) -> np.ndarray:
+    """Shares at which the numbers are the present ones, and those of the settings that work, (variables, 2)."""
+    flat = remedy.stage.flat()
+    return np.array([[v.share(v.present), v.share(flat[v.name])] for v in remedy.variables])
+
+
+def candidates(search: Search) -> Iterator[np.ndarray]:
+    """The least change of those tried that break nothing, (variables,), then the same change taken further."""
+    if not search.tried:
+        return
+    points = search.points
+    free = points.shares[points.meets(search.goal)]
+    if not len(free):
+        return
+    least = free[int(change_costs(search.remedy, free).argmin())]
+    home = _ends(search.remedy)[:, 0]
+    for step in STEPS:
+        shares = np.clip(home + step * (least - home), 0, 1)
+        if search.clear(shares[None])[0]:
+            yield shares
