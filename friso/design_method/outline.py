@@ -24,7 +24,7 @@ def outline(stage: Stage) -> str:
     InputError for a stage that `friso design` cannot design for."""
     check_designable(stage)
     flat = stage.flat()
-    limit = loop_bandwidth(stage)
+    limit = f"{loop_bandwidth(stage):.4g}"
     friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
     masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
     both = masses if len(masses) == 2 else [f"# {line}   # split, unless both are told" for line in masses]
@@ -36,7 +36,7 @@ def outline(stage: Stage) -> str:
             f'name = "Friction isolator of {stage.name or "the stage"}"',
             "",
             "[machine]                                  # the highest bandwidth that it allows",
-            f'bandwidth_limit = "{limit:.4g} Hz"             # the present one; or parasitic_frequencies = ["480 Hz"]',
+            f'bandwidth_limit = "{limit} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',
             "",
             "[friction]                                 # ranges; a key left out stays as in the stage file",
             *friction,

@@ -97,7 +97,9 @@ def _relaxed_goal(
 
 def _settles(remedy: Remedy, point: TriedPoints, goal: Goal, factor: float, machines: Fleet) -> bool:
     """Whether the machines settle within so many times the tolerance, in the time of the goal if it has one."""
-    time = moves_of_points(remedy, point.shares, machines, replace(goal, within=factor * goal.within)).slowest(goal.share)[0]
+    time = moves_of_points(remedy, point.shares, machines, replace(goal, within=factor * goal.within)).slowest(
+        goal.share
+    )[0]
     return bool(np.isfinite(time) and time <= (np.inf if goal.settle is None else goal.settle))
 
 

@@ -191,7 +191,9 @@ class Search:
         columns = [np.full(count, np.inf) for _ in range(4)]
         if stable.size:
             moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal)
-            slower_moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal, slower=goal.distance)
+            slower_moves: Moves = moves_of_points(
+                self.remedy, shares[stable], self.machines, goal, slower=goal.distance
+            )
             values = (moves.settling, moves.looser, slower_moves.looser, moves.force)
             for column, value in zip(columns, values, strict=True):
                 column[stable] = quantile(value, goal.share)

@@ -50,7 +50,10 @@ def suggestion(stage: Stage) -> Suggestion | None:
         free = isolated(stage)
     except InputError:
         return None
-    remedy, tried = Remedy("", free, joint_variables(friction), True), [(stroke, d) for stroke in STROKES for d in DAMPING]
+    remedy, tried = (
+        Remedy("", free, joint_variables(friction), True),
+        [(stroke, d) for stroke in STROKES for d in DAMPING],
+    )
     shares = np.array([_shares(remedy, stroke, damping) for stroke, damping in tried])
     numbers = remedy.changes(shares)
     flat = {**free.flat(), **numbers}
