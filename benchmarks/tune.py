@@ -4,7 +4,9 @@ Axes with four controllers, three levels of friction, without and with a parasit
 way by way, the joint kept. For the ways that work a Sobol sequence of settings over the same ranges is measured by the
 same moves and margins on the same machines, and the best of them, surveyed for what attracts like the tuned one, is
 compared with it in the settling time of the slowest twentieth. All tuned stages, the least change too, are measured on
-fresh machines, and the share is counted of those that meet the goal. `--thesis` tunes the rig of the thesis instead.
+fresh machines, and the share is counted of those that meet the goal. `--thesis` tunes the rig of the thesis instead;
+`--findings` tries on it what is said of friction isolators: that they narrow the stable range of gains, and that they
+help less at some step sizes.
 """
 
 from __future__ import annotations
@@ -20,10 +22,14 @@ from scipy.stats import qmc
 
 from benchmarks.report import Goal as Target
 from benchmarks.report import print_goals, print_table
+from friso.frequency.crossover import limits
+from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
-from friso.remedies.machines import draw_fleet
+from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import machines_of_search, tune
 from friso.remedies.search import Budget, Search
+from friso.remedies.trials import moves_of_points
+from friso.remedies.variables import of_key
 from friso.remedies.verified import performance_of
 from friso.stage import Stage, load, loads
 from friso.stage.correlations import Correlations
@@ -125,6 +131,33 @@ def thesis() -> None:
         )
 
 
+def findings() -> None:
+    """The rig with its joint locked and free: the crossovers that are stable and keep a modulus margin of 0.5, and how
+    soon steps of many sizes settle at a crossover at which neither hunts, and at one at which the locked one does."""
+    rig = load(Path(__file__).parents[1] / "examples" / "thesis_rig.toml")
+    stages = {name: rig.replace({"joint.locked": name == "locked"}) for name in ("locked", "free")}
+    rows = []
+    for name, stage in stages.items():
+        ranges = limits(stage.flat())
+        parts = (ranges.stable, ranges.comfortable)
+        rows.append((name, *("; ".join(f"{low:.4g} to {high:.4g}" for low, high in part) for part in parts)))
+    print_table(("joint", "stable [Hz]", "modulus margin of 0.5 [Hz]"), rows)
+    size = of_key("motion.size", *SIZES)
+    shares = np.linspace(0, 1, STEPS)
+    alone = Fleet({}, {}, np.ones(1), (), {}, 0)
+    columns = [size.at(shares)]
+    for hertz, (_, stage) in product(CROSSOVERS, stages.items()):
+        step = {"kind": "step", "size": "1 mm", "duration": "20 s"}
+        steps = Remedy("", stage.replace({"motion": step, "controller.crossover": f"{hertz} Hz"}), (size,))
+        columns.append(moves_of_points(steps, shares, alone, Goal()).settling[:, 0])
+    names = [f"{name}, {hertz} Hz [s]" for hertz, name in product(CROSSOVERS, stages)]
+    print_table(("step [m]", *names), [tuple(f"{value:.3g}" for value in row) for row in zip(*columns, strict=True)])
+
+
+SIZES, STEPS, CROSSOVERS = (1e-5, 1e-1), 25, (8, 12)
+"""Ends of the step sizes [m], how many are tried, and at which crossovers [Hz]."""
+
+
 def main() -> None:
     """Tune machines, search by brute force, measure on fresh machines."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -133,9 +166,12 @@ def main() -> None:
     parser.add_argument("--fresh", type=int, default=400)
     parser.add_argument("--ways", nargs="*", default=["bandwidth", "gains"])
     parser.add_argument("--thesis", action="store_true")
+    parser.add_argument("--findings", action="store_true")
     options = parser.parse_args()
     if options.thesis:
         return thesis()
+    if options.findings:
+        return findings()
     goal = Goal(within=WITHIN, bandwidth_limit=LIMIT, joint=False)
     rows: list[tuple[str, ...]] = []
     worst, least = 0.0, 1.0
