@@ -149,7 +149,7 @@ def findings() -> None:
     for hertz, (_, stage) in product(CROSSOVERS, stages.items()):
         step = {"kind": "step", "size": "1 mm", "duration": "20 s"}
         steps = Remedy("", stage.replace({"motion": step, "controller.crossover": f"{hertz} Hz"}), (size,))
-        columns.append(moves_of_points(steps, shares, alone, Goal()).settling[:, 0])
+        columns.append(moves_of_points(steps, shares[:, None], alone, Goal()).settling[:, 0])
     names = [f"{name}, {hertz} Hz [s]" for hertz, name in product(CROSSOVERS, stages)]
     print_table(("step [m]", *names), [tuple(f"{value:.3g}" for value in row) for row in zip(*columns, strict=True)])
 

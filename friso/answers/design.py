@@ -139,6 +139,7 @@ def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -
 
 def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
     """Say what neither the stage file nor a specification tells."""
+    from friso.frequency.bandwidth import loop_bandwidth
     from friso.views.drawing.prefixes import with_unit
 
     if outlined:
@@ -146,7 +147,7 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
         LOGGER.warning(f"no specification: one is made from the stage file; {made}")
     rules = by_rules(stage)
     if rules is not stage:
-        hertz = with_unit(rules.flat()["controller.crossover"], "Hz")
+        hertz = with_unit(loop_bandwidth(rules), "Hz")
         LOGGER.warning(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
             f"controller, whose bandwidth is {hertz}; friso export gains tells its gains"
