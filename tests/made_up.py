@@ -34,7 +34,7 @@ UNITS = {
 }
 
 
-NO_RETURN = "from no distance does the stage swing back as far as it came from"
+NO_RETURN = "from every distance the stage swings back less far than it started"
 
 
 def fake_solver(status: str) -> Any:

@@ -96,7 +96,7 @@ def stored_study(store: Path, metric: str | None) -> tuple[Study, str]:
         study = study_of(runs)
     metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
     if metric in METRICS and metric not in study.metrics:
-        actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a map of its own"
+        actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a new map"
         example = f"friso map STAGE.toml ... --metric {metric} --out {store.stem}-{metric}.zarr"
         raise InputError("metric", actual, expected, example)
     _check_metric(metric, study.metrics)

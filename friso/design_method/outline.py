@@ -27,7 +27,7 @@ def outline(stage: Stage) -> str:
     limit = f"{loop_bandwidth(stage):.4g}"
     friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
     masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
-    both = masses if len(masses) == 2 else [f"# {line}   # split, unless both are told" for line in masses]
+    both = masses if len(masses) == 2 else [f"# {line}   # to be divided, unless both are given" for line in masses]
     travel, acceleration = _move(stage)
     own = flat.get("joint.stroke")
     stroke = f"{own / 2:.4g} m .. {own:.4g} m" if own else "0.3 mm .. 1 mm"
@@ -61,7 +61,7 @@ def outline(stage: Stage) -> str:
             'length = "30 mm .. 70 mm"',
             'width = "15 mm .. 45 mm"',
             'spacing = "30 mm .. 60 mm"',
-            'thickness = "0.1 mm .. 0.5 mm"             # usual gauges in this range, or a list of sheets to be had',
+            'thickness = "0.1 mm .. 0.5 mm"             # standard gauges in this range, or a list of available sheets',
             'materials = ["stainless 1.4310"]',
             f'stroke = "{stroke}"                  # the largest that can be had is chosen',
             "",

@@ -42,7 +42,7 @@ BELOW, ABOVE, UNKNOWN = "below the range", "above the range", "unknown"
 KINDS = {
     FLIP: "the cycle continues, but repels (its multiplier has passed -1)",
     JUMP: "the cycle is replaced by another, which repels (the multipliers do not meet at -1), and simulations settle",
-    FOLD: "no cycle exists beyond: from no distance does the stage swing back as far",
+    FOLD: "no cycle exists beyond: from every distance the stage swings back less far than it started",
     LOST: "no orbit could be closed beyond, near the fixed point of the return map, and simulations settle",
     BELOW: "no cycle attracts at any crossover tried",
     ABOVE: "a cycle attracts up to the highest crossover tried",

@@ -1,5 +1,5 @@
 """The inverse model of a log rid of what may be wrong with it: a delay or averaging between force and motion, a force
-that depends on the place or drifts, a feed-forward that is not part of the force."""
+that depends on position or drifts, a feedforward that is not part of the force."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from friso.identification.inverse_model import SMOOTH, InverseModel, inverse_mod
 from friso.identification.logs.log import Log
 
 BETTER = 0.7
-"""Share of the error that is left once a cause is taken away that counts as found."""
+"""A cause counts if the model without it has at most this share of the error."""
 
 RIVAL = 1.5
 """How many times the error of the best alternative another one may leave and still count."""
@@ -103,16 +103,15 @@ def _force_moved(log: Log, lag: int, width: int) -> Log:
 def _timing_sentence(lag: int, width: int, step: float) -> str:
     shift = f"{abs(lag) * step * 1e3:.3g} ms {'earlier' if lag < 0 else 'later'}"
     if width == 1:
-        return f"a force {shift} fits much better, which suggests a delay between the channels"
-    also = f" and a force {shift}" if lag else ""
-    span = f"{abs(width) * step * 1e3:.3g} ms"
-    if width > 0:
-        return f"motion averaged over {span}{also} fits much better, which suggests an averaged or filtered force"
-    also = f", {shift}," if lag else ""
-    return (
-        f"a force averaged over {span}{also} fits much better, which suggests a position that is filtered, or not "
-        "measured"
+        return f"shifting the force {shift} improves the fit considerably, which suggests a delay between the channels"
+    averaged, shifted, cause = (
+        ("motion", "the force", "an averaged or filtered force")
+        if width > 0
+        else ("force", "it", "a position that is filtered, or not measured")
     )
+    also = f" and shifting {shifted} {shift}" if lag else ""
+    span = f"{abs(width) * step * 1e3:.3g} ms"
+    return f"averaging the {averaged} over {span}{also} improves the fit considerably, which suggests {cause}"
 
 
 def _with_columns(log: Log, inverse: InverseModel, cart_share: float) -> Iterator[Alternative]:
@@ -150,19 +149,19 @@ def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
 
 
 def _drift_sentence(model: InverseModel, log: Log) -> str:
-    return f"a force that drifts by {model.value(TIME):.2g} {log.unit('force')}/s explains most of it"
+    return f"a force drifting by {model.value(TIME):.2g} {log.unit('force')}/s accounts for most of it"
 
 
 def _place_sentence(model: InverseModel, log: Log) -> str:
     levels = [value for name, value in model.solution.items() if name.startswith(PLACE.format(""))]
     size = f"{np.ptp([0.0, *levels]):.2g} {log.unit('force')}"
-    return f"a force that differs along the way, by {size}, explains most of it"
+    return f"a force that varies with position, by {size}, accounts for most of it"
 
 
 def _feedforward_sentence(model: InverseModel, log: Log) -> str:
     mass = f"{-model.value(ACCELERATION):.2g} {unit_of('kg', log)}"
     coulomb = f"{-model.value(DIRECTION):.2g} {log.unit('force')}"
     return (
-        f"{mass} times the acceleration of the reference and {coulomb} in its direction are missing, which suggests a "
-        "feed-forward that is not part of this force"
+        f"the force lacks {mass} times the acceleration of the reference and {coulomb} in its direction, which "
+        "suggests that a feedforward is not part of it"
     )

@@ -14,7 +14,7 @@ from friso.identification.logs.log import Log
 from friso.quantities import percent
 
 PEAK = 0.5
-"""Share of the power of what is left in one peak from which on that counts as an oscillation."""
+"""Share of the residual's power in one peak from which on it counts as an oscillation."""
 
 FRAGMENT = 0.2
 """Share of a record in its longest stretch without gaps up to which the gaps are named."""
@@ -23,8 +23,8 @@ COARSE = 500
 """Steps of the position's digits over the whole travel from which on these are fine enough not to be named."""
 
 UNKNOWN = (
-    "a delay, a filter, a constant force, one that drifts or differs along the way, a feed-forward and a mode in the "
-    "band were looked for, and none of them explains it: check --scale, its sign too, and which channel is which"
+    "a delay, a filter, a constant force, one that drifts or varies with position, a missing feedforward and a mode in "
+    "the band were considered, and none explains it: check --scale, including its sign, and which channel is which"
 )
 """What to do where no cause is found."""
 
@@ -66,7 +66,7 @@ def _jump(log: Log) -> str:
     if not size:
         return ""
     at = log.time[part][sample]
-    return f"the position jumps by {size:.3g} m at {at:.4g} s, as homing or a reset does: cut the record there"
+    return f"the position jumps by {size:.3g} m at {at:.4g} s, as after homing or a reset: cut the record there"
 
 
 def _coarse(log: Log) -> str:
@@ -75,12 +75,12 @@ def _coarse(log: Log) -> str:
     digit, travel = float(steps[steps > 0].min(initial=np.inf)), float(np.ptp(position))
     if digit * COARSE < travel:
         return ""
-    return f"the position is in steps of {digit:.2g} m, of a travel of {travel:.3g} m: more digits are needed"
+    return f"the position has steps of {digit:.2g} m over a travel of {travel:.3g} m: log it with more digits"
 
 
 def _clipped(log: Log) -> list[Cause]:
     share = clipped_share(log["force"])
-    sentence = f"{percent(share)} of the force is cut off at its extremes: the channel does not show all of it"
+    sentence = f"{percent(share)} of the force samples lie at its extremes: the channel clips"
     return [Cause(sentence, None, True)] if share > CLIPPED else []
 
 
@@ -89,7 +89,7 @@ def _constant(inverse: InverseModel, unit: str) -> str:
     if offset <= max(coulomb, 0.1 * float(np.std(inverse.measured))):
         return ""
     force = f"{inverse.value('offset'):.3g} {unit}"
-    return f"a constant force of {force} is larger than friction: gravity, or an offset of the channel"
+    return f"a constant force of {force} exceeds the friction: gravity, or an offset of the channel"
 
 
 def _oscillation(inverse: InverseModel) -> str:
@@ -100,4 +100,4 @@ def _oscillation(inverse: InverseModel) -> str:
     share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
     if share < PEAK or peak == 0:
         return ""
-    return f"{percent(share)} of what is left swings at {rates[peak]:.3g} Hz, probably a mode in the band"
+    return f"{percent(share)} of the power of the residual is near {rates[peak]:.3g} Hz, probably a mode in the band"

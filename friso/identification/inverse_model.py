@@ -206,7 +206,9 @@ def unit_of(unit: str, log: Log) -> str:
 def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
     if np.isfinite(variance):
         return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
-    return Estimate.unknown(name, unit, METHOD, "the motion does not tell it from the others: it goes one way only")
+    return Estimate.unknown(
+        name, unit, METHOD, "the motion is in one direction only, which does not separate it from the others"
+    )
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:

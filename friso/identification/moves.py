@@ -179,7 +179,7 @@ def check_roles(log: Log, roles: Sequence[str], foreign: Sequence[str] = ()) -> 
             raise InputError(role, actual, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
         if role in log.units and role not in foreign:
             example = f'--scale {role}="35 {"N" if role == "force" else "mm"}/{log.unit(role)}"'
-            raise InputError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
+            raise InputError(role, f"a channel in {log.unit(role)}", "its factor to SI units", example, log.name)
 
 
 def _problems(

@@ -47,7 +47,7 @@ class Conditions(UncertainSection):
         Rule(
             ("conditions.cold", "conditions.warm_up_time"),
             lambda flat: (flat.get("conditions.cold", 1.0) == 1) | ("conditions.warm_up_time" in flat),
-            "the time constant of the warm-up of a machine that is colder than [friction] tells",
+            "the time constant of the warm-up, for a machine colder than [friction] describes",
             'warm_up_time = "20 min"',
         ),
     )

@@ -23,7 +23,7 @@ _HINTS = {
     ".csv": "friso logs {}",
     ".mat": "friso logs {}",
     ".tdms": "friso logs {}",
-    ".zarr": "a store made by friso map, of which there is none at {}",
+    ".zarr": "a store made by friso map; there is none at {}",
 }
 """What a file is for that is no stage file, by its suffix."""
 

@@ -65,7 +65,7 @@ class Request:
         names = [axis.name for dimension in dimensions for axis in dimension.axes]
         for name in names:
             if names.count(name) > 1 or name in (*METRICS, SAMPLE):
-                raise InputError(name, "a name that is taken", "every axis once, under a name of its own")
+                raise InputError(name, "a name that is taken", "each axis once, each under a different name")
         linking.check_links(self.stage, self.links, frozenset(names))
         return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
 

@@ -18,9 +18,7 @@ def simulate(
         list[str], typer.Argument(metavar="STAGE.toml", help="The stage file; with --cell, the cell's numbers: 3 4.")
     ],
     overrides: Overrides = None,
-    cell: Annotated[
-        Path | None, typer.Option(metavar="STORE", help="Run one cell of a study again, by itself.")
-    ] = None,
+    cell: Annotated[Path | None, typer.Option(metavar="STORE", help="Run a single cell of a study again.")] = None,
     rtol: Annotated[str | None, typer.Option("--rtol", metavar="NUMBER", help=RTOL_HELP)] = None,
     sample_time: Annotated[str | None, typer.Option(metavar="TIME", help='Sampling interval, such as "1 ms".')] = None,
     out: DefaultFolder = Path("response"),

@@ -35,7 +35,7 @@ SMOOTH, STEEP = 0.25, 3.0
 END_OF_RANGE = "end of the range"
 """How a branch ends that has been followed to the end."""
 
-REACHED = "it was followed as far as was asked"
+REACHED = "it reached the end of the requested range"
 """How one ends that was followed until something happened."""
 
 TURN = 0.3

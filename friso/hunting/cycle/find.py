@@ -39,7 +39,7 @@ REPEATED, STEADY = 40, 0.02
 last of them may differ if there is a cycle that attracts."""
 
 
-NO_RETURN = "from no distance does the stage swing back as far as it came from"
+NO_RETURN = "from every distance the stage swings back less far than it started"
 NO_MULTIPLIER = "an orbit was closed, but its multiplier could not be computed"
 NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"

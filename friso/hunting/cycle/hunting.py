@@ -58,7 +58,7 @@ FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a h
 REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
 """The same where the search through the bandwidths contradicts the survey of the stage itself."""
 
-DITHERS = "dither keeps the stage moving, so that no cycle is searched: only runs tell whether it hunts"
+DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Why cycles of a stage are not searched that may hunt all the same."""
 
 SAMPLES = 2000
@@ -207,11 +207,13 @@ def _beyond_the_search(stages: Ensemble) -> str:
     if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
     if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
-        return "most starts that were tried lie within error_deadband, and few beyond it: some of these may swing on"
+        return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
     if stages.outer_integrals:
         return "with integrals in several loops, stages that stick with an outer one wound up otherwise may swing on"
     if small_cycles_possible(stages):
-        return "friction falls so little over the speeds of small swings that cycles may be smaller than is looked for"
+        return (
+            "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
+        )
     return ""
 
 

@@ -112,7 +112,7 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
     sample = draw(_spread(clocked, spreads), _with_default_correlations(correlations, spreads), count, seed)
     held = [key for key in stage.uncertain() if key.startswith(HELD)]
     if held:
-        notes += [f"not drawn, as they are the same on all machines: {', '.join(held)}"]
+        notes += [f"not drawn, being the same on all machines: {', '.join(held)}"]
     if sample.left_out:
         notes += [f"{sample.left_out} draws that no stage may have were left out and others drawn"]
     numbers = np.arange(count)

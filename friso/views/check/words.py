@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _MICRON, _TEN_MICRON = BANDS
 
-_UNFINISHED = "this run was completed, but not the longer one that tells whether it ends in the hunting that was found"
+_UNFINISHED = "this run was completed, but not the longer one that shows whether it ends in the hunting that was found"
 
 ROUGH = 5e-4
 """Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""

@@ -117,7 +117,7 @@ def _settling(comparison: Comparison, within: str) -> Panel:
         steps = 100 * np.arange(len(ordered) + 1) / count
         series.append(Series(x, np.repeat(steps, 2), label(result), colour, dash))
     axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
-    return Panel(f"In position for good, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
+    return Panel(f"In position to stay, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
 
 
 def _standstill(comparison: Comparison) -> Panel:

@@ -303,5 +303,5 @@ def population(comparison: Comparison) -> list[str]:
         spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
         lines.append(f"Default spreads (95 % of the machines), as the stage file gives none: {spreads}.")
     if "rail.seed" in machines.keys:
-        lines.append("Every machine has a rail of its own.")
+        lines.append("Every machine has a different rail.")
     return lines

@@ -167,7 +167,7 @@ def _settling(design: Design) -> Figure:
         "", x, Axis("Moves in position", "%", (0.0, 102.0)), tuple(lines), limits=(Limit((95.0,), "95 %", GREEN),)
     )
     caption = (
-        f"The share of the {free.tried} simulated moves that are in position for good, over the time since the last "
+        f"The share of the {free.tried} simulated moves that are in position to stay, over the time since the last "
         "corner of the reference; the same machines with the joint free and locked. If a curve ends below 100 %, the "
         "remaining moves do not come to rest."
     )

@@ -24,7 +24,7 @@ def law_sentence(comparison: LawComparison) -> str:
     names = _laws_with_errors(supported)
     if len(supported) == len(comparison.predictions):
         return (
-            f"The record does not tell the laws apart: {names} predict what they were not fitted to. Loops of force "
+            f"The record does not distinguish the laws: {names} predict what they were not fitted to. Loops of force "
             "over displacement before sliding, of several amplitudes, would."
         )
     others = [law for law in comparison.predictions if law not in supported]

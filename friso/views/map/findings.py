@@ -99,7 +99,7 @@ def _creeping(runs: xr.Dataset) -> list[str]:
     if not creeping:
         return []
     where = f"in {_percent(creeping, runs['outcome'].size)} of the map"
-    return [f"It still creeps at its end {where}: whether it hunts there, a longer run or --metric verdict tells."]
+    return [f"It still creeps at its end {where}: a longer run or --metric verdict shows whether it hunts there."]
 
 
 def _answer(runs: xr.Dataset, question: Question) -> str:

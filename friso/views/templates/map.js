@@ -197,7 +197,7 @@
     data.axes.forEach((axis, i) => row(axis.label, valueAt(axis, data.sampled ? cell : at[i])));
     for (const item of data.texts) row(item.label, item.words[item.codes[cell]] || "–");
     for (const item of data.variables) {
-      if (item.name === "outcome" || item.name === "verdict") continue; // told among the texts
+      if (item.name === "outcome" || item.name === "verdict") continue; // shown among the texts
       const value = item.numbers[cell];
       const kind = item.codes[cell] === NONE ? "" : item.kinds[item.codes[cell]].label;
       row(item.label, Number.isFinite(value) ? withUnit(value, item.unit) : kind);
@@ -258,10 +258,10 @@
   function slider(controls, axis, act) {
     const label = element("label", controls, axis.label);
     const input = element("input", label);
-    const told = element("output", label, valueAt(axis, 0));
+    const valueShown = element("output", label, valueAt(axis, 0));
     Object.assign(input, { type: "range", min: 0, max: axis.values.length - 1, step: 1, value: 0 });
     input.addEventListener("input", () => {
-      told.textContent = valueAt(axis, Number(input.value));
+      valueShown.textContent = valueAt(axis, Number(input.value));
       act(Number(input.value));
     });
   }

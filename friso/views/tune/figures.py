@@ -110,7 +110,7 @@ def _settling(tuning: Advice, lines: Lines) -> Panel:
             x = np.concatenate([[start], np.repeat(ordered, 2), [end]])
             series.append(Series(x, np.repeat(100 * np.arange(len(ordered) + 1) / len(times), 2), *line))
     axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
-    return Panel("In position for good", axis, Axis("Share of machines", "%", (-3.0, 103.0)), tuple(series))
+    return Panel("In position to stay", axis, Axis("Share of machines", "%", (-3.0, 103.0)), tuple(series))
 
 
 def _windows(tuning: Advice) -> list[Panel]:

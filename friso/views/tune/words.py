@@ -328,7 +328,7 @@ def window_lines(tuning: Advice) -> list[str]:
     least = tuning.least
     if least is None or not least.windows:
         return []
-    return [f"{least.remedy.name} meets the goal, each number by itself, for {'; '.join(_windows(least))}."]
+    return [f"{least.remedy.name} meets the goal with each number varied separately, for {'; '.join(_windows(least))}."]
 
 
 def window_facts(tuning: Advice) -> list[tuple[str, str]]:

@@ -60,7 +60,7 @@ def judged_steps(steps: JointSteps) -> Finding:
                 f"wrong by as much as the masses of Fig. 17 and 18 require, would make it {larger / 1e3:.3g} N/mm, "
                 f"and {FIRST:g} Hz "
                 f"with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} too: the force was scaled differently there, or "
-                "the joint was softer. Simulation alone cannot tell",
+                "the joint was softer. Simulation alone cannot decide this",
             ),
         )
     )
@@ -147,7 +147,7 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
                 ),
                 f"correlation of the two speeds: {repeats}",
                 why="not in the model: its friction is uniform along the rail, and it is the loop that oscillates, by "
-                "sticking and slipping. Simulation alone cannot tell",
+                "sticking and slipping. Simulation alone cannot decide this",
             ),
             Part(
                 "dynamic friction cannot be determined, joint free or locked",

@@ -61,7 +61,7 @@ def judged_line(line: LockedLine) -> Finding:
                 f"{mass.min():.3g} to {mass.max():.3g} kg at {len(mass)} places",
                 why="not in the model: friction hardly moves the line. Cables and the motor constant (Sec. 4.2.1) may, "
                 f"the latter by the factor {CONSTANTS[0]:.2f}; Fig. 18 asks for {CONSTANTS[1]:.2f}. Simulation alone "
-                "cannot tell",
+                "cannot decide this",
             ),
             Part(
                 f"identifications at different places differ most between {_NOISY[0]:g} and {_NOISY[1]:g} Hz, by more "
@@ -103,7 +103,7 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 f"{reads[0]:.3g} to {reads[1]:.3g} kg",
                 why=f"not in the model: the line lies by a factor of {factor:.2f} off, in Fig. 17 by "
                 f"{CONSTANTS[0]:.2f}: one error of the motor constant {both} both (to {percent(CLOSE)}), and the first "
-                "mode does not depend on it. Simulation alone cannot tell",
+                "mode does not depend on it. Simulation alone cannot decide this",
             ),
             *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),
         )

@@ -57,7 +57,7 @@ def _further(loops: RigLoops) -> Part:
         f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
         f"{number_text(gain, '.2g')} at {number_text(near, unit='Hz')}",
         why=f"not in the model: its only parasitic mode, that of Fig. 18, is at {near:.3g} Hz with the joint locked. "
-        "Simulation alone cannot tell"
+        "Simulation alone cannot decide this"
         if np.isfinite(near)
         else "",
     )

@@ -44,7 +44,7 @@ def sentences(outcome: Outcome) -> list[str]:
     )
     unmeasured = [f"{loop.tuned:.3g} Hz" for loop in result.loops if not loop.measured]
     unstable = f" Tuned to {listed(unmeasured, 'and')} the closed loop is not stable." if unmeasured else ""
-    above = f"once more at {with_unit(max(others), 'Hz')}" if others else "nowhere above"
+    above = f"again at {with_unit(max(others), 'Hz')}" if others else "nowhere above"
     return [
         f"Joint locked: the mass line shows {_mass(result.locked.mass)} from "
         f"{with_unit(result.locked.band[0], 'Hz')} to {with_unit(result.locked.band[1], 'Hz')}.",
