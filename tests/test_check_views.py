@@ -147,14 +147,14 @@ def test_nan_of_a_failed_run_breaks_nothing(start):
     assert case.trace is not None
     for name in case.trace.data_vars:
         case.trace[name][start:] = np.nan if name != "force" else np.inf
-    solver = fake_solver("step size underflow: use a looser rtol")
+    solver = fake_solver("underflow")
     numbers = {"peak_to_peak": float("nan"), "period": float("nan")}
     failed = replace(case, judgement=hunts(verdict="failed"), solver=solver, **numbers)
     cases = {"given": failed, "locked": failed, "free": fake_case(stage=fake_stage(locked=False))}
     for figure in check_figures(cases):
         assert same(mpl_arrays(figure), plotly_arrays(figure))
     page = check_html(cases)
-    assert "step size underflow: use a looser rtol" in page
+    assert "underflow" in page
     assert "NaN" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
 
 
@@ -170,7 +170,7 @@ def test_return_map_with_the_swings_of_this_motion():
     (cycle,) = locked.markers
     assert (cycle.label, *cycle.x, *cycle.y) == ("attracts", *[pytest.approx(5.2e-4)] * 4)
     assert free.markers == ()
-    assert f"Free (as given): no cycle, as {NO_RETURN}." in figure_of("return-map", both_joints()).caption
+    assert NO_RETURN in figure_of("return-map", both_joints()).caption
 
 
 def test_ringing_does_not_count_as_a_swing():

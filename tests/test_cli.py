@@ -142,7 +142,7 @@ def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     wild = [part for text in settings for part in ("--set", text)]
     done = run("simulate", RIG, "--out", tmp_path, *wild)
     assert done.returncode == 1
-    assert "the loop is unstable" in done.stdout
+    assert "unstable" in done.stdout
     with xr.open_dataset(tmp_path / "thesis_rig_response.nc", engine="scipy") as written:
         assert 0 < written.position.notnull().sum() < written.time.size
     document = json.loads(run("check", RIG, "--json", *wild).stdout)

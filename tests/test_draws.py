@@ -154,7 +154,7 @@ def test_the_figure_holds_every_draw() -> None:
     assert [band.label for band in panel.bands] == [word for word in VERDICTS if word in ("hunts", "settles", "failed")]
     assert panel.bands[-1].high[::2].sum() == 100
     assert panel.x.label == "friction.coulomb [N]"
-    assert draws_figure(draws(made(0, 30))).panels[0].title == "As given: all settles"
+    assert "settles" in draws_figure(draws(made(0, 30))).panels[0].title
 
 
 # the command

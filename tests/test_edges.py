@@ -126,14 +126,11 @@ def test_what_is_wrong_in_several_tables_is_told_at_once() -> None:
     with pytest.raises(InputError) as caught:
         loads(text)
     wrong = {caught.value.key: caught.value.actual, **dict(caught.value.also)}
-    assert {key: actual.split(";")[0] for key, actual in wrong.items()} == {
-        "motoin": "an unknown key",
-        "masses.cart": '"1.2 kq" ("kq" is not a known unit)',
-        "friction.static": "nothing",
-        "joint.stroke": "nothing",
-        "controller.crosover": "an unknown key",
-        "controller.beta2": "an unknown key",
-    }
+    unknown, missing = {"motoin", "controller.crosover", "controller.beta2"}, {"friction.static", "joint.stroke"}
+    assert wrong.keys() == {*unknown, *missing, "masses.cart"}
+    assert {key for key, actual in wrong.items() if actual.startswith("nothing")} == missing
+    assert {key for key, actual in wrong.items() if "unknown" in actual} == unknown
+    assert "kq" in wrong["masses.cart"]
 
 
 @pytest.mark.parametrize(
@@ -182,7 +179,7 @@ def test_a_value_that_is_hardly_meant_is_questioned(key: str, value: str, meant:
 
 def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "bode", EXAMPLES / "thesis_rig.toml", "--set", "friction.static=52 kN")
-    assert "friso: friction.static = 52 kN" in done.stderr
+    assert "52 kN" in done.stderr.partition("\n")[0]
 
 
 @pytest.mark.parametrize("path", [*EXAMPLES.glob("*.toml"), EXAMPLES.parent / "friso" / "templates" / "stage.toml"])

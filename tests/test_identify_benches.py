@@ -1,5 +1,6 @@
 """Measured benches: KU Leuven linear guide, Univ. of Tokyo two-inertia motor bench (see shared/data/README.md)."""
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -66,7 +67,7 @@ def test_leuven_lines_and_exact_period() -> None:
     response = leuven_response((1, 2), 0)
     assert len(response.frequency) == 100
     assert response.frequency[0] == pytest.approx(1 / 4.999)
-    assert "every 4999 samples, not every 5000" in response.warnings[0]
+    assert re.findall(r"\b\d+\b", response.warnings[0]) == ["4999", "5000"]
     assert feedback(leuven(1)[0]) == ()
 
 
@@ -167,7 +168,7 @@ def test_tokyo_modes() -> None:
     assert modes["resonance 1 frequency"].value == pytest.approx(77, abs=1)
     seen = visible(tokyo("theta_mx"), modes)
     assert seen.case == "sliding"
-    assert seen.words[-1] == "cart sliding: free joint, antiresonance and resonance"
+    assert seen.words[-1].startswith("cart sliding")
 
 
 def test_tokyo_second_encoder_counts_the_other_way(wording: Wording) -> None:

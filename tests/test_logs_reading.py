@@ -328,14 +328,15 @@ def test_values_held(tmp_path: Path, wording: Wording) -> None:
     wording("\n".join(log.warnings))
 
 
-def test_a_signal_that_was_interpolated_is_told(tmp_path: Path) -> None:
+def test_a_signal_that_was_interpolated_is_told(tmp_path: Path, wording: Wording) -> None:
     instants = np.arange(len(M["force"]))
     slower = np.interp(instants, instants[::4], M["force"][::4])
     assert interpolated(slower) == 4
     assert interpolated(M["force"]) == 1
     assert interpolated(np.repeat(M["force"][::4], 4)) == 1
     log = log_of(tmp_path, NAMES, [*columns()[:3], slower])
-    assert recognised(log.warnings, "straight lines of 4 samples")
+    assert recognised(log.warnings, "4 samples")
+    wording("\n".join(log.warnings))
 
 
 @pytest.mark.parametrize(
@@ -378,7 +379,7 @@ def test_friction_is_no_delay(tmp_path: Path) -> None:
     result = [line for line in log_of(tmp_path, NAMES, [*columns()[:3], late]).warnings if "come after" in line]
     assert len(result) == 1
     start, _, rest = result[0].partition(" by ")
-    assert start == "the force seems to come after motion"
+    assert "force" in start
     assert float(rest.split()[0]) == pytest.approx(4, abs=0.1)
 
 
@@ -481,7 +482,8 @@ def test_what_is_said_now_silences_what_was_kept() -> None:
     assert "time" not in from_options(dt="2 ms").over(Mapping({"time": "t"})).roles
     assert from_options(["force=w"]).over(kept).scales == {}
     assert from_options(["force=u"]).over(kept) == kept
-    assert kept.beside(from_options(["time=Uhrzeit"])).words == "force is u, force by 25 N/A"
+    beside = kept.beside(from_options(["time=Uhrzeit"]))
+    assert (beside.roles, beside.scales, beside.sample_time) == ({"force": "u"}, {"force": "25 N/A"}, None)
 
 
 @pytest.mark.parametrize(

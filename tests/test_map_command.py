@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import re
 import shutil
 import signal
 import subprocess
@@ -13,7 +14,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 from inside import friso_inside
-from refusals import Refused
+from refusals import Refused, Wording
 
 from friso.studies.cells import USUAL
 
@@ -179,15 +180,18 @@ def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments:
 def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str, ...]) -> None:
     done = friso_inside(mapped[0], "simulate", "--cell", "a.zarr", "--", *numbers)
     assert done.returncode == 2
-    assert "controller.crossover 0 to 4, joint.stroke 0 to 3" in done.stderr
+    assert re.findall(r"([a-z]+\.[a-z]+) (\d+) to (\d+)", done.stderr) == [
+        ("controller.crossover", "0", "4"),
+        ("joint.stroke", "0", "3"),
+    ]
 
 
-def test_an_invalid_cell_gives_its_reason(tmp_path: Path) -> None:
+def test_an_invalid_cell_gives_its_reason(tmp_path: Path, wording: Wording) -> None:
     axes = ("--x", "friction.coulomb=1 N, 4 N", "--out", "a.zarr", "--verify", "0")
     assert friso_inside(tmp_path, "map", RIG, *axes).returncode == 0
     done = friso_inside(tmp_path, "simulate", "--cell", "a.zarr", 1)
     assert done.returncode == 2
-    assert "Coulomb friction no larger than static friction" in done.stderr
+    wording(done.stderr)
 
 
 def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:

@@ -14,9 +14,10 @@ from inside import friso_inside
 from refusals import Refused
 
 from friso.answers.drafts import DRAFTS, Drafts
-from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, write
+from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, check_store_folder, write
 from friso.cli.app import command_line
 from friso.errors import InputError
+from friso.stage import load
 from friso.views.drawing import matplotlib_renderer
 from friso.views.files import Content
 
@@ -29,6 +30,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "simulate": (RIG,),
     "bode": (RIG,),
     "boundary": (RIG, "--x", "controller.crossover=4 Hz..8 Hz"),
+    "map": (RIG, "--x", "controller.crossover=4 Hz, 8 Hz"),
     "flexure": (LEAVES,),
     "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
     "logs": (RIG,),
@@ -43,6 +45,9 @@ NEEDS: dict[str, tuple[object, ...]] = {
 }
 """Commands that write into a folder, with what they need to get as far as looking at it."""
 
+OF_ONE_FILE: dict[str, tuple[object, ...]] = {"init": ("a.toml",), "example": ("thesis_rig", "a.toml")}
+"""Commands that write a single file, which the user names."""
+
 
 def commands_with(option: str) -> set[str]:
     """The commands of friso that take an option."""
@@ -56,7 +61,7 @@ def tree(folder: Path) -> dict[str, bytes | None]:
 
 
 def test_every_command_that_writes_can_be_told_to_overwrite() -> None:
-    assert commands_with("--overwrite") == {*NEEDS, "map", "init", "example"}
+    assert commands_with("--overwrite") == {*NEEDS, *OF_ONE_FILE}
     assert commands_with("--out") <= commands_with("--overwrite")
 
 
@@ -79,6 +84,30 @@ def test_a_folder_of_another_command_is_refused(command: str, tmp_path: Path) ->
     assert done.returncode == 2
     assert "friso another" in done.stderr
     assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("command", OF_ONE_FILE)
+def test_a_file_that_is_there_is_refused(command: str, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text("precious")
+    done = friso_inside(tmp_path, command, *OF_ONE_FILE[command])
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--overwrite" in done.stderr
+    assert tree(tmp_path) == {"a.toml": b"precious"}
+    assert friso_inside(tmp_path, command, *OF_ONE_FILE[command], "--overwrite").returncode == 0
+    assert len(load(tmp_path / "a.toml").name) > 0
+
+
+def test_the_folder_of_a_map_is_its_store(tmp_path: Path) -> None:
+    """Another command takes it for one that friso map made; beside files of others, no store is made."""
+    (tmp_path / "a.zarr").mkdir()
+    (tmp_path / "a.zarr" / ".zattrs").write_text('{"equations": "1"}')
+    with pytest.raises(InputError, match="friso map"):
+        place(tmp_path / "a.zarr")
+    check_store_folder(tmp_path / "a.zarr")
+    check_store_folder(tmp_path / "new.zarr")
+    (tmp_path / "mine.txt").write_text("mine")
+    with pytest.raises(InputError, match="--overwrite"):
+        check_store_folder(tmp_path)
 
 
 def place(folder: Path, overwrite: bool = False, inputs: tuple[Path, ...] = ()) -> OutputFolder:
@@ -289,7 +318,7 @@ def test_a_command_that_fails_while_writing_leaves_nothing(
     monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
     done = friso_inside(tmp_path, command, stage, "--out", "out")
     assert done.returncode == 1
-    assert "could not be completed: disk full" in done.stderr
+    assert "disk full" in done.stderr
     assert tree(tmp_path) == {}
 
 

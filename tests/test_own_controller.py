@@ -94,7 +94,8 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
     assert case["cycle"]["growth"] == pytest.approx(case["cycle"]["multiplier"], rel=1e-3)
     assert case["margin"]["crossover_hz"] == pytest.approx(EDGE, rel=2e-3)
     assert case["margin"]["factor"] == pytest.approx(EDGE / 6.0, rel=2e-3)
-    assert "aise the bandwidth by" in document["conclusion"]
+    factor = next(word for word in document["conclusion"].split() if word.replace(".", "", 1).isdigit())
+    assert float(factor) >= EDGE / 6.0
 
 
 def test_boundary(locked: Stage, tmp_path: Path) -> None:

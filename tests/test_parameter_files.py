@@ -89,7 +89,8 @@ def test_the_example_is_an_axis_in_torque_mode(tmp_path: Path) -> None:
     labels = ["--set", "force_per_output=60 N", *options]
     done = friso_inside(tmp_path, "init", "axis.toml", "--from", AXIS, *labels)
     assert done.returncode == 0
-    assert [line.split(",")[0] for line in done.stderr.splitlines()] == ["friso: left out: error-previous-target"]
+    (left_out,) = done.stderr.splitlines()
+    assert "error-previous-target" in left_out
     flat = friso.load(tmp_path / "axis.toml").flat()
     assert flat["controller.kp"] == pytest.approx(2.0 * 60 / 1e-3)
     assert flat["controller.error_deadband"] == pytest.approx(0.5e-6)
@@ -342,7 +343,7 @@ def test_an_odrive_that_controls_no_position(tmp_path: Path, changes: dict[str, 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:
     path = backup(tmp_path, enable_gain_scheduling=True, gain_scheduling_width=0.01, input_mode=1)
     drawn = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"})
-    assert any("the gains go to 0 with the error" in text for text in drawn.left_out)
+    assert any("enable_gain_scheduling" in text for text in drawn.left_out)
     assert all(f"# Left out: {text}" in drawn.text() for text in drawn.left_out)
     assert drawn.stage.flat()["controller.velocity_feedforward"] == 0.0
 
@@ -350,7 +351,7 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
 def test_what_these_firmwares_do_not_have_is_told(tmp_path: Path) -> None:
     path = backup(tmp_path, gain_scheduling_min_ratio=0.2, load_encoder_axis=1)
     left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
-    assert any(text.startswith("gain_scheduling_min_ratio, which") for text in left_out)
+    assert any(text.startswith("gain_scheduling_min_ratio") for text in left_out)
     assert any(text.startswith("load_encoder_axis = 1") for text in left_out)
 
 

@@ -14,7 +14,7 @@ import pytest
 import xarray as xr
 from pages import Page
 from patched import patched
-from refusals import Refused
+from refusals import Refused, Wording
 from rig_evidence import HUNTS, grid, loops, moves, standstill
 from rig_evidence import cycles as rail_cycles
 from snapshots import Snapshots
@@ -350,7 +350,7 @@ def test_judgements_of_parts() -> None:
     ]
 
 
-def test_what_a_judgement_depends_on() -> None:
+def test_what_a_judgement_depends_on(wording: Wording) -> None:
     claim = claims()[0]
     judgement = verdict(
         claim,
@@ -360,12 +360,12 @@ def test_what_a_judgement_depends_on() -> None:
         [(OPEN[0], finding(True, True)), (OPEN[1], finding(True, False)), (METHOD[0], finding(True, False))],
     )
     assert [str(item) for item in judgement.depends_on] == ["alpha 0.2: holds (number 1)"]
-    assert "unknown parameter (holds with alpha 0.2)" in judgement.reason
-    varied = "Parameters left open by the thesis, varied one at a time "
-    assert judgement.dependence == f"{varied}(2 values): the judgement changes with alpha (0.2: holds)."
+    assert "alpha 0.2" in judgement.reason
+    wording(judgement.dependence)
     untouched = verdict(claim, "5", finding(True), finding(True), [(OPEN[0], finding(True))])
-    assert untouched.dependence == f"{varied}(1 values): no judgement changes."
-    assert verdict(claim, "5", finding(True), finding(True), []).dependence.startswith("No open parameter")
+    assert (untouched.tried, untouched.depends_on) == (1, ())
+    wording(untouched.dependence)
+    wording(verdict(claim, "5", finding(True), finding(True), []).dependence)
 
 
 def test_a_variant_is_compared_with_the_baseline_alone() -> None:
@@ -373,7 +373,7 @@ def test_a_variant_is_compared_with_the_baseline_alone() -> None:
     full, coarse = finding(False), finding(True)
     judgement = verdict(claims()[0], "5", full, coarse, [(OPEN[0], finding(False)), (OPEN[1], finding(True))])
     assert [item.variant for item in judgement.depends_on] == [OPEN[1]]
-    assert "every second value of each axis: holds" in judgement.reason
+    assert judgement.reason.endswith("holds") or ": holds" in judgement.reason
 
 
 def test_the_coarser_grid_is_part_of_the_full_one() -> None:
@@ -445,9 +445,8 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     reproduction = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
     judged = {item.claim.id for item in reproduction.verdicts if item.finding}
     assert judged == {"F5", "F12B", "F13"} | LINEAR | LEAVES | IDENTIFIED | BUILT
-    assert {entry.reason for entry in reproduction.verdicts if entry.claim.id == "F11A"} == {
-        "not computed in this run: path"
-    }
+    (path,) = (entry for entry in reproduction.verdicts if entry.claim.id == "F11A")
+    assert (path.finding, path.reason.split()[-1]) == (None, "path")
     assert [step[0] for step in steps] == list(range(len(steps)))
     assert steps[-1][0] <= steps[-1][1] <= len(steps)
 
@@ -579,7 +578,6 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     assert edge is not None
     assert crossover == pytest.approx(edge.crossover, rel=0.02)
     shown = replace(small, cycles={"system": cycles_})
-    assert "Peaks counted, but no cycle attracts" in reproduce_html(shown)
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
     assert "edge of the attracting cycle" in labels

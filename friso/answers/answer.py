@@ -177,26 +177,25 @@ class Answer(ABC):
         InputError
             Where something is in the way, or there is no page.
         """
+        from friso.answers.output_folder import OVERWRITE, OutputFolder, write_file
+
+        place = Path(path)
         with speaking_of(self.axis_kind):
-            return self._page(Path(path), overwrite) if str(path).endswith(".html") else self._folder(path, overwrite)
+            page = self._page(place) if place.suffix == ".html" else None
+            try:
+                if page is None:
+                    return OutputFolder(self.command, place, overwrite).write(self.files())
+                write_file("path", place, page, overwrite)
+            except InputError as error:
+                expected = error.expected.replace(OVERWRITE, "overwrite=True")
+                raise InputError("path", error.actual, expected, f'report("report-2{place.suffix}")') from None
+        return [place]
 
-    def _folder(self, path: str | Path, overwrite: bool) -> list[Path]:
-        from friso.answers.output_folder import OutputFolder
-
-        try:
-            return OutputFolder(self.command, Path(path), overwrite).write(self.files())
-        except InputError as error:
-            expected = error.expected.replace("--overwrite", "overwrite=True")
-            raise InputError("path", error.actual, expected, f'report("{path}-2")') from None
-
-    def _page(self, path: Path, overwrite: bool) -> list[Path]:
-        from friso.stage.files import write_whole
-
+    def _page(self, place: Path) -> str:
         page = next((content for name, content in self.files().items() if name.endswith("html")), None)
         if not isinstance(page, str):
-            raise InputError("path", str(path), f"a folder: friso {self.command} has no page", 'report("folder")')
-        write_whole(page, path, overwrite)
-        return [path]
+            raise InputError("path", str(place), f"a folder: friso {self.command} has no page", 'report("folder")')
+        return page
 
     def __repr__(self) -> str:
         with speaking_of(self.axis_kind):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.answers.inputs import Changes, axes_of, pairs_of
-from friso.answers.output_folder import refuse_device
+from friso.answers.output_folder import check_file, check_store_folder, refuse_device
 from friso.errors import InputError, StoreError
 from friso.quantities import quoted
 from friso.stage import Stage
@@ -167,13 +167,13 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> None:
     """Refuse to write over files that are no earlier result of this study, or to Windows' devices. Raises
     InputError."""
-    for option, path in (("--out", store), *(("--export", path) for path in exports)):
-        refuse_device(option, path)
-    views = [store.parent / name for name in own_views(store) if name not in _claimed(store)]
-    for path in [*views, *exports]:
-        if path == store or (path.exists() and not overwrite):
-            expected = "another name, or --overwrite; nothing was overwritten"
-            raise InputError("--out", f"{path} already exists", expected, "--out new.zarr")
+    refuse_device("--out", store)
+    check_store_folder(store)
+    claimed = _claimed(store)
+    for name in own_views(store):
+        check_file("--out", store.parent / name, overwrite, [store], is_own=name in claimed)
+    for path in exports:
+        check_file("--export", path, overwrite, [store])
 
 
 def own_views(store: Path) -> list[str]:

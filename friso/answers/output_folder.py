@@ -1,5 +1,6 @@
 """Files that a command writes: all of them or none, into a folder that is new, empty, or its own from an earlier run,
-which a small file in it marks; else it refuses and names --overwrite. Never does it replace a file that it reads."""
+which a small file in it marks, or which is a store of friso map; else it refuses and names --overwrite. A file that the
+user names has to be new, too. Never does a command replace a file that it reads."""
 
 from __future__ import annotations
 
@@ -22,8 +23,14 @@ if TYPE_CHECKING:
 
 LOGGER = logging.getLogger("friso")
 
+STORE_MAKER = "map"
+"""The command whose folder is a store."""
+
 MARKER = ".friso-output"
 """The file that records which command made a folder, and which files there are friso's."""
+
+OVERWRITE, REPLACES = "--overwrite", "which replaces files of the same name"
+"""The option by which a command writes among files of others, and what that does."""
 
 UNFINISHED = ".friso-unfinished"
 """The folder in which a long command keeps what is done until all is."""
@@ -40,10 +47,7 @@ class OutputFolder:
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
         if not (self.is_own or overwrite):
-            holds = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
-            replaced = "which replaces files of the same name"
-            expected = f"a new or empty folder, one that friso {command} made, or --overwrite, {replaced}"
-            raise InputError("--out", f"{folder}, {holds}", expected, f"--out {folder}-2")
+            raise _of_others(folder, maker, f"one that friso {command} made, or {OVERWRITE}, {REPLACES}")
         self.check(name for name in self.files if self.is_own)
 
     @property
@@ -61,7 +65,7 @@ class OutputFolder:
         others = [name for name in existing if name not in self.files]
         if others and not self.overwrite:
             actual = f"{self.folder}, with {_first_names(others)}, which friso {self.command} has not written"
-            raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
+            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", f"--out {self.folder}-2")
 
     def write(
         self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
@@ -92,6 +96,40 @@ def refuse_device(option: str, path: Path) -> None:
         raise InputError(option, str(path), expected, f"{option} report" if option.startswith("--") else "")
 
 
+def check_store_folder(folder: Path) -> None:
+    """Raises InputError where a folder that is to be a store holds anything but a store of friso map: a store is the
+    whole folder, so that --overwrite does not put one beside files of others."""
+    maker, _ = marked(folder)
+    if _entries(folder) and maker != STORE_MAKER:
+        raise _of_others(folder, maker, f"or one that friso {STORE_MAKER} made; {OVERWRITE} replaces stores alone")
+
+
+def check_file(
+    option: str, path: Path, overwrite: bool, inputs: Sequence[Path | None] = (), is_own: bool = False
+) -> None:
+    """Raises InputError where a file that the user names must not be written: it is among the `inputs`, which are read,
+    or there already, unless it `is_own` or may be overwritten."""
+    refuse_device(option, path)
+    example = f"{path.stem}-2{path.suffix}"
+    example = f"{option} {example}" if option.startswith("--") else example
+    if any(file and file.exists() and path.exists() and path.samefile(file) for file in inputs):
+        raise InputError(option, f"{path}, which is read", "another file; nothing was overwritten", example)
+    if os.path.lexists(path) and not ((is_own or overwrite) and path.is_file()):
+        expected = f"a new file, or {OVERWRITE}; nothing was overwritten"
+        raise InputError(option, f"{path}, which already exists", expected, example)
+
+
+def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
+    """Write a file that the user names, whole or not at all. Raises InputError where that must not be, or cannot."""
+    check_file(option, path, overwrite)
+    try:
+        path.parent.stat()  # a folder that is missing is a mistake, not one to make
+        write({path: content})
+    except OSError as error:
+        expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
+        raise InputError(option, str(path), expected, path.name) from None
+
+
 def output_folder(
     command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
 ) -> OutputFolder | None:
@@ -120,11 +158,19 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     try:
         document = parsed(text_of(folder / MARKER, "a marker"), "a marker")
     except InputError:
-        return "", ()
+        from friso.studies.metadata import is_store
+
+        return (STORE_MAKER if folder.is_dir() and is_store(folder) else ""), ()
     command, files = document.get("command"), document.get("files")
     if not (isinstance(command, str) and isinstance(files, list)):
         return "", ()
     return command, tuple(str(name) for name in files)
+
+
+def _of_others(folder: Path, maker: str, expected: str) -> InputError:
+    """That a folder is not new, empty or the command's own; `expected` is what else it may be."""
+    holds = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
+    return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", f"--out {folder}-2")
 
 
 def _entries(folder: Path) -> list[str]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.answers.inputs import LOGGER, Changes, changes_of, choice
-from friso.answers.output_folder import refuse_device, write
+from friso.answers.output_folder import check_file, write_file
 from friso.errors import InputError
 from friso.stage import load
 from friso.stage.arguments import check_arguments
@@ -107,21 +107,8 @@ def init(
     if from_ is None and (axis is not None or values):
         key = "set" if values else "axis"
         raise InputError(key, "no --from", "a parameter file that it is about", "--from machine.ini")
-    refuse_device("STAGE.toml", place)
-    for source in (spec, from_):
-        if source is not None and place.exists() and Path(source).exists() and place.samefile(source):
-            expected = "another file than the one that is read; nothing was overwritten"
-            raise InputError("STAGE.toml", str(place), expected, "friso init new.toml")
-    if os.path.lexists(place) and not (overwrite and place.is_file()):
-        expected = "a new file, or --overwrite; nothing was overwritten"
-        raise InputError("STAGE.toml", f"{place}, which already exists", expected, "friso init new.toml")
-    text = _start(spec, from_, axis, values)
-    try:
-        place.parent.stat()  # a folder that is missing is a mistake, not one to make
-        write({place: text})
-    except OSError as error:
-        expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
-        raise InputError("STAGE.toml", str(place), expected, "friso init new.toml") from None
+    check_file("STAGE.toml", place, overwrite, [Path(source) for source in (spec, from_) if source is not None])
+    write_file("STAGE.toml", place, _start(spec, from_, axis, values), overwrite)
     return place
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from friso.design_method.prepare import check_designable
 from friso.frequency.bandwidth import loop_bandwidth
-from friso.intervals import Interval
 from friso.quantities import percent
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
@@ -63,7 +62,7 @@ def outline(stage: Stage) -> str:
             'spacing = "30 mm .. 60 mm"',
             'thickness = "0.1 mm .. 0.5 mm"             # standard gauges in this range, or a list of available sheets',
             'materials = ["stainless 1.4310"]',
-            f'stroke = "{stroke}"                  # the largest that can be had is chosen',
+            f'stroke = "{stroke}"                  # the largest feasible one is chosen',
             "",
             "[safety]                                   # factors; those left out are the defaults",
             "hunting = 1.2                              # crossover over the edge of hunting",
@@ -76,13 +75,9 @@ def _line(stage: Stage, key: str, share: float) -> str:
     """A range of a key: its own, or a share about its value."""
     flat, own = stage.flat(), stage.uncertain().get(key)
     name, unit = key.split(".")[1], numeric_keys(flat)[key].unit
-    low, high = _ends(own) if own else ((1 - share) * flat[key], (1 + share) * flat[key])
+    low, high = (own.low, own.high) if own else ((1 - share) * flat[key], (1 + share) * flat[key])
     why = "as in the stage file" if own else f"assumed: {percent(share)} about the stage file's"
     return f'{name} = "{low:.4g} {unit} .. {high:.4g} {unit}"   # {why}'
-
-
-def _ends(interval: Interval) -> tuple[float, float]:
-    return float(interval.low), float(interval.high)
 
 
 def _move(stage: Stage) -> tuple[float, float]:

@@ -87,12 +87,9 @@ def _rows(flat: Mapping[str, Any], turn: Turn) -> Iterator[Conversion]:
     """The gains that a controller declares, each by its unit."""
     kind = axis_of(flat)
     for gain in controller_of(flat).gains(flat):
-        values = [(gain.value, kind.unit(gain.unit)), *BY_UNIT.get(gain.unit, _nothing)(gain.value, turn, kind)]
-        yield Conversion(gain.name, gain.symbol, tuple(values))
-
-
-def _nothing(value: float, turn: Turn, kind: AxisKind) -> list[Other]:
-    return []
+        convert = BY_UNIT.get(gain.unit)
+        others = convert(gain.value, turn, kind) if convert else []
+        yield Conversion(gain.name, gain.symbol, ((gain.value, kind.unit(gain.unit)), *others))
 
 
 def _rate(value: float, turn: Turn, kind: AxisKind) -> list[Other]:

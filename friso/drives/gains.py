@@ -57,10 +57,6 @@ def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
     """Keys of [controller] that parameters have no place for: a filter once, and nothing that is 0 or a mere choice."""
     before = f"{CONTROLLER}."
     names = [key.removeprefix(before) for key, value in flat.items() if key.startswith(before) and value]
-    named = [name for name in names if name not in held and (not isinstance(flat[before + name], str))]
-    return tuple(dict.fromkeys(before + ".".join(name.split(".")[:2]) for name in named if not _within(name, held)))
-
-
-def _within(name: str, held: frozenset[str]) -> bool:
-    """Whether a key of a filter belongs to one that is held."""
-    return ".".join(name.split(".")[:2]) in held
+    numbers = [name for name in names if name not in held and not isinstance(flat[before + name], str)]
+    parts = [".".join(name.split(".")[:2]) for name in numbers]  # of all keys of a filter, the filter
+    return tuple(dict.fromkeys(before + part for part in parts if part not in held))

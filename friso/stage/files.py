@@ -93,18 +93,14 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     >>> stage = friso.load("rig.toml").replace({"masses.stage": "0.6 kg"})  # doctest: +SKIP
     >>> friso.save(stage, "heavier.toml")  # doctest: +SKIP
     """
-    write_whole(stage.to_toml(), Path(path), overwrite)
-
-
-def write_whole(text: str, path: Path, overwrite: bool) -> None:
-    """Write a text file, all of it or nothing. Raises InputError as `save` does."""
-    if os.path.lexists(path) and not (overwrite and path.is_file()):
-        raise InputError("", "a file that already exists", "a new file, or permission to overwrite", origin=str(path))
+    place = Path(path)
+    if os.path.lexists(place) and not (overwrite and place.is_file()):
+        raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))
     try:
-        with whole_file(path) as file:
-            file.write(text.encode())
+        with whole_file(place) as file:
+            file.write(stage.to_toml().encode())
     except OSError as error:
-        raise InputError("", _reason(error), "a writable location", origin=str(path)) from error
+        raise InputError("", _reason(error), "a writable location", origin=str(place)) from error
 
 
 def parse_set(text: str) -> tuple[str, Any]:

@@ -263,7 +263,7 @@ def _refuse_other(path: Path, study: Study) -> None:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:
         text = "a store of another study:\n            " + "\n            ".join(differences)
-        expected = "the same study, to resume it, or another --out; nothing was overwritten"
+        expected = "the same study, to resume it, another --out, or --overwrite, which replaces the store"
         raise StoreError("", text, expected, origin=str(path))
 
 

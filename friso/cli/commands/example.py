@@ -22,12 +22,12 @@ def example(
 
     Example: friso example thesis_rig && friso check thesis_rig.toml
     """
+    from friso.answers.output_folder import write_file
     from friso.answers.starting import example as example_path
-    from friso.stage.files import write_whole
 
     source = example_path(name)
     target = path or Path(source.name)
-    write_whole(source.read_text(encoding="utf-8"), target, overwrite)
+    write_file("FILE", target, source.read_text(encoding="utf-8"), overwrite)
     print(f"wrote {target}")
 
 

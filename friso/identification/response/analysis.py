@@ -64,7 +64,7 @@ def analyse(
     """What the logs of one bench, realisations of one experiment, show; or a response as somebody `measured` it.
 
     `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
-    periodic excitation (default: found). Raises InputError where no response can be had.
+    periodic excitation (default: found). Raises InputError where no response can be estimated.
     """
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
     if measured is not None:

@@ -58,7 +58,8 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
     """The logs, one for each place; none where the friction has no bristles and Stribeck curve, or no loop was
     stable."""
     speeds, quick = _edge(passed), passed[0].stage
-    if not _has_falling_bristles(quick) or all(run_passes.failure for run_passes in passed):
+    falling_bristles = {"friction.bristle_stiffness", "friction.stribeck_velocity"} <= quick.flat().keys()
+    if not falling_bristles or all(run_passes.failure for run_passes in passed):
         return ()
     period = 1 / pace(stage)
     parts = [(0.0, STANDS * period), *((float(sign * speed), LASTS * period) for speed in speeds for sign in (1, -1))]
@@ -67,10 +68,6 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
         (recorded,) = run(quick, legs(low, parts), [seed + number], interval(quick, period / SAMPLES))
         logs.append(rig_log(recorded, 0, f"slow_sliding_{number + 1}", "slow-sliding", quick, seed + number))
     return tuple(logs)
-
-
-def _has_falling_bristles(stage: Stage) -> bool:
-    return {"friction.bristle_stiffness", "friction.stribeck_velocity"} <= stage.flat().keys()
 
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:

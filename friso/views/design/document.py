@@ -17,7 +17,7 @@ from friso.design_method.verification import MachineOutcomes
 from friso.views.design.control import parallel_gains
 from friso.views.design.window import lower, upper
 from friso.views.design.words import need, refusal
-from friso.views.documents import plain_json
+from friso.views.documents import plain_json, unit_suffix
 
 
 def design_document(design: Design) -> dict[str, Any]:
@@ -77,7 +77,7 @@ def _corners(corners: Corners, design: Design) -> dict[str, Any]:
         "unknown_corners": corners.unknown,
         "searched_hz": list(corners.searched),
         "edges_hz": np.where(corners.edges > 0, corners.edges, np.nan),
-        "worst_corner": {f"{key.replace('.', '_')}{_suffix(units[key])}": value for key, value in worst.items()},
+        "worst_corner": {f"{key.replace('.', '_')}{unit_suffix(units[key])}": value for key, value in worst.items()},
     }
 
 
@@ -181,8 +181,3 @@ def _outcome(outcome: MachineOutcomes) -> dict[str, Any]:
         "settling_median_s": outcome.slower_than(0.5),
         "settling_95_s": outcome.slower_than(0.05),
     }
-
-
-def _suffix(unit: str) -> str:
-    """A unit as a key ends with it: "_n_s_per_m"."""
-    return f"_{unit.lower().replace('/', '_per_').replace('*', '_')}" if unit else ""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from friso.quantities import percent
@@ -35,7 +34,7 @@ def law_sentence(comparison: LawComparison) -> str:
 
 def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
     """Each law by name: by how much it is off, and what was fitted; and the logs left out, with the reason."""
-    laws = tuple((prediction.law, _fact(prediction)) for prediction in comparison.predictions)
+    laws = tuple((prediction.law, _errors_and_keys(prediction)) for prediction in comparison.predictions)
     return laws + tuple((f"{name}, left out", why) for name, why in comparison.left_out.items())
 
 
@@ -78,10 +77,7 @@ def _laws_with_errors(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> 
     return ", ".join(f"{law.law} (off by {_error_share(law)})" for law in laws)
 
 
-def _fact(prediction: LawPrediction) -> str:
+def _errors_and_keys(prediction: LawPrediction) -> str:
     low, high = percent(prediction.errors.min()), percent(prediction.errors.max())
-    return f"off by {_error_share(prediction)} ({low} to {high}); {_keys(prediction.fit.keys)}"
-
-
-def _keys(keys: Mapping[str, float]) -> str:
-    return ", ".join(f"{key.removeprefix('friction.')} {value:.4g}" for key, value in keys.items())
+    keys = ", ".join(f"{key.removeprefix('friction.')} {value:.4g}" for key, value in prediction.fit.keys.items())
+    return f"off by {_error_share(prediction)} ({low} to {high}); {keys}"

@@ -53,12 +53,8 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     contact = machine_between(as_built_keys(stage))
     results = tuple(bristles_from_presliding(log.log, contact) for log in logs)
     true = (flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0))
-    return Outcome("presliding", stage, seed, tuple(logs), Bristles(results, *map(float, true)), _notes(stage))
-
-
-def _notes(stage: Stage) -> tuple[str, ...]:
-    """How the stage was set up."""
-    return ("the joint is held by its limiter, as an engineer would clamp it",) if stage.joint else ()
+    notes = ("the joint is held by its limiter, as an engineer would clamp it",) if stage.joint else ()
+    return Outcome("presliding", stage, seed, tuple(logs), Bristles(results, *map(float, true)), notes)
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:

@@ -11,6 +11,7 @@ from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.profile import Profile
 from friso.quantities import percent
+from friso.views.documents import unit_suffix
 from friso.views.drawing.figure import Figure
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import ends_document
@@ -103,15 +104,10 @@ def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
 
 def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
     named = {
-        f"{estimate.name.replace(' ', '_')}_{_suffix(estimate.unit)}": ends_document(estimate)
+        f"{estimate.name.replace(' ', '_')}{unit_suffix(estimate.unit)}": ends_document(estimate)
         for estimate in model.estimates
     }
     return {**named, "force_error": model.error, "bandwidth_hz": model.bandwidth}
-
-
-def _suffix(unit: str) -> str:
-    """Of a key, by its unit: "n_s_per_m" of "N*s/m"."""
-    return unit.lower().replace("*", "_").replace("/", "_per_").replace("^", "")
 
 
 def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
