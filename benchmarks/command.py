@@ -22,7 +22,7 @@ import numpy as np
 import friso
 from benchmarks.rigs import rig
 from friso.engine.batch import run_chunks
-from friso.hunting.measures import measure, options
+from friso.hunting.measures import measure_runs, measuring_options
 
 rig = rig(locked=False)
 n = {SWEPT}
@@ -35,8 +35,8 @@ def high_water():  # ru_maxrss of a started process begins with that of the one 
 
 before = high_water()
 start, hunting = time.perf_counter(), 0
-for runs in run_chunks(rig.kernel, flat, n, options(1e-4)):
-    hunting += int((measure(runs.part(flat), runs).peaks > 0).sum())
+for runs in run_chunks(rig.kernel, flat, n, measuring_options(1e-4)):
+    hunting += int((measure_runs(runs.part(flat), runs).peaks > 0).sum())
 peak = max(high_water(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 """

@@ -27,25 +27,25 @@ import os
 from friso.engine.cache import keep
 from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import object_code
-from friso.engine.scalar_code import written
+from friso.engine.scalar_code import scalar_llvm
 
 def build(folder, task):
     assert task == b"task"
     print("a plug-in may say something")
     source = "def run(x):\\n    x[0] = 2.0 * x[0]" + os.environ.get("STAND_IN_ENDS_WITH", "") + "\\n"
-    return keep(folder, source, lambda module: object_code(written(module.run, [ArrayKind("float64", 1)])))
+    return keep(folder, source, lambda module: object_code(scalar_llvm(module.run, [ArrayKind("float64", 1)])))
 """
 
 SCRIPT = """
 import sys
 import numpy as np
-from friso.engine.building import entries
+from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest
 from friso.engine.kinds import ArrayKind
-from friso.engine.machine_code import Loops, load
+from friso.engine.machine_code import Loops, load_object
 
-(entry,) = entries([CodeRequest(sys.argv[1], "a stand-in", "stand_in_builder", b"task")])
-run = Loops(load(entry.code, ["run"])["run"], [ArrayKind("float64", 1)])
+(entry,) = built_entries([CodeRequest(sys.argv[1], "a stand-in", "stand_in_builder", b"task")])
+run = Loops(load_object(entry.code, ["run"])["run"], [ArrayKind("float64", 1)])
 x = np.array([21.0])
 run(x)
 assert x[0] == 42.0

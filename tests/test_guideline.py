@@ -486,7 +486,7 @@ def test_wrong_number_of_samples(samples: str, monkeypatch: Any, capsys: Any, tm
     assert left.value.code == 2
     out, err = capsys.readouterr()
     assert out == ""
-    assert err.startswith("--samples\n")
+    assert err.startswith("friso: --samples\n")
     assert {samples, "64", "65536"} <= {*err.split()}
     assert not (tmp_path / "none").exists()
 

@@ -368,7 +368,7 @@ def test_an_oscillation_is_found() -> None:
     log = axis()
     force = log["force"] + 8 * np.sin(2 * np.pi * 9.0 * log.time)
     swinging = replace(log, signals={**log.signals, "force": force})
-    assert "at 9" in sentences(swinging)
+    assert "near 9" in sentences(swinging)
 
 
 def test_noise_has_no_cause() -> None:

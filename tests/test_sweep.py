@@ -78,8 +78,8 @@ def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     runs = sweep(locked, {"friction.static": "0 N..4 N:3", "controller.crossover": ["8 Hz", "-1 Hz"]})
     assert (runs.outcome.values == "invalid").tolist() == [[True, True], [False, True], [False, True]]
     reasons = runs.status.values
-    assert reasons[0, 0].startswith("friction.static ")
-    assert reasons[1, 1].startswith("controller.crossover ")
+    assert "friction.static" in reasons[0, 0]
+    assert "controller.crossover" in reasons[1, 1]
     assert np.isnan(runs.peaks.values[0, 0])
     assert reasons[1, 0] == "done"
     below = sweep(locked, {"friction.coulomb": ["1 N", "3.5 N"]})
