@@ -379,8 +379,8 @@ def test_missing_table(table: str) -> None:
     start = RIG.index(f"[{table}]")
     end = RIG.find("\n[", start)
     text = message(RIG[:start] + (RIG[end:] if end > 0 else ""))
-    place, given, *others = text.splitlines()
-    assert (place, given.split()) == (f"rig.toml: {table}", ["given:", "nothing"])
+    place, nothing, *others = text.splitlines()
+    assert (place, nothing.split()) == (f"rig.toml: {table}", ["given:", "nothing"])
     assert others[0].endswith(f"[{table}]")
     assert others[1].split()[1] == f"[{table}]"
 
