@@ -230,6 +230,8 @@ def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch
     above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
     assert attractors(above).decided.all()
     monkeypatch.setattr(survey, "MOST_KINDS", 1)
+    assert attractors(above).decided.all()  # there are steps left for the others
+    monkeypatch.setattr(survey, "DEARER", 1e9)
     assert not attractors(above).decided.any()
 
 

@@ -98,8 +98,9 @@ def test_a_stage_that_cannot_hunt_settles(rig: Stage) -> None:
 # what is made of verdicts
 
 
-def made(hunts: int, settles: int, failed: int = 0) -> Fates:
-    return Fates(np.array(["hunts"] * hunts + ["settles"] * settles + ["failed"] * failed, dtype=object))
+def made(hunts: int, settles: int, failed: int = 0, unstable: int = 0) -> Fates:
+    words = np.array(["hunts"] * hunts + ["settles"] * settles + ["failed"] * failed, dtype=object)
+    return Fates(words, np.arange(len(words)) < unstable)
 
 
 def test_failures_widen_the_interval() -> None:
@@ -131,6 +132,23 @@ def draws(fates: Fates) -> Draws:
     drawn = Sample({"friction.coulomb": np.linspace(0.5, 1.5, count)}, count, 2, {"a rule": 3})
     stage = friso.load(Path(__file__).parents[1] / "examples" / "lugre_stick_slip.toml")
     return Draws(stage, drawn, 7, {"given": fates})
+
+
+def test_draws_with_an_unstable_loop_are_told_first() -> None:
+    shown = draws(made(6, 3, unstable=2))
+    text = draws_sentences(shown)[0]
+    assert "2 of 9" in text
+    assert text.index("unstable") < text.index("hunts")
+    assert draws_document(shown, "given")["loop_unstable"] == 2
+    assert "unstable" not in draws_sentences(draws(made(6, 3)))[0]
+
+
+def test_loops_of_draws_are_judged(rig: Stage) -> None:
+    """Tuned for a tenth of the mass the loop is unstable, for the mass that there is it is not."""
+    keys = {"controller.tuned_mass": np.array([0.17, 1.7])}
+    stage = locked(rig, "8 Hz").replace({"motion": {"kind": "ramp", "velocity": "0.1 m/s", "duration": "1 s"}})
+    outcome = fates(stage, Sample(keys, 2, 0, {}), 1e-6)["given"]
+    assert outcome.unstable.tolist() == [True, False]
 
 
 def test_document_rows_and_sentences(wording: Wording) -> None:

@@ -10,13 +10,14 @@ from made_up import fake_cycle, fake_hunting
 from patched import patched
 from variants import VARIANTS
 
+from friso.engine.allowance import allowance
 from friso.engine.arrays import Status
 from friso.hunting import basin, verdict
 from friso.hunting.attractors import Attractors, Target
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt
 from friso.hunting.margin import NOT_SOUGHT
 from friso.hunting.measures import measuring_options
-from friso.hunting.verdict import LEFT_OVER, STARTS, SWINGS_ON, Judgement, judge
+from friso.hunting.verdict import LEFT_OVER, STARTS, SWINGS_ON, UNFOLLOWED, Judgement, judge
 
 STAGE = VARIANTS["rigid"]
 TARGET = Target(1e-3, 1.6, 100.0, 25.0)
@@ -132,16 +133,20 @@ def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, certai
     assert (STARTS in judged(starts=starts).given_up) == (not certain)
 
 
-def test_a_longer_run_that_is_given_up_tells_nothing_of_settling() -> None:
-    """Of a motion that has not settled at its end: the longer run is out of steps at once."""
+@pytest.mark.parametrize(("budget", "work"), [(100, np.inf), (2_000_000, 1e5)])
+def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, work: float) -> None:
+    """Of a motion that has not settled at its end: the longer run is out of its own steps, or out of the work that is
+    allowed. Nothing attracts, as far as is known, but this motion was not seen to come to rest."""
     resting = fake_hunting(reason="")
     attraction = replace(resting, surveyed=surveyed(complete=True))
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "search_bandwidths": lambda *_: NOT_SOUGHT,
-        "measuring_options": lambda *_: replace(measuring_options(1e-6), budget=100),
+        "measuring_options": lambda *_: replace(measuring_options(1e-6), budget=budget),
     }
-    with patched({verdict: made_up}):
-        judgement = judge(STAGE, run_to(np.nan, swing=1e-3), 1e-6)
+    with patched({verdict: made_up}), allowance() as spent:
+        judgement = judge(STAGE, run_to(np.nan, swing=1e-3), 1e-6, work=work)
     assert (judgement.verdict, judgement.observed) == ("transient", False)
     assert (judgement.settled_after, judgement.followed) == (None, None)
+    assert (judgement.hunting.certain, judgement.hunting.reason) == (False, UNFOLLOWED)
+    assert spent.used < 1e6

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from variants import VARIANTS
 
-from friso.hunting.loop import unstable
+from friso.hunting.loop import stable_at_lower_gains, unstable
 from friso.stage import Stage
 
 
@@ -21,6 +21,16 @@ def test_a_pi_controller_is_stable_as_far_as_viscous_friction_damps(
     assert unstable(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == states
 
 
+@pytest.mark.parametrize(("share", "always"), [(0.98, True), (1.02, False)])
+def test_where_a_force_limit_unsettles_a_loop(share: float, always: bool) -> None:
+    """m s^3 + sigma_2 s^2 + N kp s + N ki has its roots on the left at all gains N where m ki < sigma_2 kp."""
+    chosen = VARIANTS["rigid, Stribeck 2, PI, limit"]
+    flat = chosen.flat()
+    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    gain = share * flat["friction.viscous"] * flat["controller.kp"] / mass
+    assert stable_at_lower_gains(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"}).flat()) == always
+
+
 @pytest.mark.parametrize("mass", [0.01, 0.1, 0.3, 0.6, 1.7, 200.0])
 def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     """The roots of (m s^2 + sigma_2 s) tau_i s (tau_p s + 1) + k_p (tau_z s + 1)(tau_i s + 1) decide (Eq. 7, 8)."""
@@ -35,6 +45,12 @@ def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     lost = np.roots(np.polyadd(loop, control)).real.max() > 0
     assert unstable(chosen) == (("slides",) if lost else ())
     assert lost == (mass < 0.2)
+
+
+def test_van_dijks_rules_need_their_gain_where_hardly_anything_is_viscous() -> None:
+    """The derivative makes the loop stable at its own gain; at lower ones m ki > sigma_2 kp decides."""
+    assert unstable(VARIANTS["rigid"]) == ()
+    assert not stable_at_lower_gains(VARIANTS["rigid"].flat())
 
 
 def test_a_stage_without_friction_is_judged_too() -> None:

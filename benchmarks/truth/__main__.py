@@ -1,7 +1,8 @@
 """Draws stages, checks them, and tries to refute every verdict and edge: `python -m benchmarks.truth`.
 
 Prints the share of sure verdicts, how many of these are wrong (their stage files, each with a note, are written to a
-folder), and the CPU time of a check. Interrupted, it prints what there is. `--number` takes single stages of a seed.
+folder), the CPU time of a check, and why what is not sure is not. Interrupted, it prints what there is. `--number`
+takes single stages of a seed; `--checks` checks them and tries to refute nothing.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ import numpy as np
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.attack import attack
 from benchmarks.truth.positions import compared, summary
+
+SLOWEST = 8
+"""Checks that are listed for the work they take."""
 
 
 def main() -> None:
@@ -62,7 +66,7 @@ def _simulate(seed: int, numbers: Iterable[int]) -> None:
 
 
 def _attacked(arguments: argparse.Namespace, numbers: Any) -> Iterator[dict[str, Any]]:
-    tasks = [(arguments.seed, number, arguments.scipy_share, arguments.out) for number in numbers]
+    tasks = [(arguments.seed, number, arguments.scipy_share, arguments.out, arguments.checks) for number in numbers]
     if arguments.workers == 1:
         yield from (attack(*task) for task in tasks)
         return
@@ -104,6 +108,7 @@ def _summary(records: list[dict[str, Any]], seconds: float) -> None:
             ["wall time [s]", f"{seconds:.0f}"],
         ],
     )
+    _doubts(records)
     share, median, worst = sure / len(claims), float(np.median(cpu)), max(cpu)
     print_goals(
         [
@@ -116,6 +121,22 @@ def _summary(records: list[dict[str, Any]], seconds: float) -> None:
     )
 
 
+def _doubts(records: list[dict[str, Any]]) -> None:
+    """Print why what is not sure is not, and of which stages; and which checks take the most work."""
+    stages: dict[tuple[str, str], list[str]] = {}
+    for record in records:
+        for claim in record["claims"]:
+            for doubt in claim["doubts"].items():
+                stages.setdefault(doubt, []).append(f"{record['seed']}:{record['number']}")
+    rows = [[of, why, len(which), ", ".join(which)] for (of, why), which in stages.items()]
+    print_table(("not sure", "why", "", "stages"), sorted(rows, key=lambda row: -row[2]))
+    slowest = sorted(records, key=lambda record: -record["work"])[:SLOWEST]
+    print_table(
+        ("most work, in steps times states", "", "CPU [s]"),
+        [[f"{r['seed']}:{r['number']}", f"{r['work']:.1e}", f"{r['cpu']:.1f}"] for r in slowest],
+    )
+
+
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.truth", description=__doc__)
     parser.add_argument("--stages", type=int, default=100)
@@ -123,6 +144,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--number", type=int, action="append", help="a single stage; may be repeated")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scipy-share", type=float, default=0.1, help="share of stages that SciPy looks at too")
+    parser.add_argument("--checks", action="store_true", help="check the stages alone, and refute nothing")
     parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("benchmark_results/truth"), help="folder for refuted stages")

@@ -17,20 +17,22 @@ from friso.stage import Stage
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
-def attack(seed: int, number: int, scipy_share: float, folder: Path) -> dict[str, Any]:
-    """What friso says of the stage with this number and what refutes it; refuted stages are written to a folder."""
+def attack(seed: int, number: int, scipy_share: float, folder: Path, checks: bool) -> dict[str, Any]:
+    """What friso says of the stage with this number and what refutes it (nothing is tried for `checks` alone); refuted
+    stages are written to a folder."""
     stage = draw(seed, number)
     said = checked(stage)
     start = time.process_time()
     refuted = [
         {"case": claim.case, "of": refutation.of, "sure": refutation.sure, "why": refutation.why}
-        for claim in said.claims
+        for claim in (() if checks else said.claims)
         for refutation in _against(claim, number, scipy_share)
     ]
     record = {
         "seed": seed,
         "number": number,
         "cpu": said.cpu,
+        "work": said.work,
         "attack_cpu": time.process_time() - start,
         "claims": [
             {
@@ -40,6 +42,7 @@ def attack(seed: int, number: int, scipy_share: float, folder: Path) -> dict[str
                 "sure": claim.sure,
                 "edge": claim.edge.factor if claim.edge else None,
                 "edge_sure": bool(claim.edge and claim.edge.sure),
+                "doubts": dict(claim.doubts),
             }
             for claim in said.claims
         ],

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
+from friso.engine.allowance import allowance
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting import Case, check
 from friso.hunting.attractors import Attractors
+from friso.hunting.verdict import BANDWIDTHS
 from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
@@ -26,7 +29,8 @@ class Edge:
 @dataclass(frozen=True)
 class Claim:
     """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named),
-    displacements [m] that are said to start hunting, and what attracts, as it was surveyed (None: it was not)."""
+    displacements [m] that are said to start hunting, what attracts, as it was surveyed (None: it was not), and why the
+    verdict and the edge are not sure, `doubts`, by "verdict" and "edge"."""
 
     case: str
     stage: Stage
@@ -35,6 +39,7 @@ class Claim:
     edge: Edge | None
     kicks: tuple[float, ...]
     surveyed: Attractors | None = None
+    doubts: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def attracted(self) -> bool:
@@ -49,10 +54,12 @@ class Claim:
 
 @dataclass(frozen=True)
 class Checked:
-    """The claims on a stage, and the CPU time [s] that the check took once its kernels were there."""
+    """The claims on a stage, the CPU time [s] that the check took once its kernels were there, and its `work` (see
+    `friso.engine.allowance`)."""
 
     claims: tuple[Claim, ...]
     cpu: float
+    work: float
 
 
 def checked(stage: Stage) -> Checked:
@@ -61,12 +68,13 @@ def checked(stage: Stage) -> Checked:
         for variational in (False, True):
             kernel(structure(variant.flat()), variational)
     start = time.process_time()
-    cases = check(stage)
+    with allowance() as spent:
+        cases = check(stage)
     cpu = time.process_time() - start
     unique: dict[int, tuple[str, Case]] = {}
     for name, case in cases.items():
         unique.setdefault(id(case), (name, case))
-    return Checked(tuple(_claim(name, case) for name, case in unique.values()), cpu)
+    return Checked(tuple(_claim(name, case) for name, case in unique.values()), cpu, spent.used)
 
 
 def _claim(name: str, case: Case) -> Claim:
@@ -75,4 +83,15 @@ def _claim(name: str, case: Case) -> Claim:
     edge = Edge(said.margin.factor, sure and said.margin.certain, said.margin.reserve) if said.margin else None
     windows = said.displacement.windows if said.displacement else ()
     kicks = tuple((low * high) ** 0.5 for low, high in windows)
-    return Claim(name, case.stage, case.verdict, sure, edge, kicks, said.hunting.surveyed)
+    return Claim(name, case.stage, case.verdict, sure, edge, kicks, said.hunting.surveyed, _doubts(case, sure, edge))
+
+
+def _doubts(case: Case, sure: bool, edge: Edge | None) -> dict[str, str]:
+    said, doubts = case.judgement, {}
+    if not sure:
+        doubts["verdict"] = case.solver.status if case.verdict == "failed" else said.hunting.reason
+    if BANDWIDTHS in said.given_up:
+        doubts["edge"] = "given up for its work" + (" between two bandwidths" if edge else "")
+    elif edge and not edge.sure:
+        doubts["edge"] = "no orbit to its end, or simulations beyond it not decided" if sure else "the verdict is not"
+    return doubts

@@ -25,6 +25,9 @@ DECADES = (1e-4, 1e3)
 """Releases and pushes in units of the deflection of the loop by the break-away force, and of that times its natural
 frequency."""
 
+LIMITED = 1e6
+"""The largest release of a stage whose force is limited, in the same unit: motions that a limit drives are large."""
+
 NEAR = (0.01, 10.0)
 """Where stages that stick begin, in the same unit."""
 
@@ -124,7 +127,8 @@ class Bench:
         some drawn at random."""
         rng = np.random.default_rng([seed, 7])
         sign = np.where(np.arange(1000) % 2, -1.0, 1.0)
-        released = np.geomspace(*DECADES, releases) * self.length * sign[:releases]
+        farthest = LIMITED if "controller.force_limit" in self.flat else DECADES[1]
+        released = np.geomspace(DECADES[0], farthest, releases) * self.length * sign[:releases]
         pushed = np.geomspace(*DECADES, pushes) * self.length * self.omega * sign[:pushes]
         stands = np.geomspace(*NEAR, stuck) * self.length * sign[:stuck]
         places, speeds = (

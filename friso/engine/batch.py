@@ -31,6 +31,10 @@ MOST_TURNS = 1 << 20
 """Turning points no run may exceed."""
 
 
+MORE = 2
+"""How many times as many steps a run has to be allowed that is run again because those that it had did not suffice."""
+
+
 @dataclass(frozen=True)
 class RunOptions:
     """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
@@ -179,16 +183,41 @@ def _run_with_room(
 
 
 def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, results: Results) -> None:
-    """Run a batch; where there is an allowance, in no more steps than it has left for each run."""
+    """Run a batch; where there is an allowance, in no more steps than it has left for each run. Those for which that
+    does not suffice, a few as a rule, are run again by themselves, and may take what the others have left over. Raises
+    Exhausted where that is hardly more."""
     allowance, states = current_allowance(), len(kernel.full_state)
     if allowance is None:
         run_batch(kernel, batch, options_of(options), results, options.threads)
         return
-    budget = int(min(options.budget, allowance.most_steps(len(batch.starts), states)))
-    run_batch(kernel, batch, options_of(replace(options, budget=budget)), results, options.threads)
-    allowance.charge(results.statistics[:, STATISTICS.index("attempted")], states)
-    if budget < options.budget and np.any(results.statuses == Status.BUDGET):
-        allowance.exhaust()
+    which, steps = np.arange(len(batch.starts)), 0
+    while which.size:
+        before, steps = steps, int(min(options.budget, allowance.most_steps(len(which), states)))
+        if steps < MORE * before:
+            allowance.exhaust()
+        part = _empty_like(results, len(which))
+        run_batch(kernel, _batch_of(batch, which), options_of(replace(options, budget=steps)), part, options.threads)
+        allowance.charge(part.statistics[:, STATISTICS.index("attempted")], states)
+        for column, rows in zip(results, part, strict=True):
+            column[which] = rows
+        which = which[(part.statuses == Status.BUDGET) & (steps < options.budget)]
+
+
+def _batch_of(batch: Batch, which: np.ndarray) -> Batch:
+    """The runs of a batch with some numbers; what all runs share stays."""
+    if len(which) == len(batch.starts):
+        return batch
+    own = {
+        name: array[which]
+        for name, array in batch._asdict().items()
+        if isinstance(array, np.ndarray) and len(array) == len(batch.starts)
+    }
+    return batch._replace(**own)
+
+
+def _empty_like(results: Results, runs: int) -> Results:
+    """Room for the results of so many runs, as much for each as these have."""
+    return empty_results(runs, results.turn_times.shape[1], *results.samples.shape[1:])
 
 
 def options_of(options: RunOptions) -> Settings:

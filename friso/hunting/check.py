@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.allowance import allowance
+from friso.engine.allowance import Exhausted, allowance
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import KernelRequest, kernel, kernels
@@ -21,7 +21,7 @@ from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.feeding import Feeding, feeding
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure_runs, measuring_options
-from friso.hunting.verdict import ATTRACTION, PARTS, WORK, Judgement, judge
+from friso.hunting.verdict import ATTRACTION, FEEDING, PARTS, ROOM, WORK, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.transmission import BACKLASH, leading_friction
@@ -54,7 +54,8 @@ class Case:
     `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what sticks, constant
     forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`; `unstable` tells in which
     of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`); `feeding`, with a
-    backlash, without what hunting ends. `trace` holds the time response if asked for.
+    backlash, without what hunting ends (None, too, where that was given up). `trace` holds the time
+    response if asked for.
     """
 
     stage: Stage
@@ -83,6 +84,9 @@ class Case:
         joint = self.stage.joint
         return self.largest_force < self.breakaway and (joint is None or joint.locked)
 
+
+FED = 0.3
+"""Share of the work of a case that the search for what feeds its cycle may use at least."""
 
 LONG = 1e-6
 """Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
@@ -136,11 +140,16 @@ def _needed(stage: Stage) -> set[KernelRequest]:
 def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> Case:
     flat = stage.flat()
     begun = done.done
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, measuring_options(rtol))
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
     measures = measure_runs(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
-    judgement = judge(stage, measures, max(rtol, LONG), lambda part: done.add(int(part != ATTRACTION), part), work)
+    with allowance() as spent:
+        judgement = judge(stage, measures, max(rtol, LONG), lambda part: done.add(int(part != ATTRACTION), part), work)
+    fed = None
+    if judgement.swing and structure(flat).plays:
+        fed = _fed(stage, max(work - spent.used, FED * work))
+        judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, FEEDING))
     done.add(begun + len(PARTS) - done.done, PARTS[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,
@@ -155,9 +164,18 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
         solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
         breakaway=_breakaway(flat),
         unstable=unstable(stage),
-        feeding=feeding(stage) if judgement.swing else None,
+        feeding=fed,
         trace=simulate(stage, rtol) if traces else None,
     )
+
+
+def _fed(stage: Stage, work: float) -> Feeding | None:
+    """What feeds the cycle of a stage with a backlash; None where that takes more work."""
+    try:
+        with allowance(work):
+            return feeding(stage)
+    except Exhausted:
+        return None
 
 
 def _breakaway(flat: Mapping[str, Any]) -> float:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Literal
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal
 
 import numpy as np
 
 from friso.equations.roles import Role, Steady
+from friso.equations.structure import structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.stage import Stage
+from friso.stage.controllers import controller_of
 from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
@@ -23,6 +25,22 @@ has poles at 0."""
 
 FAST = 1e3
 """Speed at which friction is viscous and no more, in units of that of the loop's own motion."""
+
+LOWER = np.geomspace(1e-6, 1.0, 37)
+"""Shares of its gain at which the stability of a loop is looked at."""
+
+
+def stable_at_lower_gains(flat: Mapping[str, Any]) -> bool:
+    """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones.
+
+    A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup the largest motions go by
+    the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
+    b k_p > m k_i, which is Hurwitz's criterion for the same loop at any gain, and grow where it is less.
+    """
+    controller = controller_of(flat)
+    gains = {controller.key(name): flat[controller.key(name)] * LOWER for name in controller.loop_gain}
+    stages = Ensemble.held({**flat, **gains}, len(LOWER), form=structure(dict(flat)))
+    return not unstable_among(stages)["slides"].any()
 
 
 def unstable(stage: Stage) -> tuple[LoopState, ...]:

@@ -28,13 +28,14 @@ from friso.hunting.basin import (
     moves_that_hunt,
     pushes_that_hunt,
 )
-from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
+from friso.hunting.criteria import BAND, COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
 from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, Searched, search_bandwidths
 from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.outward import AttractionEnd
+from friso.hunting.turning import HALF, WINDOW
 from friso.stage import Stage
 
 LONG, SWINGS = 1000.0, 120.0
@@ -47,15 +48,27 @@ MOVING = "the reference never stands still"
 WORK = 7e8
 """Work of a check (see `friso.engine.allowance`): about 8 s on one core."""
 
-SURVEY, KICKS = 0.4, 0.3
-"""Shares of the work of a verdict that the search for what attracts the stage may use, and that are kept for kicks and
-moves."""
+SURVEY, REST, KICKS = 0.4, 0.3, 0.3
+"""Shares of the work of a verdict that the search for what attracts the stage may use at most, and of what that leaves
+those for following a motion that has not come to rest, and for kicks and moves; the search for the edge of hunting may
+use all that is left then."""
+
+FARTHER = 12.0
+"""How many times as long a motion is followed that still swings by less than what attracts."""
 
 LEFT_OVER = "not every motion that swings on was followed to its end: this one may end in another than those found"
 """Why it is not certain that a motion comes to rest which does not end in what attracts."""
 
 SWINGS_ON = "this motion still swings when it is given up, by less than half of what was found to attract"
 """The same where it has been seen not to have done so."""
+
+UNFOLLOWED = (
+    "this motion was not followed for long enough to see it come to rest: that takes more work than a check may"
+)
+"""Why it is not certain that a motion comes to rest where nothing was found that attracts."""
+
+ROOM = 1 << 14
+"""Room for turning points of a motion that is followed for long: one that needs more is run again."""
 
 STEADY = 0.01
 """Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
@@ -71,8 +84,8 @@ class Judgement:
     reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no
     longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
     in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
-    was seen to swing on, at the end of the time for which it was followed. `given_up`: what of `PARTS` would have taken
-    more work than was allowed.
+    was seen to swing on, at the end of the time for which it was followed. `given_up`: what of `PARTS`, or `FEEDING`,
+    would have taken more work than was allowed.
     """
 
     verdict: Verdict
@@ -122,8 +135,11 @@ class Motions:
         return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
 
 
-PARTS = ATTRACTION, BANDWIDTHS, STARTS = "what attracts the stage", "other bandwidths", "kicks and moves"
-"""What is computed for a verdict, in this order; without a cycle that attracts the last is left out."""
+PARTS = ATTRACTION, STARTS, BANDWIDTHS = "what attracts the stage", "kicks and moves", "other bandwidths"
+"""What is computed for a verdict, in this order; without a cycle that attracts the second is left out."""
+
+FEEDING = "what feeds it"
+"""What is computed behind these of a stage with a backlash that something attracts."""
 
 
 def judge(
@@ -142,15 +158,19 @@ def judge(
         attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage, work=SURVEY * work)
     if not motions.completed[0]:
         return Judgement("failed", attraction)
-    begin(BANDWIDTHS)
     if attraction.target:
         return _with_a_target(stage, motions, attraction, attraction.target, begin, work - spent.used)
+    begin(BANDWIDTHS)
     return _without_a_target(stage, motions, rtol, attraction, work - spent.used)
 
 
 def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: Hunting, work: float) -> Judgement:
-    with allowance() as spent:
-        rest = _rest(stage.flat(), motions, 1, measuring_options(rtol), possible=attraction.possible)
+    with allowance(REST * work) as spent:
+        rest = _rest(
+            stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
+        )
+    if attraction.certain and rest.unknown[0]:
+        attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
     if attraction.possible and not observed:
@@ -181,25 +201,15 @@ def _with_a_target(
     work: float,
 ) -> Judgement:
     with allowance() as spent:
-        ends, completed, swing = ends_in(stage.flat(), 1, target)
+        ends, completed, swing = _own_motion(stage, target, REST * work)
         if not completed[0]:
             return Judgement("failed", attraction)
         within = float(motions.settling[0])
-        sought, given_up = _sought(stage, attraction, (1 - KICKS) * work - spent.used)
-    doubt = "" if ends[0] else _restless(stage, attraction, float(swing[0]), within)
-    begin(STARTS)
-    starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
-    try:
-        with allowance(work - spent.used):
-            starts = (
-                displacements_that_hunt(stage, target),
-                pushes_that_hunt(stage, target),
-                moves_that_hunt(stage, target),
-            )
-    except Exhausted:
-        given_up = (*given_up, STARTS)
-    if _some_unknown(*starts):
-        given_up = (*given_up, STARTS)
+        doubt = "" if ends[0] else _restless(stage, attraction, float(swing[0]), within)
+        begin(STARTS)
+        starts, started = _starts(stage, target, KICKS * work)
+    begin(BANDWIDTHS)
+    sought, given_up = _sought(stage, attraction, work - spent.used)
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
         replace(attraction, certain=False, reason=doubt) if doubt else attraction,
@@ -209,15 +219,53 @@ def _with_a_target(
         sought.lower,
         None if ends[0] or not np.isfinite(within) else within,
         observed=not attraction.attracting,
-        given_up=given_up,
+        given_up=(*given_up, *started),
     )
+
+
+def _own_motion(stage: Stage, target: Target, work: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the stage's own motion ends (see `ends_in`). One that still swings then, by less than what attracts, is
+    followed for longer, if that takes no more than so much work: it may be dying out."""
+    flat, first = stage.flat(), ends_in(stage.flat(), 1, target)
+    ends, completed, swing = (column[0] for column in first)
+    if ends or not completed or swing <= _resting(stage):
+        return first
+    longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
+    try:
+        with allowance(work):
+            last = ends_in(flat, 1, longer)
+    except Exhausted:
+        return first
+    return last if last[1][0] else first
+
+
+def _resting(stage: Stage) -> float:
+    """The swing, peak to peak [m], up to which a stage is at rest."""
+    return 2 * RESOLVED * float(Ensemble.held(stage.flat(), 1).length[0])
+
+
+def _starts(
+    stage: Stage, target: Target, work: float
+) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[str, ...]]:
+    """Which kicks and moves start hunting, as far as so much work shows, and what of that had to be given up."""
+    starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
+    try:
+        with allowance(work):
+            starts = (
+                displacements_that_hunt(stage, target),
+                pushes_that_hunt(stage, target),
+                moves_that_hunt(stage, target),
+            )
+    except Exhausted:
+        return starts, (STARTS,)
+    return starts, (STARTS,) if _some_unknown(*starts) else ()
 
 
 def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) -> str:
     """Why a motion need not come to rest that does not end in what was found to attract, and at last swings by so much
     [m], peak to peak; `within` is the time from which on it stays near its reference [s] (NaN: not within its run).
     "" if it does."""
-    if swing > 2 * RESOLVED * float(Ensemble.held(stage.flat(), 1).length[0]):
+    if swing > _resting(stage):
         return SWINGS_ON
     surveyed = attraction.surveyed
     every = surveyed is None or bool(surveyed.complete[0])
@@ -324,28 +372,46 @@ class _Rest:
     followed: np.ndarray
     swing: np.ndarray
 
+    @property
+    def unknown(self) -> np.ndarray:
+        """Which had to be followed for long, and were not to the end of that, shape (count,)."""
+        return ~self.rests & ~np.isfinite(self.followed)
+
+    def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
+        """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""
+        stages = Ensemble.held(flat, count, form=shared_structure(flat))
+        waits = SWINGS * wait(stages, loose_from(stages))
+        lasts_for = np.maximum(np.maximum(LONG, flat["motion.duration"]), waits)
+        long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
+        last = _motions(long, count, replace(run_options, window=WINDOW))
+        done = last.completed.copy()
+        if (swinging := np.flatnonzero(done & (last.swing > COUNTED_ABOVE))).size:
+            half = _motions(_part(long, swinging), swinging.size, replace(run_options, window=HALF))
+            done[swinging] = half.completed
+            swing = last.swing[swinging]
+            self.steady[which[swinging]] = half.completed & lasts(
+                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY)
+            )
+        self.followed[which] = np.where(done, lasts_for, np.nan)
+        self.after[which], self.swing[which] = np.where(done, last.settling, np.nan), last.swing
+
 
 def _rest(flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool) -> _Rest:
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
-    its end is followed."""
-    after, steady, followed = motions.settling.copy(), np.zeros(count, bool), np.full(count, np.nan)
-    swing = motions.swing.copy()
+    its end is followed, as far as an allowance reaches."""
     rests = np.isfinite(motions.settling)
+    steady, followed = np.zeros(count, bool), np.full(count, np.nan)
+    rest = _Rest(rests, motions.settling.copy(), steady, followed, motions.swing.copy())
     if not possible:
         idle = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
-        return _Rest(rests | idle, after, steady, followed, swing)
+        return replace(rest, rests=rests | idle)
     if (moving := np.flatnonzero(~rests)).size:
-        part = _part(flat, moving)
-        stages = Ensemble.held(part, moving.size, form=shared_structure(flat))
-        waits = SWINGS * wait(stages, loose_from(stages))
-        followed[moving] = np.maximum(np.maximum(LONG, part["motion.duration"]), waits)
-        long = {**part, "motion.duration": followed[moving] + last_corner(part)}
-        last, half = (_motions(long, moving.size, replace(run_options, window=window)) for window in (0.75, 0.5))
-        done = last.completed & half.completed
-        followed[moving] = np.where(done, followed[moving], np.nan)
-        after[moving], swing[moving] = np.where(done, last.settling, np.nan), last.swing
-        steady[moving] = done & lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
-    return _Rest(rests, after, steady, followed, swing)
+        late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)  # what may leave the band, at the end
+        try:
+            rest.follow(moving, _part(flat, moving), moving.size, late)
+        except Exhausted:
+            rest.steady[moving], rest.followed[moving] = False, np.nan
+    return rest
 
 
 def _motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:

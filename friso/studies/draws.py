@@ -10,7 +10,9 @@ import numpy as np
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import shared_structure
 from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import why_not
+from friso.hunting.loop import unstable_among
 from friso.hunting.verdict import judge_many
 from friso.progress import Progress, Tally, silent
 from friso.shares import Share, share
@@ -26,9 +28,11 @@ MOST = 100_000
 
 @dataclass(frozen=True)
 class Fates:
-    """The verdicts on drawn stages, words of `friso.hunting.criteria.VERDICTS`, shape (count,)."""
+    """The verdicts on drawn stages, words of `friso.hunting.criteria.VERDICTS`, and the loops of which are `unstable`,
+    sticking or sliding (see `friso.hunting.loop`), both of shape (count,)."""
 
     verdicts: np.ndarray
+    unstable: np.ndarray
 
     @property
     def counts(self) -> dict[str, int]:
@@ -96,10 +100,13 @@ def different(stage: Stage) -> dict[str, Stage]:
 
 
 def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
-    words = np.full(sample.count, "failed", dtype=object)
+    words, lost = np.full(sample.count, "failed", dtype=object), np.zeros(sample.count, bool)
     for first in range(0, sample.count, CHUNK):
         chunk = slice(first, min(first + CHUNK, sample.count))
         keys = {key: values[chunk] for key, values in sample.keys.items()}
-        words[chunk] = judge_many(laid_over(stage, keys), chunk.stop - first, rtol)
+        flat, count = laid_over(stage, keys), chunk.stop - first
+        words[chunk] = judge_many(flat, count, rtol)
+        stages = Ensemble.held(flat, count, form=shared_structure(flat))
+        lost[chunk] = np.any([*unstable_among(stages).values()], axis=0)
         tally.add(chunk.stop - first, "draws")
-    return Fates(words)
+    return Fates(words, lost)

@@ -29,8 +29,10 @@ CLOSE = 0.01
 SAME = 1e-3
 """The same of two orbits that are the same."""
 
-MOST_KINDS = 32
-"""Kinds of runs of a stage that are followed after the second round."""
+MOST_KINDS, DEARER = 32, 30.0
+"""Kinds of runs of a stage that are followed after the second round; and how many times as many steps as the last round
+the next ones may take: of a stage that nothing attracts so far all kinds are followed for which the steps left
+suffice."""
 
 ENOUGH = 3
 """Rounds after which no more motions that attract are looked for where one is known."""
@@ -192,7 +194,7 @@ class Survey:
             if number > 0:
                 still = swinging[~ends.swing[swinging]]  # each of them somewhere else
                 moving = np.setdiff1d(swinging, still)
-                kinds = moving[self._kinds(owners[moving], ends.take(moving), MOST_KINDS)]
+                kinds = moving[self._kinds(owners[moving], ends.take(moving), self._affordable(owners, ends)[moving])]
                 swinging = np.union1d(kinds, still)
             if number == ROUNDS - 1:
                 return self._last(runs.take(swinging), owners[swinging], ends.take(swinging), before[swinging])
@@ -226,7 +228,14 @@ class Survey:
         self.unknown[owners[swinging[spent]]] = True
         return swinging[~spent]
 
-    def _kinds(self, owners: np.ndarray, ends: Ends, most: int) -> np.ndarray:
+    def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
+        """How many kinds of runs of its stage may be followed on, for each run."""
+        runs = np.bincount(owners, minlength=self.count)
+        steps = np.bincount(owners, ends.steps, minlength=self.count) / np.maximum(runs, 1)
+        most = np.where(self.attracted, 0, self.left / (DEARER * np.maximum(steps, 1)))
+        return np.maximum(most, MOST_KINDS)[owners]
+
+    def _kinds(self, owners: np.ndarray, ends: Ends, most: np.ndarray | int) -> np.ndarray:
         """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
         unknown what the others come to."""
         chosen, surplus = _kinds(owners, ends, most)
@@ -334,9 +343,11 @@ class Survey:
             self.add([motion])
 
 
-def _kinds(owners: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarray]:
-    """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, and of
-    those that are like none of these. Runs that do not repeat themselves are on their way, and soon apart."""
+def _kinds(owners: np.ndarray, ends: Ends, most: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
+    """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, a
+    number or one for each run, and of those that are like none of these. Runs that do not repeat themselves are on
+    their way, and soon apart."""
+    limits = np.broadcast_to(most, (len(owners),))
     chosen: dict[int, list[int]] = {}
     surplus: list[int] = []
     repeats = ends.repeats.swings > 0
@@ -350,6 +361,6 @@ def _kinds(owners: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.nd
     for k in np.argsort(ends.repeats.swings, kind="stable").tolist():
         same_stage = chosen.setdefault(int(owners[k]), [])
         if not any(same_kind(k, j) for j in same_stage):
-            (same_stage if len(same_stage) < most else surplus).append(k)
+            (same_stage if len(same_stage) < limits[k] else surplus).append(k)
     stand = [k for numbers in chosen.values() for k in numbers]
     return np.array(stand, dtype=np.int64), np.array(surplus, dtype=np.int64)

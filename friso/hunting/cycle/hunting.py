@@ -20,6 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
+from friso.hunting.loop import stable_at_lower_gains
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
 
@@ -204,7 +205,7 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
 def _beyond_the_search(stages: Ensemble) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
     controller = stages.structure.controller
-    if controller is not None and controller.anti_windup == "none":
+    if controller is not None and controller.anti_windup == "none" and not stable_at_lower_gains(stages.flat):
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
     if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
         return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"

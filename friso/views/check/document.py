@@ -165,6 +165,7 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
         "attracting_cycle": _share_document(fates.share(ATTRACTED)),
         "criterion": CRITERION,
         "verdicts": fates.counts,
+        "loop_unstable": int(fates.unstable.sum()),
         "separation": fates.separations(draws.sample.keys),
     }
 

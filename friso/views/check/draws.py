@@ -53,7 +53,11 @@ def draws_sentences(draws: Draws) -> list[str]:
 
 def _sentence(fates: Fates, draws: Draws) -> str:
     failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
-    sentences = [
+    lost = int(np.count_nonzero(fates.unstable))
+    sentences = (
+        [f"the loop of {lost} of {draws.sample.count} draws is unstable, whatever the friction."] if lost else []
+    )
+    sentences += [
         f"of {draws.sample.count} draws, hunts with a probability of {share_with_interval(fates.share(('hunts',)))}, "
         f"has a cycle that attracts with {share_with_interval(fates.share(ATTRACTED))}."
     ]

@@ -9,7 +9,7 @@ from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import DISTANCE, FARTHEST
-from friso.hunting.verdict import BANDWIDTHS, STARTS
+from friso.hunting.verdict import BANDWIDTHS, FEEDING, STARTS
 from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
@@ -37,6 +37,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     if case.verdict not in says:
         return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []
+    feeds += [f"{_too_much('What feeds it')}."] if FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
     return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *after])
 

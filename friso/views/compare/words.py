@@ -171,7 +171,18 @@ def sentences(comparison: Comparison) -> list[str]:
 
 def answer(comparison: Comparison) -> list[str]:
     """Which options bring the machines to rest at what cost, and what to do."""
-    return [conclusion(comparison), *_recommendation(comparison)]
+    return [*_unstable(comparison), conclusion(comparison), *_recommendation(comparison)]
+
+
+def _unstable(comparison: Comparison) -> list[str]:
+    """That the loop of the stage as it is is not stable, on how many of the machines: friction aside."""
+    base, count = comparison.results[0], comparison.machines.count
+    if not base.unstable:
+        return []
+    return [
+        f"As it is, the loop is unstable on {base.unstable} of {count} machines, whatever the friction: retune the "
+        "controller (friso bode)."
+    ]
 
 
 def details(comparison: Comparison) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.views.documents import plain_json
-from friso.views.map.findings import headline, unstable_loop
+from friso.views.map.findings import headline, loop_first
 from friso.views.map.words import text_counts, word_counts
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def map_document(runs: xr.Dataset, study: Study, store: Path | None, metric: str
         },
         "cells": study.cells,
         "rtol": study.rtol,
-        "conclusion": " ".join([*unstable_loop(study.stage), headline(runs, metric)]),
+        "conclusion": " ".join([*loop_first(study.stage), headline(runs, metric)]),
         "outcomes": word_counts(runs, "outcome"),
         "verdicts": word_counts(runs, "verdict") or None,
         "attractors": text_counts(runs, "attractor") or None,

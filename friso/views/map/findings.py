@@ -13,6 +13,7 @@ from friso.quantities import percent
 from friso.shares import share_interval
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
 from friso.views.drawing.prefixes import listed, percentage
+from friso.views.loop_words import unstable_loop
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.views.map.words import (
     AT_ONCE,
@@ -238,18 +239,12 @@ def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
-    answer = [*unstable_loop(study.stage), headline(runs, metric)]
+    answer = [*loop_first(study.stage), headline(runs, metric)]
     return [*answer, extent, verification(runs), *caveats(runs, metric), *reasons]
 
 
-def unstable_loop(stage: Stage) -> list[str]:
-    """In which of its states the loop of the stage as its file gives it is unstable; nothing where it is stable."""
+def loop_first(stage: Stage) -> list[str]:
+    """That the loop of the stage as its file gives it is unstable, if it is."""
     from friso.hunting.loop import unstable  # looking at a map needs no engine
 
-    if not (states := unstable(stage)):
-        return []
-    where = listed([f"while the stage {state}" for state in states], "and")
-    return [
-        f"The loop of the stage as its file gives it is unstable {where}, whatever the friction: retune the controller "
-        "(friso bode)."
-    ]
+    return unstable_loop(unstable(stage))

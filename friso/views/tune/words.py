@@ -23,6 +23,7 @@ from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER
 from friso.stage.transmission import leading_friction
 from friso.views.drawing.prefixes import NOTHING, listed, share_with_interval, with_unit
+from friso.views.loop_words import unstable_loop
 
 DOUBTS = {
     "verdict": "friso check does not say that it settles",
@@ -94,7 +95,7 @@ def number(value: float, unit: str) -> str:
 
 def answer(tuning: Advice) -> list[str]:
     """The answer, first of all that is said: the least change that works, what it brings and costs; the next best."""
-    lines = [*_interrupted(tuning)]
+    lines = [*unstable_loop(tuning.case.unstable), *_interrupted(tuning)]
     if not tuning.needed:
         return [
             *lines,
