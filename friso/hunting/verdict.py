@@ -169,7 +169,7 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         rest = _rest(
             stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
         )
-    if attraction.certain and rest.unknown[0]:
+    if attraction.possible and attraction.certain and rest.unknown[0]:
         attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
