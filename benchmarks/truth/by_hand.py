@@ -27,8 +27,17 @@ NAMES = (
     *("law", "static", "coulomb", "v_stribeck", "exponent", "sigma0", "sigma1", "viscous"),
     *("asymmetry", "viscous_asymmetry", "v_regular", "tuned", "kp", "ki", "kd", "tau", "on_error", "limit"),
     *("windup", "unwinding", "bias_cart", "bias_stage"),
+    *("deadband", "motor", "k_drive", "d_drive", "play", "at_motor"),
 )
 """What the equations contain, in the order of `_rate`."""
+
+WRITTEN = (
+    *("masses.", "friction.", "joint.", "parasitic.", "bias.", "motion.", "transmission.", "encoder."),
+    *("controller.kind", "controller.crossover", "controller.alpha", "controller.beta", "controller.tuned_mass"),
+    *("controller.kp", "controller.ki", "controller.kd", "controller.tau", "controller.derivative_on"),
+    *("controller.force_limit", "controller.anti_windup", "controller.error_deadband"),
+)
+"""How the keys begin that the equations contain."""
 
 REST_BAND = 1e-3
 """Share of the force limit beyond it over which the integrator comes to rest (clamping)."""
@@ -69,7 +78,7 @@ class ByHand:
     def omega(self) -> float:
         """Natural frequency of mass and loop [1/s]."""
         n = dict(zip(NAMES, self.numbers, strict=True))
-        return float(np.sqrt(n["kp"] / (n["cart"] + n["stage"] + n["part"])))
+        return float(np.sqrt(n["kp"] / (n["cart"] + n["stage"] + n["part"] + n["motor"])))
 
     @property
     def length(self) -> float:
@@ -134,6 +143,10 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
     law, joint = flat["friction.model"], _joint(flat)
     if law not in LAWS:
         raise NotWritten(law)
+    if missing := [key for key in flat if not key.startswith(WRITTEN)]:
+        raise NotWritten(", ".join(missing))
+    if joint != "rigid" and "transmission.mass" in flat:
+        raise NotWritten("a transmission before a joint")
     windup = flat.get("controller.anti_windup", "none")
     if flat["controller.kind"] != "pid" or windup not in WINDUPS:
         raise NotWritten(f"{flat['controller.kind']}, {windup}")
@@ -169,9 +182,23 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
         "unwinding": flat.get("controller.anti_windup_time", 1.0),
         "bias_cart": flat.get("bias.cart", 0.0),
         "bias_stage": flat.get("bias.stage", 0.0),
+        "deadband": flat.get("controller.error_deadband", 0.0),
+        "motor": flat.get("transmission.mass", 0.0),
+        "k_drive": flat.get("transmission.stiffness", 0.0),
+        "d_drive": flat.get("transmission.damping", 0.0),
+        "play": flat.get("transmission.backlash", 0.0),
+        "at_motor": _side(flat),
         **_gains(flat),
     }
     return ByHand(np.array([float(values[name]) for name in NAMES]), _pieces(flat))
+
+
+def _side(flat: Mapping[str, Any]) -> float:
+    """Where the encoder is: 1 at the motor, 0 at the load."""
+    sides = {flat.get(f"encoder.{name}", "load") for name in ("position", "velocity")}
+    if len(sides) > 1:
+        raise NotWritten("two encoders")
+    return float("motor" in sides)
 
 
 def _joint(flat: Mapping[str, Any]) -> str:
@@ -215,11 +242,14 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
     (cart, stage, part, mode_k, mode_d, joint, k_j, d_j, stroke, k_l, d_l) = n[:11]
     (law, static, coulomb, v_s, exponent, sigma0, sigma1, viscous) = n[11:19]
     (asymmetry, viscous_asymmetry, v_r, tuned, kp, ki, kd, tau, on_error, limit) = n[19:29]
-    (windup, unwinding, bias_cart, bias_stage) = n[29:]
+    (windup, unwinding, bias_cart, bias_stage) = n[29:33]
+    (deadband, motor, k_drive, d_drive, play, at_motor) = n[33:]
     out = np.zeros(9)
     since = time - piece[0]
     r = piece[1] + since * (piece[2] + since * piece[3] / 2)
-    e = r - y[0]
+    place, pace = (y[4], y[5]) if at_motor > 0 else (y[0], y[1])
+    e = r - place
+    e -= min(max(e, -deadband), deadband)
 
     integrand = e
     if tuned > 0:
@@ -227,13 +257,13 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
         demand = kp * y[7] + ki * y[8] + kd * (e - y[7]) / tau
         out[7] = (e - y[7]) / tau
     else:
-        source = e if on_error > 0 else y[0]
+        source = e if on_error > 0 else place
         rise = 0.0
         if tau > 0 and kd > 0:
             rise = (source - y[7]) / tau
             out[7] = rise
         elif kd > 0:
-            rise = y[1]
+            rise = pace
         demand = kp * e + ki * y[8] + (kd * rise if on_error > 0 else -kd * rise)
     share = 1.0
     beyond = abs(demand) - limit
@@ -260,6 +290,14 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
             friction = sigma0 * y[6] + (sigma1 * out[6] if law == 1 else 0.0) + rub
 
     out[0] = y[1]
+    if motor > 0:
+        gap, pull = y[4] - y[0], 0.0
+        if abs(gap) >= play / 2:
+            pull = k_drive * (gap - (play / 2 if gap > 0 else -play / 2)) + d_drive * (y[5] - y[1])
+        out[4] = y[5]
+        out[5] = (force - pull) / motor
+        out[1] = (pull + bias_cart + bias_stage - friction) / (cart + stage)
+        return out
     if joint == 0:
         out[1] = (force + bias_cart + bias_stage - friction) / (cart + stage)
         return out

@@ -30,7 +30,8 @@ ELEMENTS = 4
 class Form:
     """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
     with their derivative "on error", or on the measurement, "filtered" or "plain"; `windup`: what the
-    integrator does where the force is limited; `bias`: the mass it acts on."""
+    integrator does where the force is limited; `bias`: the mass it acts on; `deadband`: of the error; `drive`: a
+    "transmission", with a "backlash" or none, and where the encoder is; `filtered`: a notch and a low-pass filter."""
 
     joint: str
     friction: str = "lugre"
@@ -40,6 +41,9 @@ class Form:
     windup: str = ""
     parasitic: bool = False
     bias: str = ""
+    deadband: bool = False
+    drive: str = ""
+    filtered: bool = False
 
 
 FORMS = (
@@ -77,10 +81,24 @@ FORMS = (
 """Structures, as many as there are kernels to compile, with every friction law that comes with friso."""
 
 
-def draw(seed: int, number: int) -> Stage:
-    """The stage with this number of the series that begins with `seed`."""
-    tables = _Draw(np.random.default_rng([seed, number]), FORMS[number % len(FORMS)]).tables()
-    return Stage(name=f"seed {seed}, number {number}", **tables)
+MACHINES = (
+    Form("rigid", control="cascade", filtered=True),
+    Form("rigid", control="filtered", drive="backlash at the load"),
+    Form("rigid", deadband=True),
+    Form("free", control="cascade"),
+    Form("rigid", control="filtered", drive="transmission at the load"),
+    Form("rigid", control="cascade", filtered=True, windup="clamp"),
+    Form("rigid", drive="backlash at the motor"),
+    Form("free", control="filtered", deadband=True),
+)
+"""Structures of machines: cascades with filters, screws and belts, deadbands. A series of their own."""
+
+
+def draw(seed: int, number: int, forms: tuple[Form, ...] = FORMS) -> Stage:
+    """The stage with this number of the series of some forms that begins with `seed`."""
+    tables = _Draw(np.random.default_rng([seed, number]), forms[number % len(forms)]).tables()
+    kind = ", machines" if forms is MACHINES else ""
+    return Stage(name=f"seed {seed}{kind}, number {number}", **tables)
 
 
 class _Draw:
@@ -127,6 +145,8 @@ class _Draw:
                 "mass": _text(self.stage * self.rng.uniform(0.1, 0.7), "kg"),
                 "damping_ratio": self.log(2e-3, 0.05),
             }
+        if self.form.drive:
+            tables |= self.drive()
         if self.form.bias:
             tables["bias"] = {self.form.bias: _text(self.sign() * self.static * self.log(0.01, 2.0), "N")}
         return tables | {"motion": self.motion()}
@@ -183,9 +203,44 @@ class _Draw:
             return _text(float(number) * self.log(1 / SPREAD, SPREAD), unit)
         return float(field.example) * self.log(1 / SPREAD, 1.0)
 
+    def drive(self) -> dict[str, Any]:
+        """A motor behind a screw or belt, whose mode with the masses lies above the crossover."""
+        kind, side = self.form.drive.split(" at the ")
+        motor = self.mass * self.log(0.1, 5.0)
+        reduced = motor * self.mass / (motor + self.mass)
+        stiffness = reduced * (self.omega * self.log(4.0, 60.0)) ** 2
+        table = {
+            "mass": _text(motor, "kg"),
+            "stiffness": _text(stiffness, "N/m"),
+            "damping": _text(2 * self.log(0.01, 0.3) * np.sqrt(stiffness * reduced), "N*s/m"),
+        }
+        if kind == "backlash":
+            table["backlash"] = _text(self.deflection * self.log(1e-3, 0.5), "m")
+        return {"transmission": table, "encoder": {"position": side, "velocity": side}}
+
+    def cascade(self) -> dict[str, Any]:
+        """A velocity loop, its integral as slow as a few of its own times, and a slower position loop."""
+        return {
+            "kind": "cascade",
+            "kv": _text(self.omega * self.log(0.1, 0.6), "1/s"),
+            "kp": _text(self.mass * self.omega, "N*s/m"),
+            "velocity_integral_time": _text(self.log(1.5, 15.0) / self.omega, "s"),
+            "proportional_on": str(self.rng.choice(["error", "measurement"])),
+        }
+
+    def filters(self) -> list[dict[str, Any]]:
+        """A notch on the force, and a low-pass filter in the feedback, both above the crossover."""
+        notch, low_pass = (max(self.crossover * self.log(6.0, 40.0), 50.0) for _ in range(2))
+        return [
+            {"kind": "notch", "frequency": _text(notch, "Hz"), "width": _text(0.4 * notch, "Hz"), "depth": 0.9},
+            {"kind": "low_pass", "path": "feedback", "frequency": _text(low_pass, "Hz")},
+        ]
+
     def controller(self) -> dict[str, Any]:
         table: dict[str, Any] = {"kind": "pid"}
-        if self.form.control == "rules":
+        if self.form.control == "cascade":
+            table = self.cascade()
+        elif self.form.control == "rules":
             table |= {"crossover": _text(self.crossover, "Hz"), "alpha": self.alpha, "beta": self.beta}
             if self.rng.random() < 0.2:
                 table["tuned_mass"] = _text(self.mass * self.log(0.6, 1.6), "kg")
@@ -205,6 +260,10 @@ class _Draw:
                 "force_limit": _text(self.static * self.log(3.0, 60.0), "N"),
                 "anti_windup": self.form.windup,
             }
+        if self.form.filtered:
+            table["filters"] = self.filters()
+        if self.form.deadband:
+            table["error_deadband"] = _text(self.deflection * self.log(1e-4, 0.3), "m")
         if self.form.windup == "back_calculation":
             table["anti_windup_time"] = _text(self.log(0.1, 10.0) / self.omega, "s")
         return table

@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.truth.by_hand import NotWritten, by_hand
 from benchmarks.truth.claims import Claim
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
-from benchmarks.truth.trials import FINE, LINGERING, ROUGH, ROUNDS, Bench, Trial
+from benchmarks.truth.trials import FINE, LINGERING, NEIGHBOURS, ROUGH, ROUNDS, Bench, Trial
 from friso.equations.bandwidth import bandwidth, faster
 
 ALL = (80, 40, 60, 20)
@@ -36,6 +36,10 @@ out."""
 
 BELOW = (0.995, 0.98, 0.95)
 """Factors below it; at one of them at least something must."""
+
+JUST, DENSE = 1.01, 1 + 0.06 * np.linspace(-1, 1, 24)
+"""Factors up to which stages just beyond an edge are also begun from swings just below it, made larger and smaller by
+so much: beyond a flip or a fold something may attract from a narrow range there."""
 
 SCIPY_PERIODS, ALIKE = 20.0, 0.03
 """Periods for which SciPy follows a swing, and the share by which its amplitude may differ."""
@@ -109,7 +113,8 @@ def swinging(bench: Bench, trial: Trial) -> str:
 def attracts(bench: Bench, end: np.ndarray, period: float) -> bool:
     """Whether neighbours of a state that a run ended in, which swung for long with a period [s], swing on too, for very
     long."""
-    words = bench.follow(bench.beside(end), FINE, (LINGERING * period / bench.period,)).words
+    beside = Trial(bench.beside(end), ("beside a swing",) * len(NEIGHBOURS), NEIGHBOURS)
+    words = bench.follow(beside, FINE, (LINGERING * period / bench.period,)).words
     return bool(np.mean(words == SWINGS) >= MOST)
 
 
@@ -124,7 +129,7 @@ def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
         y[_PLACES[name]] = value
     if "cart_position" not in bench.kernel.states:
         y[2:4] = y[0:2]
-    if "parasitic_position" not in bench.kernel.states:
+    if not {"parasitic_position", "motor_position"} & set(bench.kernel.states):
         y[4:6] = y[0:2]
     times = np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
     x = equations.run(y, times)[:, 0]
@@ -142,6 +147,8 @@ _PLACES = {
     "cart_velocity": 3,
     "parasitic_position": 4,
     "parasitic_velocity": 5,
+    "motor_position": 4,
+    "motor_velocity": 5,
     "bristle_deflection": 6,
     "filtered_error": 7,
     "filtered_position": 7,
@@ -162,17 +169,30 @@ def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
     """Whether nothing attracts on the far side of the edge, and something on the near side."""
     assert claim.edge
     edge, nearest = claim.edge.factor, 1 + claim.edge.reserve
+    benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
+    swings = _swings(benches[0], seed)
     beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], edge**-0.5) if edge * factor < 1]
     for factor in (factor for factor in beyond if factor > nearest):
         bench = Bench(at(claim, edge * factor))
-        if why := swinging(bench, bench.starts(*FEW, seed)):
+        trial = bench.starts(*FEW, seed)
+        if factor <= JUST and len(swings):
+            trial = trial.and_more(swings, "just below the edge, by")
+        if why := swinging(bench, trial):
             place = f"at {factor:.4g} times the edge{_crossover(bench.flat)}"
             yield Refutation("edge", claim.edge.sure, f"{place} {why}")
             return
-    benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
     if not any(_may_hunt(bench, bench.starts(*starts, seed)) for starts in (ALL, CLOSE) for bench in benches):
         places = ", ".join(f"{factor:g}" for factor in BELOW)
         yield Refutation("edge", claim.edge.sure, f"at {places} times the edge no start swings on")
+
+
+def _swings(bench: Bench, seed: int) -> np.ndarray:
+    """States in swings that go on, a few of them, made larger and smaller, (starts, states)."""
+    run = bench.follow(bench.starts(*FEW, seed), ROUGH)
+    chosen = run.swinging[:: max(1, len(run.swinging) // TRIED)][:TRIED]
+    if not chosen.size:
+        return np.empty((0, 0))
+    return np.vstack([bench.beside(end, DENSE) for end in run.ends[chosen]])[:, : bench.kernel.initial_size]
 
 
 def at(claim: Claim, factor: float) -> dict[str, Any]:

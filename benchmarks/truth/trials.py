@@ -37,7 +37,7 @@ SMALL = 2e-3
 ROUNDS = (150.0, 800.0, 4000.0)
 """Periods for which a run is followed, and followed on where that does not tell."""
 
-NEIGHBOURS = (0.99, 0.997, 1.003, 1.01)
+NEIGHBOURS = np.array([0.99, 0.997, 1.003, 1.01])
 """Factors of a state that has swung for long, beside which the swing has to be taken up again."""
 
 LINGERING = 12_000.0
@@ -62,6 +62,11 @@ class Trial:
 
     def take(self, numbers: np.ndarray) -> Trial:
         return Trial(self.states[numbers], tuple(self.kinds[k] for k in numbers), self.sizes[numbers])
+
+    def and_more(self, states: np.ndarray, kind: str) -> Trial:
+        """These starts, and others of one kind, whose sizes are those of their positions."""
+        kinds = self.kinds + (kind,) * len(states)
+        return Trial(np.vstack([self.states, states]), kinds, np.append(self.sizes, states[:, 0]))
 
 
 @dataclass(frozen=True)
@@ -163,12 +168,12 @@ class Bench:
         all that is looked for."""
         return self._follow(self.held, trial.states, 0.0, rtol, rounds, any_will_do)
 
-    def beside(self, end: np.ndarray) -> Trial:
-        """A state in which a run ended, made larger and smaller by a little: near a cycle that repels but weakly a run
-        lingers, the longer the finer the tolerance, and only its neighbours leave."""
-        states = end * np.array(NEIGHBOURS)[:, None]
+    def beside(self, end: np.ndarray, factors: np.ndarray = NEIGHBOURS) -> np.ndarray:
+        """A state in which a run ended, made larger and smaller by factors, (factors, kept): near a cycle that repels
+        but weakly a run lingers, the longer the finer the tolerance, and only its neighbours leave."""
+        states = end * factors[:, None]
         states[:, len(self.kernel.states) :] = end[len(self.kernel.states) :]
-        return Trial(states, ("beside a swing",) * len(NEIGHBOURS), np.array(NEIGHBOURS))
+        return states
 
     def follow_own(self, rtol: float, longest: float = 100.0) -> Outcome:
         """What becomes of the stage's own motion, followed as many times its duration, and for `ROUNDS`."""
