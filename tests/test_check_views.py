@@ -33,7 +33,7 @@ from snapshots import Snapshots
 from friso.hunting import Judgement, Kick, Margin
 from friso.hunting.margin import BandwidthWindow
 from friso.hunting.outward import AttractionEnd
-from friso.hunting.verdict import STARTS
+from friso.hunting.verdict import BANDWIDTHS, STARTS
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
@@ -393,6 +393,14 @@ def test_kicks_that_start_hunting_are_told_where_others_were_given_up(wording: W
     silent = hunts(verdict="bistable", displacement=none, push=none, moves=None, given_up=(STARTS,))
     wording(sentence(silent))
     assert "1.72 mm" in sentence(hunts(verdict="bistable", push=none, moves=None, given_up=(STARTS,)))
+
+
+def test_what_a_search_left_open_depends_on_whether_the_edge_is_sure() -> None:
+    sure = hunts(given_up=(BANDWIDTHS,))
+    assert sure.margin is not None
+    unsure = replace(sure, margin=replace(sure.margin, certain=False))
+    assert "other bandwidths" in sentence(sure)
+    assert "other bandwidths" not in sentence(unsure)
 
 
 def test_a_peak_count_that_contradicts_the_verdict_is_explained(wording: Wording) -> None:

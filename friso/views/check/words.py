@@ -174,6 +174,8 @@ def _unsearched(case: Case) -> list[str]:
     """That the search through the bandwidths was given up."""
     if BANDWIDTHS not in case.judgement.given_up:
         return []
+    if case.judgement.margin and case.judgement.margin.certain:
+        return [f"{_too_much('Whether hunting is possible again at other bandwidths')}."]
     if case.judgement.margin:
         return ["The search for the edge of hunting was given up there: it takes more work than a check may."]
     return [f"{_too_much('At which bandwidths hunting is possible')}."]
