@@ -32,7 +32,7 @@ from friso.identification.moves import IdentifiedMoves, SimulatedLog
 from friso.identification.output_error.coverage import coverage
 from friso.identification.output_error.fit import OutputErrorFit, first_values
 from friso.identification.output_error.parameters import fit_parameters
-from friso.identification.output_error.problem import Simulated, tracking
+from friso.identification.output_error.problem import Simulated, loop_problem, tracking
 from friso.identification.output_error.profile import Profile
 from friso.identification.quality import Quality
 from friso.identification.readings.at_bearing import Between
@@ -88,7 +88,7 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
     levels = {name: inverse.value(name) for name in ("mass", "viscous", "coulomb", "offset")}
     parameters = fit_parameters(flat, levels, 0.16, 0.1, True)
     follows = tracking(flat, log, part, parameters, 5.0)
-    loop = own_loop(flat, log, part, parameters) if own_loop else None
+    loop = loop_problem(flat, log, part, parameters) if own_loop else None
     problem = loop if fitted_in_loop and loop else follows
     residual = 0.2 * np.random.default_rng(2).standard_normal(len(log.time))
     core = tuple(i for i, parameter in enumerate(parameters) if parameter.core)

@@ -193,7 +193,7 @@ def _problems(
     parameters = [replace(parameter, unit=unit_of(parameter.unit, log)) for parameter in every]
     full = {**flat, **keys_of(flat, {parameter.name: parameter.start for parameter in parameters})}
     follows = tracking(full, log, part, parameters, inverse.bandwidth)
-    return follows, own_loop(full, log, part, parameters) if own_loop else None
+    return follows, loop_problem(full, log, part, parameters) if own_loop else None
 
 
 def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
