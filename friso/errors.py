@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 from typing import Self
 
-_LONGEST = 4096
-"""Characters of a path that are shown, at most: no file has a longer one."""
+_LONGEST = 1200
+"""Characters of a line that are shown, at most: longer ones come from no person, and hide what is wrong."""
 
 
 class InputError(ValueError):
@@ -25,11 +25,10 @@ class InputError(ValueError):
         self.also = also
 
     def __str__(self) -> str:
-        origin = self.origin if len(self.origin) <= _LONGEST else f"{self.origin[:_LONGEST]}..."
-        head = ": ".join(part for part in (origin, self.key) if part)
+        head = ": ".join(shortened(part) for part in (self.origin, self.key) if part)
         rows = {"given:": self.actual, "expected:": self.expected, "example:": self.example}
-        lines = [f"  {name:<9} {text}" for name, text in rows.items() if text]
-        lines += [f"  {'also:':<9} {key}: {actual}" for key, actual in self.also]
+        lines = [f"  {name:<9} {shortened(text)}" for name, text in rows.items() if text]
+        lines += [f"  {'also:':<9} {shortened(f'{key}: {actual}')}" for key, actual in self.also]
         return "\n".join([head, *lines]).lstrip("\n")
 
     @classmethod
@@ -52,6 +51,11 @@ class InputError(ValueError):
         return type(self)(
             self.key, self.actual, self.expected, self.example, self.origin, tuple(dict.fromkeys((*self.also, *also)))
         )
+
+
+def shortened(text: str) -> str:
+    """A text whose lines are not longer than anyone reads."""
+    return "\n".join(line if len(line) <= _LONGEST else f"{line[:_LONGEST]}..." for line in text.split("\n"))
 
 
 def _dotted(table: str, key: str) -> str:

@@ -1,20 +1,33 @@
 """A small part of `python -m benchmarks.trust`: the same cases every time, and how a failure is shown."""
 
+import inspect
 import random
 from pathlib import Path
 
 import pytest
 
+import friso
 from benchmarks.trust import campaign
+from benchmarks.trust.arguments import ARGUMENTS, CALLS, LINES
 from benchmarks.trust.campaign import failure, run_part
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.readers import READERS
 from benchmarks.trust.writing import WRITING
+from friso.cli.command import COMMANDS as REGISTERED
 
-CASES = {"binary-logs": 20, "logs": 40, "stores": 20, "store-faults": 8, "store-exchanges": 10, "store-versions": 20}
+CASES = {
+    "arguments": 25,
+    "options": 12,
+    "binary-logs": 20,
+    "logs": 40,
+    "stores": 20,
+    "store-faults": 8,
+    "store-exchanges": 10,
+    "store-versions": 20,
+}
 
 
-@pytest.mark.parametrize("name", [*READERS, *WRITING])
+@pytest.mark.parametrize("name", [*READERS, *ARGUMENTS, *WRITING])
 def test_light_cases_pass(name: str) -> None:
     assert run_part(name, 3, range(CASES.get(name, 100))).failures == []
 
@@ -39,3 +52,8 @@ def test_a_crash_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert failure("crash", crash, 1, 1) == "ZeroDivisionError: of case"
     monkeypatch.setitem(WRITING, "crash", crash)
     assert [number for number, _ in campaign.run_part("crash", 1, range(3)).failures] == [0, 1, 2]
+
+
+def test_every_function_and_command_is_tried() -> None:
+    assert {*CALLS} == {name for name in friso.__all__ if inspect.isfunction(getattr(friso, name))}
+    assert {*LINES} == {*REGISTERED}

@@ -238,16 +238,19 @@ def test_wrong_links_are_refused(rig: Stage, links: dict, refused: Refused) -> N
 @pytest.mark.parametrize(
     "samples",
     [
-        Samples({"joint.stroke": "0 m..1 mm"}),
-        Samples({"joint.stroke": "0 m..1 mm:5"}, 8),
-        Samples({"joint.stroke": "0 m..1 mm"}, 8, "dice"),
-        Samples({"joint.stroke": ["1 mm"], "controller.alpha": [0.1, 0.2]}),
-        Samples({"joint.stroke": "0 m..1 mm", "controller.alpha": [0.1, 0.2]}, 8),
+        ({"joint.stroke": "0 m..1 mm"},),
+        ({"joint.stroke": "0 m..1 mm:5"}, 8),
+        ({"joint.stroke": "0 m..1 mm"}, 8, "dice"),
+        ({"joint.stroke": "0 m..1 mm"}, 8.5),
+        ({"joint.stroke": "0 m..1 mm"}, 8, "latin", -1),
+        (["joint.stroke"], 8),
+        ({"joint.stroke": ["1 mm"], "controller.alpha": [0.1, 0.2]},),
+        ({"joint.stroke": "0 m..1 mm", "controller.alpha": [0.1, 0.2]}, 8),
     ],
 )
-def test_wrong_samples_are_refused(rig: Stage, samples: Samples, refused: Refused) -> None:
+def test_wrong_samples_are_refused(rig: Stage, samples: tuple, refused: Refused) -> None:
     with refused():
-        sweep(rig, {}, samples)
+        sweep(rig, {}, Samples(*samples))
 
 
 def test_an_unknown_metric_is_refused(rig: Stage, refused: Refused) -> None:

@@ -50,6 +50,49 @@ def test_a_text_file_has_a_largest_size_and_a_name_a_longest(tmp_path: Path) -> 
             friso.load(tmp_path / name)
 
 
+def test_every_public_function_checks_its_arguments() -> None:
+    functions = [getattr(friso, name) for name in friso.__all__ if inspect.isfunction(getattr(friso, name))]
+    assert [function.__name__ for function in functions if not hasattr(function, "__wrapped__")] == []
+
+
+RANGES = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "0.1 mm..1 mm"}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("samples", value) for value in (0, -1, 1.5, True, "8", {}, [], float("nan"), 10**17, 10**5000)),
+        *(("export", value) for value in ("", "a.nc", 3, [3], [b"a.nc"], [""], ["x" * 300 + ".nc"], ["a\0.nc"])),
+        *(("export", value) for value in (["nowhere/a.nc"], ["a.xls"], ["folder.nc"], {"a.nc": 1, "b": 2})),
+        *(("out", value) for value in ("", "/", "x" * 5000, "x" * 201, "x/" * 1500, "a\0b", 3, b"x", ["a"])),
+        *(("stage", value) for value in ("", "x" * 5000, "a\0b", 3, None)),
+    ],
+    ids=lambda value: repr(value)[:20] if not isinstance(value, int) else "number",
+)
+def test_a_sweep_refuses_arguments_of_other_types_and_writes_nothing(
+    name: str, value: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder.nc").mkdir()
+    stage = friso.load(EXAMPLES / "thesis_rig.toml")
+    with pytest.raises(InputError) as refusal:
+        friso.sweep(**{"stage": stage, "axes": RANGES, "samples": 8, name: value})
+    assert max(map(len, str(refusal.value).splitlines())) < 200
+    assert refusal.value.expected
+    assert [*tmp_path.rglob("*")] == [tmp_path / "folder.nc"]
+
+
+@pytest.mark.parametrize("path", ["", "x" * 201, "x" * 5000, "x/" * 1500])
+@pytest.mark.parametrize("option", ["--out", "--out=", "--export"])
+def test_a_map_refuses_paths_that_are_none_and_writes_nothing(option: str, path: str, tmp_path: Path) -> None:
+    words = [option + path] if option.endswith("=") else [option, f"{path}.nc" if path and "port" in option else path]
+    done = friso_inside(tmp_path, "map", EXAMPLES / "thesis_rig.toml", "--x", "joint.stroke=0.1 mm..1 mm:3", *words)
+    assert done.returncode == 2
+    assert "expected:" in done.stderr
+    assert option.rstrip("=") in done.stderr
+    assert [*tmp_path.iterdir()] == []
+
+
 @posix
 def test_the_name_of_a_parameter_file_writes_no_table(tmp_path: Path) -> None:
     source = tmp_path / "a\n[evil]\nx = 1\x1b.ini"

@@ -17,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.trust.arguments import ARGUMENTS
 from benchmarks.trust.commands import COMMANDS
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.readers import READERS
@@ -30,11 +31,11 @@ Case = Callable[[random.Random, Path], None]
 """One case, which raises what it finds wrong: with its random numbers, in a folder of its own."""
 
 
-NAMES = (*READERS, *WRITING, *COMMANDS)
+NAMES = (*READERS, *ARGUMENTS, *WRITING, *COMMANDS)
 """The campaigns."""
 
-HEAVY = {"binary-logs": 8, "stores": 16, "store-faults": 32, "store-exchanges": 32, "store-versions": 8,
-         **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
+HEAVY = {"binary-logs": 8, "arguments": 8, "options": 32, "stores": 16, "store-faults": 32, "store-exchanges": 32,
+         "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """By how much fewer the cases of a campaign are whose cases take long."""
 
 
@@ -61,7 +62,7 @@ def run_part(name: str, seed: int, numbers: range, end: float = float("inf")) ->
 @cache
 def case_of(name: str) -> Case:
     """The case of a campaign."""
-    return WRITING.get(name) or COMMANDS.get(name) or reading(name)
+    return WRITING.get(name) or ARGUMENTS.get(name) or COMMANDS.get(name) or reading(name)
 
 
 def failure(campaign: str, case: Case, seed: int, number: int) -> str | None:

@@ -18,36 +18,48 @@ from tempfile import mkdtemp
 
 import psutil
 
+from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC
 from friso.answers.drafts import DRAFTS
-from friso.answers.output_folder import MARKER, UNFINISHED, write
-
-EXAMPLES = Path(__file__).parents[2] / "examples"
-RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))
+from friso.answers.output_folder import MARKER, UNFINISHED, marked, write
 
 FRISO = [sys.executable, "-m", "friso.cli"]
-MAP = ["map", RIG, "--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24",
-       "--rtol", "1e-8", "--out", "a.zarr"]  # fmt: skip
+SMALL = ["--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24", "--rtol", "1e-8"]
+MAP = ["map", RIG, *SMALL, "--out", "a.zarr"]
+OUT = ["--out", "out"]
+
 QUICK: dict[str, list[str]] = {
-    "bode": ["bode", RIG, "--out", "out"],
-    "simulate": ["simulate", RIG, "--out", "out"],
-    "flexure": ["flexure", LEAVES, "--out", "out"],
+    "bode": ["bode", RIG, *OUT],
+    "simulate": ["simulate", RIG, *OUT],
+    "flexure": ["flexure", LEAVES, *OUT],
+    "convert": ["convert", RIG, "--friction", "gms", *OUT],
+    "export": ["export", "gains", RIG, "--to", "linuxcnc", "--set", "machine_unit=mm", "--set", "force_per_output=20 N",
+               *OUT],
+    "logs": ["logs", "log.csv", *OUT],
     "init": ["init", "stage.toml"],
+    "specification": ["init", "stage.toml", "--spec", RIG],
+    "parameters": ["init", "stage.toml", "--from", AXIS, *(f"--set={answer}" for answer in ANSWERS)],
+    "example": ["example", "thesis_rig", "stage.toml"],
     "map": MAP,
-}
-"""Commands that write, by name, which end within seconds."""
+    "exports": [*MAP, "--export", "a.csv", "--export", "a.nc"],
+}  # fmt: skip
+"""Commands that write, by a name of the case, which end within seconds."""
 
 WRITING: dict[str, list[str]] = {
     **QUICK,
-    "check": ["check", RIG, "--out", "out"],
-    "boundary": ["boundary", RIG, "--x", "controller.crossover=4 Hz..8 Hz", "--out", "out"],
-    "design": ["design", RIG, str(EXAMPLES / "specs" / "thesis.toml"), "--out", "out"],
-    "identify": ["identify", "log.csv", "--out", "out"],
-    "rig": ["rig", "stiffness", DRIVE, "--out", "out"],
-    "compare": ["compare", DRIVE, "--machines", "20", "--out", "out"],
-    "reproduce": ["reproduce", "--points", "3", "--out", "out"],
-    "guideline": ["guideline", "--samples", "64", "--out", "out"],
+    "check": ["check", RIG, *OUT],
+    "boundary": ["boundary", RIG, "--x", "controller.crossover=4 Hz..8 Hz", *OUT],
+    "design": ["design", RIG, SPEC, *OUT],
+    "identify": ["identify", "log.csv", "--map", "position=position", *OUT],
+    "rig": ["rig", "stiffness", DRIVE, *OUT],
+    "compare": ["compare", DRIVE, "--machines", "20", *OUT],
+    "tune": ["tune", RIG, "--only", "controller", *OUT],
+    "reproduce": ["reproduce", "--points", "3", *OUT],
+    "guideline": ["guideline", "--samples", "64", *OUT],
 }
 """All commands that write."""
+
+ONE_FILE = {name for name, line in WRITING.items() if line[0] in ("init", "example")}
+"""Those that write one file and no folder."""
 
 LONGEST = 8.0
 """How long [s] after its start a command is killed or interrupted, at most."""
@@ -59,7 +71,7 @@ PATIENCE = 120
 def killed(rng: random.Random, folder: Path) -> None:
     """A command killed up to three times: no file is there in part, and what is left goes with the next that writes
     there; one that ends quickly, run again, leaves what it does undisturbed: the same bytes, and nothing else."""
-    name = rng.choice([*WRITING, "map", "map", "map"])
+    name = rng.choice([*WRITING, "map", "exports"])
     _prepare(name, folder)
     for _ in range(rng.randrange(1, 4)):
         with _started(folder, WRITING[name]) as process:
@@ -67,7 +79,7 @@ def killed(rng: random.Random, folder: Path) -> None:
             process.kill()
     if name in QUICK:
         done = _finished(folder, WRITING[name])
-        assert done.returncode in (0, 2 if name == "init" else 0), f"{name}: {done.stderr[-300:]}"
+        assert done.returncode in (0, 2 if name in ONE_FILE else 0), f"{name}: {done.stderr[-300:]}"
         _assert_as(_undisturbed(name), folder, name)
     else:
         write({folder / "out" / "next.txt": "", folder / "next.txt": ""})
@@ -78,7 +90,7 @@ def interrupted(rng: random.Random, folder: Path) -> None:
     """Ctrl-C or a termination: the status that shells know and one line (or two, where a study can be resumed), and the
     files whole or not at all."""
     name = rng.choice([*WRITING])
-    number = rng.choice([signal.SIGINT, signal.SIGTERM])
+    number = rng.choice([signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
     _prepare(name, folder)
     with _started(folder, WRITING[name]) as process:
         while process.poll() is None and not _takes_signals(process.pid):
@@ -89,6 +101,8 @@ def interrupted(rng: random.Random, folder: Path) -> None:
     assert process.returncode in (0, 128 + number), f"{name}: status {process.returncode}: {err[-300:]}"
     assert "Traceback" not in err, f"{name}: {err[-300:]}"
     assert "Warning" not in err, f"{name}: {err[-300:]}"
+    words = "interrupted" if number == signal.SIGINT else "terminated"
+    assert process.returncode == 0 or err.rstrip().endswith(f"friso: {words}"), f"{name}: {err[-300:]}"
     _whole_or_nothing(name, folder, process.returncode == 0)
 
 
@@ -96,6 +110,7 @@ def short_of_disk(rng: random.Random, folder: Path) -> None:
     """No file may become larger than some size: one message, status 1, and the files whole or not at all."""
     name = rng.choice([*QUICK])
     most = int(10 ** rng.uniform(1, 6.5))
+    _prepare(name, folder)
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
@@ -114,11 +129,37 @@ def small_disk(rng: random.Random, folder: Path) -> None:
     if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
         return
     try:
+        _prepare(name, disk)
         done = _finished(disk, WRITING[name])
         _assert_told(f"{name} on {size} kB", done)
         _whole_or_nothing(name, disk, done.returncode == 0)
     finally:
         subprocess.run(["umount", str(disk)], check=True)
+
+
+def read_only(rng: random.Random, folder: Path) -> None:
+    """A folder that may not be written into: status 2 before anything is computed, and nothing is written."""
+    name, below = rng.choice([*WRITING]), rng.random() < 0.5
+    closed = folder / "closed"
+    closed.mkdir()
+    _prepare(name, closed)
+    line = [word.replace("out", "there/out") if below and word == "out" else word for word in WRITING[name]]
+    before = _tree(closed)
+    closed.chmod(0o555)
+    try:
+        done = subprocess.run([*_without_root_s_rights(), *FRISO, *line], cwd=closed, capture_output=True, text=True)
+    finally:
+        closed.chmod(0o755)
+    assert done.returncode == 2, f"{name}: status {done.returncode}: {done.stderr[-300:]}"
+    assert "expected:" in done.stderr, f"{name}: {done.stderr[-300:]}"
+    assert "Traceback" not in done.stderr, f"{name}: {done.stderr[-600:]}"
+    assert _tree(closed) == before, f"{name}: wrote {sorted(_tree(closed).keys() - before.keys())}"
+
+
+def _without_root_s_rights() -> list[str]:
+    """What to put before a command so that permissions hold for it: root may write everywhere else."""
+    rights = "-dac_override,-dac_read_search,-fowner"
+    return ["setpriv", f"--bounding-set={rights}", f"--inh-caps={rights}"] if os.geteuid() == 0 else []
 
 
 def two_at_once(rng: random.Random, folder: Path) -> None:
@@ -181,6 +222,7 @@ COMMANDS: dict[str, Callable[[random.Random, Path], None]] = {
     "interrupted": interrupted,
     "short-of-disk": short_of_disk,
     "small-disk": small_disk,
+    "read-only": read_only,
     "two-at-once": two_at_once,
     "without-workers": without_workers,
     "without-scheduler": without_scheduler,
@@ -217,7 +259,7 @@ def _moment(rng: random.Random, folder: Path, process: subprocess.Popen[str]) ->
 
 def _prepare(name: str, folder: Path) -> None:
     """Put what a command reads into its folder."""
-    if name == "identify":
+    if "log.csv" in WRITING[name]:
         shutil.copyfile(_undisturbed("simulate") / "out" / "log.csv", folder / "log.csv")
 
 
@@ -225,6 +267,7 @@ def _prepare(name: str, folder: Path) -> None:
 def _undisturbed(name: str) -> Path:
     """A folder with what a command writes that nothing happened to."""
     folder = Path(mkdtemp(prefix="friso-trust-"))
+    _prepare(name, folder)
     done = _finished(folder, WRITING[name])
     assert done.returncode == 0, done.stderr
     if name == "simulate":
@@ -274,12 +317,19 @@ def _whole_or_nothing(name: str, folder: Path, done: bool) -> None:
     work is kept in a folder of its own."""
     left = [path.name for path in folder.rglob("*") if path.name.startswith(DRAFTS)]
     assert not left, f"{name} left {left}"
-    if name == "map":
-        views = sorted(path.suffix for path in folder.iterdir() if path.is_file() and path.name != "next.txt")
-        assert len(views) in (0, 4), f"map wrote {views} alone"
-    elif name != "init":
+    if WRITING[name][0] == "map":
+        every = 6 if name == "exports" else 4
+        views = sorted(path.name for path in folder.iterdir() if path.is_file() and path.name != "next.txt")
+        assert len(views) in (0, every), f"{name} wrote {views} alone"
+    elif name in ONE_FILE:
+        file, whole = folder / "stage.toml", _undisturbed(name) / "stage.toml"
+        assert not (done and not file.exists()), f"{name} is done without its file"
+        assert not file.exists() or file.read_bytes() == whole.read_bytes(), f"{name} wrote a part"
+    else:
         out = folder / "out"
         written = [path for path in out.rglob("*") if path.is_file() and path.name != "next.txt"]
         written = [path for path in written if UNFINISHED not in path.parts]
         assert (out / MARKER).exists() or not written, f"{name} wrote {written} alone"
         assert (out / MARKER).exists() or not done, f"{name} is done without its files"
+        named = [] if not (out / MARKER).exists() else [out / file for file in marked(out)[1]]
+        assert all(file.is_file() for file in named), f"{name} lacks some of {named}"

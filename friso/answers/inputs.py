@@ -145,6 +145,10 @@ def choice(value: str, name: str, choices: Sequence[str], example: str) -> str:
 def pairs_of(values: Changes, name: str, example: str) -> dict[str, str]:
     """Keys to texts from a dictionary, or from texts KEY=VALUE. Raises InputError."""
     if isinstance(values, Mapping):
+        for key, value in values.items():
+            if not isinstance(value, str):
+                of_key, _, text = example.partition("=")
+                raise wrong(name, f"{quoted(value)} for {quoted(key)}", "a text", f'{{"{of_key}": {text}}}')
         return dict(values)
     pairs: dict[str, str] = {}
     for text in values or ():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.answers.inputs import Changes, axes_of, pairs_of
-from friso.answers.output_folder import check_file, check_store_folder, refuse_device
+from friso.answers.inputs import Changes, axes_of, pairs_of, wrong
+from friso.answers.output_folder import check_file, check_store_folder, refuse_place
 from friso.errors import InputError, StoreError
 from friso.quantities import quoted
 from friso.stage import Stage
@@ -157,6 +158,17 @@ def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content
     return {_path_beside(store, form): content for form, content in files.items()}
 
 
+def place_of_store(folder: str | os.PathLike[str]) -> Path:
+    """The folder of a store, by a name of its own also where it is "." or "..". Raises InputError where it can have
+    none."""
+    path = Path(folder)
+    path = path if path.name not in ("", "..") else Path(os.path.abspath(path))
+    if not path.name:
+        raise wrong("out", str(path), "the folder of a store, with a name", "map.zarr")
+    refuse_place("out", path)
+    return path
+
+
 def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
     """The study as NetCDF or CSV, by the suffix."""
     from friso.studies.export import export
@@ -165,9 +177,9 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 
 
 def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> None:
-    """Refuse to write over files that are no earlier result of this study, or to Windows' devices. Raises
-    InputError."""
-    refuse_device("--out", store)
+    """Refuse to write over files that are no earlier result of this study. Raises InputError."""
+    if store in exports:
+        raise wrong("export", f"{store}, which is the store", "another name", "map.nc")
     check_store_folder(store)
     claimed = _claimed(store)
     for name in own_views(store):

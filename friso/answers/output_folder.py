@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from friso import paths
 from friso.answers.drafts import DRAFTS, Drafts, made
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -42,7 +43,7 @@ class OutputFolder:
     def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
         """Raises InputError where the command must not write there, or cannot."""
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
-        refuse_device("--out", folder)
+        refuse_place("--out", folder)
         _check_writable(folder)
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
@@ -89,11 +90,15 @@ class OutputFolder:
         return marker(self.command, names)
 
 
-def refuse_device(option: str, path: Path) -> None:
-    """Raises InputError where Windows takes a part of a path for a device: nothing would be there afterwards."""
+def refuse_place(option: str, path: Path) -> None:
+    """Raises InputError where nothing can be written to a path, whatever is there: it has no name, one that is too
+    long, or one that Windows takes for a device."""
+    example = f"{option} report" if option.startswith("--") else ""
+    if flaw := paths.flaw_of(path, paths.LONGEST_WRITTEN):
+        raise InputError(option, flaw, f"names of at most {paths.LONGEST_WRITTEN} bytes", example)
     if device := device_in(path):
         expected = f"another name: for Windows, {device} is a device whatever folder and suffix it has"
-        raise InputError(option, str(path), expected, f"{option} report" if option.startswith("--") else "")
+        raise InputError(option, str(path), expected, example)
 
 
 def check_store_folder(folder: Path) -> None:
@@ -109,7 +114,7 @@ def check_file(
 ) -> None:
     """Raises InputError where a file that the user names must not be written: it is among the `inputs`, which are read,
     or there already, unless it `is_own` or may be overwritten."""
-    refuse_device(option, path)
+    refuse_place(option, path)
     example = f"{path.stem}-2{path.suffix}"
     example = f"{option} {example}" if option.startswith("--") else example
     if any(file and file.exists() and path.exists() and path.samefile(file) for file in inputs):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,11 +17,13 @@ from friso.answers.map_study import (
     coloured_by,
     export_files,
     own_views,
+    place_of_store,
     refuse_overwriting,
     stored_study,
     study_for,
     view_files,
 )
+from friso.answers.output_folder import check_file, refuse_place, write
 from friso.axis import speak_of
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -41,6 +43,9 @@ if TYPE_CHECKING:
 
     from friso.views.drawing.figure import Figure
     from friso.views.files import Content, Files
+
+Keeper = Callable[[Mapping[Path, "Content"]], object]
+"""What is done with files by their paths."""
 
 LARGE = 10_000_000
 """Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
@@ -135,6 +140,7 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     yes: bool = False,
+    keep: Keeper = write,
     progress: Progress = silent,
 ) -> SweepAnswer:
     """Run every combination of the values of some keys: what `friso map` does.
@@ -180,6 +186,8 @@ def sweep(
         Whether the store of another study may be replaced, and figures and exports.
     yes : bool
         Whether a study of more than ten million cells is meant.
+    keep : callable, optional
+        Called with the exports by path; default: they are written, all of them or none.
     progress : Progress
         Called as cells are done.
 
@@ -203,12 +211,12 @@ def sweep(
     """
     exports, share = _checked_exports(export), checked_share(verify)
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
-    store = None if out is None else Path(out)
+    store = None if out is None else place_of_store(out)
     with _crew(workers, scheduler) as crew:
         if isinstance(stage, str | os.PathLike) and Path(stage).is_dir():
             if varied != Varied() or set or rtol or refine or out:
                 raise _another_study(Path(stage))
-            store = Path(stage)
+            store = place_of_store(stage)
             study, metric = stored_study(store, metric)
         else:
             metric = metric or "outcome"
@@ -218,11 +226,14 @@ def sweep(
             study = study if store is None else as_stored(study, store, metric, overwrite)
         speak_of(study.stage.axis_kind)
         if store is None:
+            for path in exports:
+                check_file("export", path, overwrite)
             runs = run_in_memory([study], crew, share, progress)[0]
         else:
             refuse_overwriting(store, exports, overwrite)
             runs = _filled(study, store, crew, share, overwrite, metric, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
+    keep(export_files(held, exports))
     return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
 
 
@@ -304,10 +315,11 @@ def _filled(
 
 
 def _checked_exports(export: Iterable[str | os.PathLike[str]]) -> list[Path]:
-    paths = [Path(path) for path in export]
-    for path in paths:
-        if path.suffix not in (".nc", ".csv"):
+    files = [Path(path) for path in export]
+    for path in files:
+        refuse_place("export", path)
+        if path.suffix not in (".nc", ".csv") or path.is_dir():
             raise wrong("export", str(path), "a file that ends in .nc or .csv", "map.nc")
-        if not path.parent.is_dir():
-            raise wrong("export", str(path), "a file in an existing folder", "map.nc")
-    return paths
+        if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
+            raise wrong("export", str(path), "a file in an existing folder that can be written", "map.nc")
+    return files

@@ -15,10 +15,11 @@ import typer
 from typer.core import TyperGroup
 
 from friso import interrupts
+from friso.cli.arguments import refuse_empty, with_checked_paths
 from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import escaping
-from friso.errors import InputError
+from friso.errors import InputError, shortened
 from friso.version import VERSION
 
 
@@ -74,7 +75,7 @@ def command_line() -> typer.Typer:
     )
     app.callback()(friso)
     for name, command in sorted(((name, COMMANDS[name]) for name in COMMANDS), key=lambda item: item[1].place):
-        app.command(name, cls=command.help_class)(command.function)
+        app.command(name, cls=command.help_class)(with_checked_paths(command.function))
     return app
 
 
@@ -116,6 +117,7 @@ def _run() -> int:
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
     try:
+        refuse_empty(sys.argv[1:])
         app = command_line()
         if {"-h", "--help"} & {*sys.argv[1:2]}:
             app.info.epilog = _plug_ins()
@@ -137,7 +139,7 @@ def _failed(error: BaseException) -> int:
     usage = getattr(error, "format_message", None)
     if usage is not None:
         context = getattr(error, "ctx", None)
-        say(f"{usage()}\n  try: {context.command_path if context else 'friso'} --help")
+        say(f"{shortened(usage())}\n  try: {context.command_path if context else 'friso'} --help")
         return 2
     if isinstance(error, RuntimeError | OSError | MemoryError):
         say(f"the computation could not be completed: {error}")

@@ -38,7 +38,7 @@ def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None)
     as the stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage
     as TOML text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration;
     samples are taken from the method's dense output. Units are those of the stage's kind of axis. A run that fails has
-    NaN from there on, and the reason in `status`. Raises InputError for a sample time and ValueError for a tolerance
+    NaN from there on, and the reason in `status`. Raises InputError for a sample time and a tolerance
     that is not usable.
     """
     flat = stage.flat()

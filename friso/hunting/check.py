@@ -95,7 +95,7 @@ LONG = 1e-6
 def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
-    With `traces`, each case has its time response; `progress` is called as work is done. Raises ValueError for an
+    With `traces`, each case has its time response; `progress` is called as work is done. Raises InputError for an
     `rtol` that is not usable.
     """
     checked_rtol(rtol)
@@ -123,7 +123,7 @@ def _is_free(stage: Stage) -> bool:
 
 
 def check_given(stage: Stage, rtol: float = RTOL) -> Case:
-    """The case "given" alone. Raises ValueError for an `rtol` that is not usable."""
+    """The case "given" alone. Raises InputError for an `rtol` that is not usable."""
     checked_rtol(rtol)
     kernels(_needed(stage))
     return _case(stage, rtol, False, Tally(silent, len(PARTS)), WORK)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Mapping, Sequence, Set
+from dataclasses import dataclass
 from functools import wraps
 from inspect import signature
 from numbers import Integral, Real
@@ -13,6 +13,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from friso import paths
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage.stage import Stage
@@ -37,6 +38,10 @@ def _is_list(value: Any, of: Callable[[Any], bool]) -> bool:
     return isinstance(value, Sequence | Set) and not isinstance(value, str | bytes) and all(map(of, value))
 
 
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool)
+
+
 def _is_number(value: Any) -> bool:
     """Whether a value is one number that a float can be."""
     if not isinstance(value, Real) or isinstance(value, bool):
@@ -59,66 +64,124 @@ def _are_numbers(value: Any) -> bool:
 MOST_INT = 10**18
 """Whole numbers are smaller, whatever they count."""
 
-_ALTERNATIVES = re.compile(r" \| (?![^\[]*\])")
 
-_KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
-    "None": (lambda value: value is None, "None"),
-    "str": (_is_text, "a text"),
-    "int": (
-        lambda value: isinstance(value, Integral) and not isinstance(value, bool) and abs(int(value)) < MOST_INT,
+@dataclass(frozen=True)
+class ArgumentKind:
+    """What an annotation stands for: a test, what passes it in words, and an example of that."""
+
+    holds: Callable[[Any], bool]
+    words: str
+    example: str = ""
+
+
+_PATHS = ArgumentKind(lambda value: _is_list(value, _is_path), "a list of paths", '["map.nc"]')
+_TEXTS = ArgumentKind(lambda value: _is_list(value, _is_text), "a list of texts")
+_FUNCTION = ArgumentKind(callable, "a function")
+
+_KINDS: dict[str, ArgumentKind] = {
+    "None": ArgumentKind(lambda value: value is None, ""),
+    "str": ArgumentKind(_is_text, "a text"),
+    "int": ArgumentKind(
+        lambda value: _is_whole(value) and abs(int(value)) < MOST_INT,
         "a whole number",
+        "64",
     ),
-    "float": (_is_number, "a number"),
-    "bool": (lambda value: isinstance(value, bool | np.bool_), "True or False"),
-    "os.PathLike[str]": (_is_path, "a path"),
-    "Path": (lambda value: isinstance(value, Path), "a path"),
-    "Stage": (lambda value: isinstance(value, Stage), "a stage, such as friso.load(path)"),
-    "StageLike": (
+    "float": ArgumentKind(_is_number, "a number"),
+    "bool": ArgumentKind(lambda value: isinstance(value, bool | np.bool_), "True or False", "True"),
+    "os.PathLike[str]": ArgumentKind(_is_path, "a path", '"report"'),
+    "Path": ArgumentKind(lambda value: isinstance(value, Path), "a path", 'Path("report")'),
+    "Stage": ArgumentKind(
+        lambda value: isinstance(value, Stage), "a stage, such as friso.load(path)", 'friso.load("rig.toml")'
+    ),
+    "StageLike": ArgumentKind(
         lambda value: isinstance(value, Stage) or _has_text_keys(value) or _is_path(value),
         "a stage, the path of a stage file, or its tables as a dictionary",
+        '"rig.toml"',
     ),
-    "Changes": (
+    "Changes": ArgumentKind(
         lambda value: value is None or _has_text_keys(value) or _is_list(value, _is_text),
         "a dictionary of keys, or a list of texts KEY=VALUE",
+        '{"masses.stage": "0.6 kg"}',
     ),
-    "Spec": (lambda value: type(value).__name__ == "Spec", "a specification"),
-    "tuple[float, float]": (
+    "Spec": ArgumentKind(lambda value: type(value).__name__ == "Spec", "a specification"),
+    "Samples": ArgumentKind(lambda value: type(value).__name__ == "Samples", "friso.Samples"),
+    "Members": ArgumentKind(lambda value: type(value).__name__ == "Members", "friso.Members"),
+    "Margin": ArgumentKind(lambda value: type(value).__name__ == "Margin", "the edge of hunting of a stage"),
+    "Changeable": ArgumentKind(_is_text, "a text"),
+    "tuple[float, float]": ArgumentKind(
         lambda value: _is_list(value, lambda end: _is_number(end) or _is_text(end)) and len(value) == 2,
         "both ends of a range",
     ),
-    "Sequence[int | str]": (
-        lambda value: _is_list(value, lambda item: _is_path(item) or isinstance(item, Integral)),
+    "Sequence[int | str]": ArgumentKind(
+        lambda value: _is_list(value, lambda item: _is_path(item) or _is_whole(item)),
         "the numbers of a cell",
     ),
-    "Iterable[str | os.PathLike[str]]": (lambda value: _is_list(value, _is_path), "a list of paths"),
-    "Mapping[str, str]": (_has_text_keys, "a dictionary of keys to ranges"),
-    "Mapping[str, Values]": (_has_text_keys, "a dictionary of keys to ranges or values"),
-    "LogFiles": (lambda value: _is_path(value) or _is_list(value, _is_path), "the path of a file, or a list of paths"),
-    "Iterable[str]": (lambda value: _is_list(value, _is_text), "a list of texts"),
-    "Sequence[str]": (lambda value: _is_list(value, _is_text), "a list of texts"),
-    "Sequence[float]": (_are_numbers, "numbers"),
-    "np.ndarray": (_are_numbers, "numbers"),
+    "Sequence[int]": ArgumentKind(lambda value: _is_list(value, _is_whole), "whole numbers"),
+    "Iterable[str | os.PathLike[str]]": _PATHS,
+    "Mapping[str, str]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges"),
+    "Mapping[str, Values]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges or values"),
+    "Sequence[Mapping[str, Any]]": ArgumentKind(
+        lambda value: _is_list(value, _has_text_keys), "a list of dictionaries"
+    ),
+    "LogFiles": ArgumentKind(
+        lambda value: _is_path(value) or _is_list(value, _is_path),
+        "the path of a file, or a list of paths",
+        '"log.csv"',
+    ),
+    "Iterable[str]": _TEXTS,
+    "Sequence[str]": _TEXTS,
+    "Sequence[float]": ArgumentKind(_are_numbers, "numbers"),
+    "np.ndarray": ArgumentKind(_are_numbers, "numbers"),
+    "Progress": _FUNCTION,
+    "Keeper": _FUNCTION,
 }
-"""What an annotation stands for: a test, and words. Arguments with another annotation are checked where they are
-used."""
+"""The kinds of arguments, by the annotations of public functions."""
+
+_PATH_KINDS = {"os.PathLike[str]", "Path", "StageLike", "LogFiles", "Iterable[str | os.PathLike[str]]"}
+
+
+def _alternatives(annotation: str) -> list[str]:
+    """The parts of an annotation at its outer bars: "int | None" has two, "Iterable[str | None]" one."""
+    parts, depth = [""], 0
+    for sign in annotation:
+        depth += (sign == "[") - (sign == "]")
+        if sign == "|" and depth == 0:
+            parts.append("")
+        else:
+            parts[-1] += sign
+    return [part.strip() for part in parts]
 
 
 def check_arguments(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
-    """A function that raises InputError for an argument of another type than is annotated."""
+    """A function that raises InputError for an argument of another type than is annotated, and for a path that is none.
+    Raises KeyError for an annotation that is no kind of argument."""
     parameters = signature(function)
-    annotated = {
-        name: _ALTERNATIVES.split(str(parameter.annotation)) for name, parameter in parameters.parameters.items()
+    kinds = {
+        name: {part: _KINDS[part] for part in _alternatives(str(parameter.annotation))}
+        for name, parameter in parameters.parameters.items()
+        if parameter.kind is not parameter.VAR_KEYWORD
     }
-    kinds = {name: parts for name, parts in annotated.items() if _KINDS.keys() >= set(parts)}
 
     @wraps(function)
     def call(*arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
         for name, value in parameters.bind(*arguments, **options).arguments.items():
-            expected = [_KINDS[part] for part in kinds.get(name, ())]
-            if expected and not any(holds(value) for holds, _ in expected):
-                words = [words for _, words in expected if words != "None"]
-                meant = 'set={"masses.stage": "0.6 kg"}' if "set" in kinds and isinstance(value, Mapping) else ""
-                raise InputError(name, quoted(value), " or ".join(dict.fromkeys(words)), meant)
+            _check(name, value, kinds.get(name, {}), "set" in kinds)
         return function(*arguments, **options)
 
     return call
+
+
+def _check(name: str, value: Any, kinds: Mapping[str, ArgumentKind], sets: bool) -> None:
+    """Raises InputError for an argument that is of none of the kinds, and for a path that is none; `sets`: keys can be
+    set, for which a dictionary in another place was meant."""
+    if kinds and not any(kind.holds(value) for kind in kinds.values()):
+        words = " or ".join(dict.fromkeys(kind.words for kind in kinds.values() if kind.words))
+        key = "set" if sets and isinstance(value, Mapping) else name
+        named = [_KINDS["Changes"]] if key == "set" else kinds.values()
+        example = next((kind.example for kind in named if kind.example), "")
+        raise InputError(name, quoted(value), words, f"{key}={example}" if example else "")
+    if _PATH_KINDS & {*kinds}:
+        for path in value if _is_list(value, _is_path) else [value]:
+            if _is_path(path) and (flaw := paths.flaw_of(path)):
+                example = next(kind.example for part, kind in kinds.items() if part in _PATH_KINDS)
+                raise InputError(name, flaw, paths.EXPECTED, f"{name}={example}")

@@ -1,5 +1,7 @@
 """Stage files: reading, writing, and the KEY=VALUE of the command line."""
 
+from __future__ import annotations
+
 import os
 import re
 import tomllib
@@ -7,10 +9,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from friso import paths
 from friso.bounded_file import LargeFileError, content_of
 from friso.errors import InputError, StageError
 from friso.escapes import one_line
 from friso.quantities import quoted
+from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage, changed
 from friso.whole_file import whole_file
 
@@ -31,6 +35,7 @@ _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 
+@check_arguments
 def load(path: str | os.PathLike[str]) -> Stage:
     """The stage of the TOML file at `path`. Raises StageError.
 
@@ -57,6 +62,7 @@ def load_changed(path: Path, changes: Mapping[str, Any]) -> Stage:
         raise StageError.of(error).found_in(str(path)) from None
 
 
+@check_arguments
 def loads(text: str, origin: str = "stage file") -> Stage:
     """The stage of a TOML text; `origin` names it in errors. Raises StageError.
 
@@ -82,6 +88,7 @@ def _refuse_specification(tables: Mapping[str, Any]) -> None:
         raise StageError("", "a specification of a design", _EXPECTED, "friso design STAGE.toml SPECIFICATION.toml")
 
 
+@check_arguments
 def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) -> None:
     """Write a stage file to `path`, all of it or nothing.
 
@@ -94,6 +101,8 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     >>> friso.save(stage, "heavier.toml")  # doctest: +SKIP
     """
     place = Path(path)
+    if flaw := paths.flaw_of(place, paths.LONGEST_WRITTEN):
+        raise InputError("path", flaw, f"names of at most {paths.LONGEST_WRITTEN} bytes", 'path="stage.toml"')
     if os.path.lexists(place) and not (overwrite and place.is_file()):
         raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))
     try:

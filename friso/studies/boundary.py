@@ -36,7 +36,7 @@ def boundary(
     or with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
     `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
     `Plane`: the curves on which they do. The motion of the stage file plays no part. Raises InputError for a wrong
-    range, link or stage (one that cannot hunt), ValueError for an `rtol` that is not usable.
+    range, link, tolerance or stage (one that cannot hunt).
     """
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())

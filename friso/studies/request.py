@@ -52,7 +52,7 @@ class Request:
         return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), USUAL, 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
-        """The study. Raises InputError, and ValueError for a tolerance that is not usable."""
+        """The study. Raises InputError."""
         checked_rtol(rtol)
         read = self._read(self.axes)
         if not read and self.samples is None:

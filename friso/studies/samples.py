@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from numbers import Integral
 
 import numpy as np
 
 from friso.errors import InputError
+from friso.quantities import quoted
 from friso.stage import Stage
-from friso.studies.axes import SweptAxis, SweptRange, Values, read_axes
+from friso.studies.axes import MOST_POINTS, SweptAxis, SweptRange, Values, read_axes
 
 SAMPLE = "sample"
 """Name of the dimension along which samples lie."""
@@ -27,6 +29,20 @@ class Samples:
     count: int | None = None
     method: str = "sobol"
     seed: int = field(default=0)
+
+    def __post_init__(self) -> None:
+        """Raises InputError for fields of other types."""
+        if not isinstance(self.ranges, Mapping):
+            raise InputError(
+                "ranges", quoted(self.ranges), "a dictionary of keys to ranges", 'ranges={"joint.stroke": "0 m..1 mm"}'
+            )
+        for name, number, least in (("samples", self.count, 2), ("seed", self.seed, 0)):
+            whole = isinstance(number, Integral) and not isinstance(number, bool) and least <= number <= MOST_POINTS
+            if not (whole or (number is None and name == "samples")):
+                expected = f"a whole number from {least} to {MOST_POINTS:,}"
+                raise InputError(name, quoted(number), expected, f"{name}=1024")
+        if self.method not in METHODS:
+            raise InputError("method", quoted(self.method), f"one of {', '.join(METHODS)}", 'method="sobol"')
 
 
 def sample_axes(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
@@ -56,12 +72,10 @@ def _points(dimensions: int, samples: Samples) -> np.ndarray:
     """Points of the unit cube, shape (count, dimensions)."""
     from scipy.stats import qmc
 
-    if samples.count is None or samples.count < 2:
-        raise InputError("samples", f"{samples.count} points", "2 points or more", "1024")
+    if samples.count is None:
+        raise InputError("samples", "no number of points", "2 points or more", "samples=1024")
     if samples.method == "sobol":
         sampler = qmc.Sobol(dimensions, rng=samples.seed)
         points = sampler.random_base2(int(np.ceil(np.log2(samples.count))))
         return points[: samples.count]
-    if samples.method == "latin":
-        return qmc.LatinHypercube(dimensions, rng=samples.seed).random(samples.count)
-    raise InputError("samples", samples.method, f"one of {', '.join(METHODS)}", "sobol")
+    return qmc.LatinHypercube(dimensions, rng=samples.seed).random(samples.count)

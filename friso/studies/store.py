@@ -20,6 +20,7 @@ import numpy as np
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
+from friso.stage.arguments import check_arguments
 from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
@@ -179,6 +180,7 @@ class Store:
         return read_store(self.path)
 
 
+@check_arguments
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
 

@@ -72,9 +72,17 @@ def map_cells(
     store = out if source.is_dir() else out or Path(f"{source.stem}_map.zarr")
     options = {"x": x, "y": y, "axis": axis or (), "link": link, "samples": samples, "latin": latin, "log": log}
     options |= {"set": overrides, "metric": metric, "rtol": rtol, "verify": verify, "refine": refine}
-    options |= {"workers": workers, "scheduler": scheduler, "export": export or (), "overwrite": overwrite, "yes": yes}
+    options |= {
+        "workers": workers,
+        "scheduler": scheduler,
+        "export": export or (),
+        "overwrite": overwrite,
+        "yes": yes,
+        "out": store,
+    }
     with ProgressBar() as progress, named_as_options(options):
-        answer = sweep(source, **options, out=store, progress=progress)
+        # The exports are written together with the figure and the page, all of them or none.
+        answer = sweep(source, **options, keep=lambda exports: None, progress=progress)
     speak_of(answer.axis_kind)
     show(answer, write(answer.files_beside(), progress), as_json)
 

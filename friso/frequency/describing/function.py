@@ -67,8 +67,8 @@ def describing(
     first harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled,
     which is so for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
 
-    Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
-    usable, ValueError for an `rtol` that is not. A pair that fails has NaN and a reason in `status`.
+    Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics, samples or an `rtol` that
+    are not usable. A pair that fails has NaN and a reason in `status`.
 
     Examples
     --------

@@ -44,7 +44,7 @@ def plant_response(
     to that before, NaN where none lasts; `answers`, their number; `status`, also of forces and frequencies that are
     beyond what can be computed. The answers to one force do not depend on what else is asked for.
 
-    Raises InputError for forces or frequencies that are not usable and for a stage without friction, ValueError for an
+    Raises InputError for forces or frequencies that are not usable and for a stage without friction, and for an
     `rtol` that is not usable.
 
     Examples

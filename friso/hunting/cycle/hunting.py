@@ -171,7 +171,7 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     """The hunting cycles of a stage, and whatever else attracts it.
 
     The motion of the stage file plays no part. The search for what attracts may use so much `work` (see
-    `friso.engine.allowance`); what it could not settle by then is not certain. Raises ValueError for a tolerance that
+    `friso.engine.allowance`); what it could not settle by then is not certain. Raises InputError for a tolerance that
     is not usable.
     """
     checked_rtol(rtol)

@@ -1,0 +1,216 @@
+"""Arguments of every public function and every command: of other types, empty, thousands of characters long, out of
+range. They are taken, or refused in one clear message with nothing written; what would be computed is not."""
+
+from __future__ import annotations
+
+import inspect
+import random
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from functools import cache
+from io import StringIO
+from pathlib import Path
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import typer
+
+import friso
+from benchmarks.trust.inputs import DRIVE, LEAVES, RIG, SPEC, ready
+from friso.cli import main
+from friso.cli.app import command_line
+from friso.engine.cache import CodeRequest
+from friso.errors import InputError
+from friso.views.drawing import matplotlib_renderer
+
+CALLS: dict[str, dict[str, Any]] = {
+    **{name: {"stage": RIG} for name in ("bode", "check", "simulate", "tune")},
+    "boundary": {"stage": RIG, "x": "controller.crossover=4 Hz..8 Hz"},
+    "compare": {"stage": DRIVE, "machines": 20},
+    "convert": {"stage": RIG, "friction": "gms"},
+    "describing": {"stage": RIG, "amplitudes": [1e-6, 1e-5], "frequencies": [5.0]},
+    "design": {"stage": RIG, "spec": SPEC},
+    "doctor": {},
+    "example": {"name": "thesis_rig"},
+    "export": {"what": "gains", "stage": RIG},
+    "flexure": {"stage": LEAVES},
+    "guideline": {"samples": 64},
+    "harmonic_balance": {"stage": RIG, "crossovers": [6.0]},
+    "identify": {"logs": "log.csv"},
+    "init": {"path": "new.toml"},
+    "linear": {"stage": RIG},
+    "load": {"path": RIG},
+    "loads": {"text": "", "origin": "file"},
+    "logs": {"logs": "log.csv"},
+    "mass_line": {"stage": RIG, "places": [{"friction.static": "2 N"}], "forces": [2.0], "frequencies": [5.0]},
+    "member": {},
+    "plant_response": {"stage": RIG, "forces": [2.0], "frequencies": [5.0]},
+    "read_store": {"path": "a.zarr"},
+    "reproduce": {},
+    "rig": {"experiment": "stiffness", "stage": DRIVE},
+    "save": {"stage": RIG, "path": "saved.toml"},
+    "schema": {},
+    "sensitivity": {"stage": RIG},
+    "sweep": {"stage": RIG, "x": "controller.crossover=2 Hz..16 Hz:3"},
+    "tuning": {"crossover": 8.0, "alpha": 0.1, "beta": 2.0, "mass": 1.7},
+}
+"""Sound arguments of every public function."""
+
+LINES: dict[str, list[str]] = {
+    **{name: [name, RIG] for name in ("bode", "check", "simulate", "tune")},
+    "app": ["app", RIG, "--no-browser"],
+    "boundary": ["boundary", RIG, "--x", "controller.crossover=4 Hz..8 Hz"],
+    "compare": ["compare", DRIVE, "--machines", "20"],
+    "convert": ["convert", RIG, "--friction", "gms"],
+    "design": ["design", RIG, SPEC],
+    "doctor": ["doctor"],
+    "example": ["example", "thesis_rig"],
+    "export": ["export", "gains", RIG],
+    "flexure": ["flexure", LEAVES],
+    "guideline": ["guideline"],
+    "identify": ["identify", "log.csv"],
+    "init": ["init", "new.toml"],
+    "logs": ["logs", "log.csv"],
+    "map": ["map", RIG, "--x", "controller.crossover=2 Hz..16 Hz:3"],
+    "reproduce": ["reproduce"],
+    "rig": ["rig", "stiffness", DRIVE],
+    "schema": ["schema"],
+}
+"""A sound line of every command."""
+
+_LONG = ("x" * 201, "x" * 256, "x" * 5000, "x/" * 700, "9" * 400, "9" * 5000, "a." * 10_000, "[" * 3000)
+TEXTS = (
+    *("", " ", ".", "..", "/", "-", "=", ":", "..:", "\n", "\t", "\x1b[31m", "\u202e", "\udc80", "\u0663", "a=b", "=b"),
+    *("nan", "inf", "-1", "0", "1e400", "1e-400", "1.5", "true", "none", "{}", "[]", '"', "'", "8 Hz", "1 s", "-1 s"),
+    *("1 Hz..", "..2 Hz", "2 Hz..1 Hz:5", "1 Hz..2 Hz:1", "1 Hz..2 Hz:1e9", "masses.stage", "masses.stage=", "name={"),
+    *("controller.crossover=1 Hz..1e400 Hz:3", "nothing.key=1 Hz..2 Hz:3", "position=", "position=nothing", "a=1=2"),
+    *("/dev/null", "/dev/full", "/dev/zero", "/proc/self/mem", "nowhere/a", "log.csv", "log.csv/a", "a.nc", "a.csv"),
+    *("folder", "folder.nc", "a.zarr", "tcp://", "tcp://127.0.0.1:1", "http://[", *_LONG),
+)
+"""Texts that a user, or a script, may give by mistake or on purpose."""
+
+VALUES: tuple[Any, ...] = (
+    *("a\0b", None, True, 0, -1, 1, 10**18, 10**400, 10**5000, 1.5, float("nan"), float("inf"), 1e300, 1e-300, 1j),
+    *(b"x", [], [None], [3], [""], ["x" * 300], ["a.nc"], {}, {"x": 1}, {3: 4}, {"masses.stage": None}, {"": ""}, ()),
+    *((1, 2), {1, 2}, object(), print, RuntimeError, Path(), Path("nowhere/a"), Path("x" * 300), np.zeros(0)),
+    *(np.zeros((2, 2)), np.array([1.0, np.nan]), np.array(["x"]), np.float64(3.0), np.int64(3), iter([1]), range(3)),
+)
+"""Values of other types, and at the ends of theirs."""
+
+
+class Computed(BaseException):
+    """What was asked for is begun to be computed: all arguments were taken."""
+
+
+def arguments(rng: random.Random, folder: Path) -> None:
+    """One argument of a public function replaced."""
+    name = rng.choice([*CALLS])
+    function = getattr(friso, name)
+    sound = {key: friso.load(value) if _wants_stage(name, key) else value for key, value in CALLS[name].items()}
+    names = [key for key in inspect.signature(function).parameters if key not in ("progress", "keep")]
+    if not names:
+        return
+    key, value = rng.choice(names), rng.choice((*VALUES, *TEXTS))
+    what = f"{name}({key}={_shown(value)})"
+    with ready(folder), _nothing_computed(), redirect_stdout(StringIO()):
+        before = _tree(folder)
+        try:
+            function(**{**sound, key: value})
+        except InputError as error:
+            _assert_clear(what, str(error))
+            assert _tree(folder) == before, f"{what}: wrote {_tree(folder) - before}"
+        except Computed:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{what}: {type(error).__name__}: {str(error)[:200]}") from error
+
+
+def options(rng: random.Random, folder: Path) -> None:
+    """One argument or option of a command replaced or added."""
+    name = rng.choice([*LINES])
+    line, text = [*LINES[name]], rng.choice(TEXTS).replace("\0", "")
+    valued = _valued_options()[name]
+    place = rng.randrange(len(line) + 2 * len(valued))
+    if 0 < place < len(line):
+        line[place] = text
+    elif valued:
+        line += [rng.choice(valued), text]
+    what = _shown(line)
+    with ready(folder), _nothing_computed():
+        before = _tree(folder)
+        try:
+            status, err = _run(["friso", *line])
+        except Computed:
+            return
+        except Exception as error:
+            raise AssertionError(f"{what}: {type(error).__name__}: {str(error)[:200]}") from error
+        assert status in (0, 1, 2), f"{what}: status {status}"
+        assert "could not be completed" not in err, f"{what}: {err[:300]}"
+        if status == 2:
+            _assert_clear(what, err)
+            assert _tree(folder) == before, f"{what}: refused, but wrote {_tree(folder) - before}"
+
+
+def _run(line: list[str]) -> tuple[int, str]:
+    """Status and errors of a command in this process."""
+    err = StringIO()
+    with mock.patch.object(sys, "argv", line), redirect_stdout(StringIO()), redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            return int(end.code or 0), err.getvalue()
+
+
+def _assert_clear(what: str, message: str) -> None:
+    """Raises AssertionError for a message that is none, or that is longer than anyone reads."""
+    assert message.strip(), f"{what}: a refusal without words"
+    longest = max(map(len, message.splitlines()))
+    assert longest < 2000, f"{what}: a line of {longest} characters"
+
+
+def _wants_stage(name: str, key: str) -> bool:
+    annotation = inspect.signature(getattr(friso, name)).parameters[key].annotation
+    return str(annotation) == "Stage"
+
+
+@cache
+def _valued_options() -> dict[str, list[str]]:
+    """The options of every command that take a value."""
+    commands = typer.main.get_command(command_line()).commands  # type: ignore[attr-defined]
+    return {
+        name: [param.opts[0] for param in command.params if param.opts[0].startswith("--") and not param.is_flag]
+        for name, command in commands.items()
+    }
+
+
+@contextmanager
+def _nothing_computed() -> Iterator[None]:
+    """Kernels are neither built nor loaded, and nothing is served: Computed is raised instead. Pictures are empty."""
+
+    def computed(*_: object, **__: object) -> None:
+        raise Computed
+
+    with (
+        mock.patch.object(CodeRequest, "entry", computed),
+        mock.patch("uvicorn.Server.run", computed),
+        mock.patch.object(matplotlib_renderer, "image", return_value=b""),
+    ):
+        yield
+
+
+def _shown(value: object) -> str:
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of thousands of digits
+        text = type(value).__name__
+    return text if len(text) < 100 else f"{text[:80]}... ({len(text)})"
+
+
+def _tree(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+ARGUMENTS = {"arguments": arguments, "options": options}
+"""The campaigns by name."""

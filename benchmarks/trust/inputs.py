@@ -1,0 +1,34 @@
+"""What commands and functions of the campaign read: examples of friso, and a folder with a log in it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))
+SPEC = str(EXAMPLES / "specs" / "thesis.toml")
+
+AXIS = str(EXAMPLES / "drives" / "linuxcnc_torque_axis.ini")
+ANSWERS = ("force_per_output=10 N", "masses.stage=3 kg", "friction.model=none", "motion.acceleration=1 m/s^2",
+           "motion.acceleration_time=30 ms")  # fmt: skip
+"""What the parameter file does not tell."""
+
+LOG = "time [s],position [m],force [N]\n" + "".join(f"{k / 1000},{(k % 50) * 1e-6},{k % 7}\n" for k in range(200))
+
+
+@contextmanager
+def ready(folder: Path) -> Iterator[None]:
+    """A folder with a log and folders in it, in which it is worked for so long."""
+    (folder / "log.csv").write_text(LOG)
+    for name in ("folder", "folder.nc"):
+        (folder / name).mkdir()
+        (folder / name / "of_others.txt").write_text("of others")
+    before = Path.cwd()
+    os.chdir(folder)
+    try:
+        yield
+    finally:
+        os.chdir(before)
