@@ -92,11 +92,13 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
     survey = survey or attractors(Ensemble.held(flat, 1), thorough=True)
     try:
-        grid = _Grid(flat, factors)
+        grid = _Grid(flat, factors, index if attracting else index // 2)
     except Exhausted:
         return NOT_SOUGHT
     grid.record(index, survey)
     edge = grid.last_edge(index, attracting)
+    grid.search_below()
+    edge = edge or grid.last_edge(index, attracting)
     lower = grid.lower_end(index) if attracting else None
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
@@ -109,17 +111,30 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
 
 
 class _Grid:
-    """Factors, ascending, at which it is known whether something attracts."""
+    """Factors, ascending, at which it is known whether something attracts, from the `lowest` that was searched on."""
 
-    def __init__(self, flat: Mapping[str, Any], factors: np.ndarray) -> None:
-        self.flat, self.factors = flat, factors
-        survey = Outward(flat, FARTHEST).surveyed(factors, cycles=False)
-        self.attracts, self.decided = survey.attracts, survey.decided
+    def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, first: int) -> None:
+        """Survey the stages at factors from the `first` on, by number. Raises Exhausted."""
+        self.flat, self.factors, self.lowest = flat, factors, first
+        self.attracts, self.decided = np.zeros(len(factors), bool), np.zeros(len(factors), bool)
         self.motions: list[list[Swinging]] = [[] for _ in factors]
-        for motion in survey.motions:
-            self.motions[motion.stage].append(motion)
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
+        self._survey(np.arange(first, len(factors)))
+
+    def search_below(self) -> None:
+        """Survey the stages at the other factors, whose motions are the slowest, as far as an allowance reaches."""
+        try:
+            self._survey(np.arange(self.lowest))
+        except Exhausted:
+            return
+        self.lowest = 0
+
+    def _survey(self, numbers: np.ndarray) -> None:
+        survey = Outward(self.flat, FARTHEST).surveyed(self.factors[numbers], cycles=False)
+        self.attracts[numbers], self.decided[numbers] = survey.attracts, survey.decided
+        for motion in survey.motions:
+            self.motions[numbers[motion.stage]].append(motion)
 
     def record(self, index: int, survey: Attractors) -> None:
         """Take over what a thorough survey of one of the stages shows."""
@@ -194,8 +209,8 @@ class _Grid:
     def lower_end(self, index: int) -> AttractionEnd | None:
         """The end below of what attracts at a number; None if it attracts as far as the search goes, or if it is not
         known that nothing does below."""
-        while self.attracts[index] and not self.attracts[:index].all():
-            first = int(np.flatnonzero(~self.attracts[:index])[-1]) + 1
+        while self.attracts[index] and not self.attracts[self.lowest : index].all():
+            first = self.lowest + int(np.flatnonzero(~self.attracts[self.lowest : index])[-1]) + 1
             end = self.end(first, -1)
             if end is None:
                 continue
@@ -213,7 +228,8 @@ class _Grid:
 
     def _window(self, first: int, last: int) -> BandwidthWindow:
         return BandwidthWindow(
-            self.end(first, -1) if first else None, self.end(last, 1) if last + 1 < len(self.factors) else None
+            self.end(first, -1) if first > self.lowest else None,
+            self.end(last, 1) if last + 1 < len(self.factors) else None,
         )
 
     def _spans(self) -> list[tuple[int, int]]:
