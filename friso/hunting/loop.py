@@ -31,7 +31,8 @@ LOWER = np.geomspace(1e-6, 1.0, 37)
 
 
 def stable_at_lower_gains(flat: Mapping[str, Any]) -> bool:
-    """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones.
+    """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones; False,
+    too, where the controller does not tell which keys its gain is.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup the largest motions go by
     the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
@@ -39,6 +40,8 @@ def stable_at_lower_gains(flat: Mapping[str, Any]) -> bool:
     """
     controller = controller_of(flat)
     gains = {controller.key(name): flat[controller.key(name)] * LOWER for name in controller.loop_gain}
+    if not gains:
+        return False
     stages = Ensemble.held({**flat, **gains}, len(LOWER), form=structure(dict(flat)))
     return not unstable_among(stages)["slides"].any()
 
