@@ -16,6 +16,7 @@ from browser import BROWSER, needs_browser
 from log_files import motion, write_text
 
 import friso
+from friso.escapes import escaped
 
 pytestmark = needs_browser
 
@@ -206,6 +207,20 @@ def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> N
     page.set_input_files("#log-files", log)
     page.wait_for_selector("#role-position", timeout=60_000)
     assert "log.csv" in page.inner_text("#picture")
+
+
+def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -> None:
+    """Control characters and overrides of the reading direction are written out, as friso writes them out elsewhere."""
+    every = "".join(map(chr, [*range(0xD800), *range(0xE000, 0x10000), *range(0xE0000, 0xE0080), 0x1F600]))
+    script = "async (text) => (await import('/dom.js')).plain(text)"
+    assert browsed.page.evaluate(script, every) == escaped(every)
+    page, moved = browsed.page, motion()
+    columns = [np.asarray(moved[n]) for n in ("time", "position", "force")]
+    log = write_text(tmp_path / "steering.csv", ["time [s]", "\u202eposition\x1b[31m [m]", "force [N]"], columns)
+    page.click("#tab-logs")
+    page.set_input_files("#log-files", log)
+    page.wait_for_function("document.querySelector('#picture').innerText.includes('u202eposition')", timeout=60_000)
+    assert escaped(page.inner_text("body")) == page.inner_text("body")
 
 
 def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:

@@ -1,5 +1,5 @@
 // The answer: a sentence per case, with its margin as soon as that is there; progress; and the history of answers.
-import { $, el } from "./dom.js";
+import { $, el, plain } from "./dom.js";
 import { paragraphs } from "./tables.js";
 
 const history = [];
@@ -48,10 +48,10 @@ export function progress(part) {
   const place = line();
   if (!place.isConnected) $("answer").append(place);
   if (!part) place.replaceChildren();
-  else if (part.kind === "message") place.replaceChildren(part.text);
+  else if (part.kind === "message") place.replaceChildren(plain(part.text));
   else {
     const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
-    place.replaceChildren(bar, part.label);
+    place.replaceChildren(bar, plain(part.label));
   }
 }
 

@@ -1,5 +1,5 @@
 // A question that takes long, with its progress, an end, its answer, and the machines that it gives.
-import { el } from "./dom.js";
+import { el, plain } from "./dom.js";
 import { draw } from "./plot.js";
 import { paragraphs, table } from "./tables.js";
 import { ask, end } from "./wire.js";
@@ -12,8 +12,8 @@ export async function shownAnswer(place, lane, question, body, tell) {
   const answer = await ask(question, body(), lane, (part) => {
     if (part.kind === "progress") {
       const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
-      status.replaceChildren(bar, part.label);
-    } else if (part.kind === "message") status.replaceChildren(part.text);
+      status.replaceChildren(bar, plain(part.label));
+    } else if (part.kind === "message") status.replaceChildren(plain(part.text));
   });
   if (!answer) return null;
   if (answer.kind !== "answer") {

@@ -1,6 +1,6 @@
 // The page: connects the machine, its keys, the answer and the pictures.
 import * as answers from "./answer.js";
-import { $, el } from "./dom.js";
+import { $, el, plain } from "./dom.js";
 import { drawing } from "./drawing.js";
 import { edit, forgetRanges, keys, worded } from "./keys.js";
 import { out, save } from "./out.js";
@@ -90,7 +90,7 @@ function described(part) {
     held = machines.current().text;
     forgetRanges();
   }
-  document.title = `${part.title || machines.current().name}: friso`;
+  document.title = plain(`${part.title || machines.current().name}: friso`);
   left();
   pictures.machine = part;
   pictures.bar();
@@ -159,7 +159,8 @@ async function opened(files) {
   pictures.own.logs.add(logs);
 }
 
-function trouble(text) {
+function trouble(said) {
+  const text = plain(said);
   if ($("trouble").textContent === text) return; // it is read out once
   $("trouble").textContent = text;
   $("trouble").hidden = !text;

@@ -1,5 +1,5 @@
 // What leaves the page, when it is asked for: stage file, link, report with its figures, command and Python lines.
-import { dialog, el } from "./dom.js";
+import { dialog, el, plain } from "./dom.js";
 
 export function save(name, content, type) {
   const address = URL.createObjectURL(new Blob([content], { type }));
@@ -14,7 +14,7 @@ export function out({ machine, answer, link, files }) {
   const copied = async (text) => {
     // a page that comes unencrypted from another machine has no clipboard
     const done = await navigator.clipboard?.writeText(text).then(() => true, () => false);
-    status.textContent = `${done ? "Copied" : "To be copied"}: ${text}`;
+    status.textContent = plain(`${done ? "Copied" : "To be copied"}: ${text}`);
   };
   const copy = (text) => el("button", { type: "button", onclick: () => copied(text) }, "Copy");
   const stage = el("button", { type: "button", onclick: () => save(`${name}.toml`, machine.toml, "application/toml") }, "Stage file");
@@ -23,8 +23,8 @@ export function out({ machine, answer, link, files }) {
   const report = el("button", { type: "button" }, "Report, figures and data (ZIP)");
   report.addEventListener("click", async () => {
     status.textContent = "The report is being made …";
-    const made = await files((part) => (status.textContent = part.label ?? part.text ?? ""));
-    status.textContent = made ?? "";
+    const made = await files((part) => (status.textContent = plain(part.label ?? part.text ?? "")));
+    status.textContent = plain(made ?? "");
   });
   const lines = answer?.command ? [el("h3", {}, `The same on the command line, of ${answer.of}`), el("pre", {}, answer.command), copy(answer.command), el("h3", {}, "and in Python"), el("pre", {}, answer.python), copy(answer.python)] : [];
   dialog("Out", el("div", { class: "row" }, stage, share, report), status, ...lines);

@@ -1,5 +1,5 @@
 // Figures as the server gives them, drawn by plotly in the colours of the page.
-import { el } from "./dom.js";
+import { el, plain } from "./dom.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 /** Colours of the figures that a dark page shows otherwise. */
@@ -24,8 +24,8 @@ export function draw(place, figures, tell = () => {}) {
       const caption = el("p", { class: "caption" }, figure.caption);
       box = el("section", { class: "figure", "data-name": figure.name }, heading, caption, el("div", { class: "plot" }));
     } else {
-      box.children[0].textContent = figure.title;
-      box.children[1].textContent = figure.caption;
+      box.children[0].textContent = plain(figure.title);
+      box.children[1].textContent = plain(figure.caption);
     }
     box.classList.remove("stale");
     place.append(box);
