@@ -219,7 +219,9 @@ def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -
     log = write_text(tmp_path / "steering.csv", ["time [s]", "\u202eposition\x1b[31m [m]", "force [N]"], columns)
     page.click("#tab-logs")
     page.set_input_files("#log-files", log)
-    page.wait_for_function("document.querySelector('#picture').innerText.includes('u202eposition')", timeout=60_000)
+    page.wait_for_function(
+        "() => document.getElementById('picture').innerText.includes('u202eposition')", timeout=60_000
+    )
     assert escaped(page.inner_text("body")) == page.inner_text("body")
 
 
