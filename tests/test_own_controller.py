@@ -100,7 +100,7 @@ def test_check(locked: Stage, tmp_path: Path) -> None:
 
 def test_boundary(locked: Stage, tmp_path: Path) -> None:
     """Of all cycles of the stage none attracts beyond the edge."""
-    document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=8 Hz..13 Hz")
+    document = answer(tmp_path, locked, "boundary", "--x", f"{BANDWIDTH}=6 Hz..15 Hz")
     assert document["branches"]
     assert min(abs(point["value"] - EDGE) for point in document["points"]) < 0.05
 

@@ -181,7 +181,7 @@ def blank(value: Any) -> Any:
 COMMANDS = {
     "check": (),
     "bode": (),
-    "boundary": ("--x", "controller.crossover=9.6 Hz..9.9 Hz"),
+    "boundary": ("--x", "controller.crossover=6 Hz..15 Hz"),
     "map": ("--x", "controller.crossover=6 Hz..12 Hz:2", "--y", "{static}:2"),
 }
 

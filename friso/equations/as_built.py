@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from friso.equations.cases import Piecewise
 from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.structure import Structure, structure
 
@@ -179,7 +180,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     error = loop.error.xreplace({loop.position: reading})
     acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
-    ahead += drive["feedforward_coulomb"] * sp.Piecewise((1, speed > 0), (-1, speed < 0), (0, True))
+    ahead += drive["feedforward_coulomb"] * Piecewise((1, speed > 0), (-1, speed < 0), (0, True))
     rest = Rest(
         rests=sp.Abs(error) < drive["integrator_deadband"],
         restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
@@ -187,5 +188,5 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     measured = replace(loop, error=error, position=reading, rated=rated)
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, measured, form.velocity_samples, extra, rest)
-    last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none
+    last = Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none
     return reading, command, (*held, Held(before, last, STEADY.error))

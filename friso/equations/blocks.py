@@ -15,6 +15,7 @@ from typing import Any, Literal
 
 import sympy as sp
 
+from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, Component, Held, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
@@ -40,7 +41,7 @@ class Loop:
 def sign_of_motion(*rates: sp.Expr) -> sp.Expr:
     """The sign of the first of some rates that is not 0, as 1, -1 or 0."""
     cases = [case for rate in rates for case in ((sp.S.One, rate > 0), (sp.S.NegativeOne, rate < 0))]
-    return sp.Piecewise(*cases, (sp.S.Zero, True))
+    return Piecewise(*cases, (sp.S.Zero, True))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
+from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TIME, Component, Kink, Output, Role, State, Switch, sine, state
 from friso.equations.structure import ControllerForm, controller_form
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
@@ -45,7 +46,7 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
         if term in demand.shares
     }
     states, resting = blocks.finished(demand, bound)
-    sides = {kink.beyond: sp.Piecewise((1, kink.surface > 0), (0, True)) for kink in blocks.kinks}
+    sides = {kink.beyond: Piecewise((1, kink.surface > 0), (0, True)) for kink in blocks.kinks}
     others = (kink.beginning(sides) if kink.surface.free_symbols & {*sides} else kink for kink in (*kinks, *resting))
     return Controller(force, Component(states, (*blocks.kinks, *others), outputs))
 
@@ -184,8 +185,8 @@ class Continuous(Blocks):
         inside = Kink("error_deadband", band**2 - error.value**2)
         self.kinks.append(inside)
         outside = 1 - inside.beyond
-        value = outside * (error.value - band * sp.Piecewise((1, error.value > 0), (-1, True)))
-        settled = sp.Piecewise(
+        value = outside * (error.value - band * Piecewise((1, error.value > 0), (-1, True)))
+        settled = Piecewise(
             (error.settled - band, error.settled > band), (error.settled + band, error.settled < -band), (0, True)
         )
         rate = None if error.rate is None else outside * error.rate
@@ -197,7 +198,7 @@ class Continuous(Blocks):
         inside = Kink("standstill", window**2 - error.value**2)
         self.kinks.append(inside)
         self.gains = 1 + (factor - 1) * inside.beyond
-        settled = sp.Piecewise((factor, error.settled**2 < window**2), (1, True))
+        settled = Piecewise((factor, error.settled**2 < window**2), (1, True))
         integrals = [integral.symbol for integral in self._integrals]
         value, resting = (
             held + gains * (part - held)
@@ -211,7 +212,7 @@ class Continuous(Blocks):
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         ahead, behind = Kink("push_ahead", error.value - window), Kink("push_behind", -error.value - window)
         self.kinks += [ahead, behind]
-        side = sp.Piecewise((1, error.settled > window), (-1, error.settled < -window), (0, True))
+        side = Piecewise((1, error.settled > window), (-1, error.settled < -window), (0, True))
         resting = push * (1 - direction.value**2)
         return Signal(resting * (ahead.beyond - behind.beyond), push, push * side, sp.S.Zero)
 

@@ -10,6 +10,7 @@ from typing import Any
 import sympy as sp
 
 from friso.equations.blocks import Controller, Loop, sign_of_motion
+from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
 from friso.equations.conditions import under_acceleration
 from friso.equations.continuous import Continuous, continuous_controller
@@ -274,7 +275,7 @@ def _scales(structure: Structure, breakaway: sp.Expr, mass: sp.Expr) -> tuple[sp
     else:
         deflection = breakaway / stiffness
         length = sp.Max(sp.Min(MOTION_SIZE, deflection), SMALLEST_LENGTH * MOTION_SIZE)
-    length = sp.Piecewise((length, MOTION_SIZE > 0), (deflection, True))
+    length = Piecewise((length, MOTION_SIZE > 0), (deflection, True))
     return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
 
 

@@ -24,6 +24,7 @@ from friso.equations.blocks import (
     unwinding_time,
     wound_up,
 )
+from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, Held, Role, clipped, key, sine, state
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
@@ -97,11 +98,11 @@ class Sampled(Blocks):
         yield
         due = self.due
         self.held[first:] = [
-            replace(number, update=sp.Piecewise((number.update, due), (number.symbol, True)))
+            replace(number, update=Piecewise((number.update, due), (number.symbol, True)))
             for number in self.held[first:]
         ]
         next_passed = passed + 1 > self.period / SAMPLE_TIME - sp.Rational(1, 2)
-        self.held.append(Held(passed, sp.Piecewise((0, next_passed), (passed + 1, True))))
+        self.held.append(Held(passed, Piecewise((0, next_passed), (passed + 1, True))))
         self.period, self.due = before
 
     def handed_on(self, signal: Signal, name: str) -> Signal:
@@ -109,7 +110,7 @@ class Sampled(Blocks):
         if self.due is None:
             return signal
         kept = self._previous(f"{name}_handed_on", signal.value, signal.settled)
-        return replace(signal, value=sp.Piecewise((signal.value, self.due), (kept, True)), rate=None, before=None)
+        return replace(signal, value=Piecewise((signal.value, self.due), (kept, True)), rate=None, before=None)
 
     def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
         """The number that a value was at the sample before."""
@@ -152,7 +153,7 @@ class Sampled(Blocks):
                 before = self._previous(f"{name}_signal_before", signal.value, signal.settled)
             share = self.period / 2 * (signal.value + before)
         if self.due is not None:
-            share = sp.Piecewise((share, self.due), (0, True))
+            share = Piecewise((share, self.due), (0, True))
         self._integrals.append(_Integral(symbol, following, share, gain, limit))
         return Signal(gain * following, gain * signal.scale * self.period, gain * symbol, sp.S.Zero)
 
@@ -185,8 +186,8 @@ class Sampled(Blocks):
     def at_standstill(self, total: Signal, error: Signal) -> Signal:
         """As the error is at a sample."""
         window, factor = map(self.key, ("standstill_window", "standstill_factor"))
-        self.gains = sp.Piecewise((factor, sp.Abs(error.value) < window), (1, True))
-        settled = sp.Piecewise((factor, error.settled**2 < window**2), (1, True))
+        self.gains = Piecewise((factor, sp.Abs(error.value) < window), (1, True))
+        settled = Piecewise((factor, error.settled**2 < window**2), (1, True))
         value, resting = (
             held + gains * (part - held)
             for gains, part, numbers in (
@@ -201,7 +202,7 @@ class Sampled(Blocks):
         """As error and reference are at a sample."""
         push, window = map(self.key, ("stiction_push", "stiction_push_window"))
         way, settled = (
-            sp.Piecewise((1, part > window), (-1, part < -window), (0, True)) for part in (error.value, error.settled)
+            Piecewise((1, part > window), (-1, part < -window), (0, True)) for part in (error.value, error.settled)
         )
         return Signal(push * way * (1 - direction.value**2), push, push * settled, sp.S.Zero)
 
@@ -210,7 +211,7 @@ class Sampled(Blocks):
         amplitude, frequency = map(self.key, ("dither_amplitude", "dither_frequency"))
         turn = state("dither_turn")
         following = turn + frequency * SAMPLE_TIME
-        self.held.append(Held(turn, sp.Piecewise((following - 1, following > 1), (following, True))))
+        self.held.append(Held(turn, Piecewise((following - 1, following > 1), (following, True))))
         return Signal(amplitude * sine(turn), amplitude, sp.S.Zero, sp.S.Zero)
 
     def _standstill(self, error: sp.Expr) -> Rest:
@@ -223,12 +224,12 @@ class Sampled(Blocks):
             if self.settings.hysteresis:
                 paused = state("paused")
                 beyond = sp.Abs(error) > self.key("integral_deadband_exit")
-                pauses = sp.Piecewise((1, within), (0, beyond), (paused, True))
+                pauses = Piecewise((1, within), (0, beyond), (paused, True))
                 self.held.append(Held(paused, pauses))
                 rests = pauses > 0
         if self.settings.reset:
             before = state("error_at_change")
-            self.held.append(Held(before, sp.Piecewise((error, error**2 > 0), (before, True)), STEADY.error))
+            self.held.append(Held(before, Piecewise((error, error**2 > 0), (before, True)), STEADY.error))
             restarts = error * before < 0
         return Rest(rests, restarts)
 
@@ -260,7 +261,7 @@ class Sampled(Blocks):
                 cut = within - unlimited
                 gain = len(self._integrals) * sp.diff(demand.total.value, integral.next)
                 following += SAMPLE_TIME * cut / (gain * unwinding_time())
-            kept = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
+            kept = Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
             leak = 2 * sp.pi * self.key("integral_leak") * SAMPLE_TIME if self.settings.leak else 0  # backward Euler
             updates[integral.next] = kept / (1 + leak)
         steady: dict[Any, Any] = {**wound_up(demand.force.settled, [integral.symbol for integral in self._integrals])}

@@ -82,7 +82,7 @@ class Friction:
 
     def steady(self, velocity: sp.Symbol) -> sp.Expr | None:
         """The force [N] in a steady motion at the velocity; None where it cannot be said."""
-        from sympy import Piecewise
+        from friso.equations.cases import Piecewise
 
         try:
             slid: dict[Any, Any] = {**self.slid()}
@@ -94,8 +94,7 @@ class Friction:
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
         """On which side of its kinks the law is in `states`: conditions, by the kinks' symbols; without the direction
         of the motion and modes that remember."""
-        from sympy import Piecewise
-
+        from friso.equations.cases import Piecewise
         from friso.equations.component import Switch
 
         kinks = [k for k in self.component.kinks if not isinstance(k, Switch) and k.name != DIRECTION]

@@ -109,8 +109,9 @@ class GeneralisedMaxwellSlip(StribeckSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: Elements) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from sympy import And, Integer, Piecewise, sqrt
+        from sympy import And, Integer, sqrt
 
+        from friso.equations.cases import Piecewise
         from friso.equations.component import Component, Output, Role, State, Switch, key, state
 
         curve = variant.curve
