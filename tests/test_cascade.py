@@ -220,6 +220,15 @@ def test_sampled_blocks_are_the_difference_equations() -> None:
     rng = np.random.default_rng(1)
     reading, reference = rng.normal(size=(2, 300)).cumsum(axis=1) * 2e-4
     speed = np.where(np.arange(300) % 50 < 10, 0.0, rng.normal(size=300) * 1e-2)
+    forces = sampled_forces(flat, reference - reading, reading, speed)
+    by_hand = difference_equations(flat, reference - reading, reading, speed)
+    assert np.abs(forces - by_hand).max() < 1e-11
+    assert np.abs(by_hand).max() == 6.0
+    assert str(SAMPLE_TIME) in flat
+
+
+def sampled_forces(flat: dict[str, Any], error: np.ndarray, reading: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    """The force [N] of a sampled controller, sample by sample."""
     e, y, r = sp.symbols("e y r", real=True)
     way = sp.Piecewise((1, r > 0), (-1, r < 0), (0, True))
     force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, r, sp.S.Zero, way), 1)
@@ -230,13 +239,34 @@ def test_sampled_blocks_are_the_difference_equations() -> None:
     passed = {state("position_before_1")}
     kept = [reading[0] if number.symbol in passed else 0.0 for number in held]
     forces = []
-    for row in zip(reference - reading, reading, speed, strict=True):
+    for row in zip(error, reading, speed, strict=True):
         now, *kept = step_once(*row, *keys.values(), *kept)
         forces.append(now)
-    by_hand = difference_equations(flat, reference - reading, reading, speed)
-    assert np.abs(np.array(forces) - by_hand).max() < 1e-11
-    assert np.abs(by_hand).max() == 6.0
-    assert str(SAMPLE_TIME) in flat
+    return np.array(forces)
+
+
+def test_settings_against_friction_that_never_act_change_nothing() -> None:
+    """All of them at once, whose conditions depend on each other, in both integrals of a cascade."""
+    idle = """
+        integral_limit = "1 MN"
+        integral_deadband = "1e-9 nm"
+        integral_deadband_exit = "2e-9 nm"
+        error_deadband = "1e-9 nm"
+        standstill_window = "1e-9 nm"
+        standstill_factor = 0.5
+        stiction_push = "1 N"
+        stiction_push_window = "1 m"
+    """
+    times = {"position_integral_time": "90 ms", "velocity_integral_time": "30 ms"}
+    rng = np.random.default_rng(4)
+    error, reading = rng.normal(size=(2, 200)).cumsum(axis=1) * 2e-4
+    speed = np.where(np.arange(200) % 50 < 10, 0.0, rng.normal(size=200) * 1e-2)
+    machines = (rigid(cascade(**times, extra=limit("6 N") + extra)) for extra in ("", idle))
+    without, with_all = (
+        sampled_forces({**machine.flat(), "drive.sample_time": 1e-3}, error, reading, speed) for machine in machines
+    )
+    assert np.abs(with_all - without).max() < 1e-9
+    assert np.abs(without).max() == 6.0
 
 
 def test_loops_at_their_own_rates() -> None:
