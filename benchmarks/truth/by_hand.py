@@ -70,6 +70,11 @@ class ByHand:
         return np.array([*[length, length * omega] * 3, bristle, length, length / omega])
 
     @property
+    def measured(self) -> int:
+        """The state that the encoder measures."""
+        return XP if self.numbers[NAMES.index("at_motor")] else X
+
+    @property
     def stiffness(self) -> float:
         """Proportional stiffness of the loop [N/m]."""
         return float(self.numbers[NAMES.index("kp")])

@@ -48,7 +48,7 @@ def _scipy(stage: Stage, equations: ByHand, rtol: float) -> tuple[np.ndarray, np
     flat = stage.flat()
     times = np.arange(SAMPLES + 1) * (flat["motion.duration"] / SAMPLES)
     displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
-    return times, equations.run(equations.start(displaced), times, rtol)[:, 0]
+    return times, equations.run(equations.start(displaced), times, rtol)[:, equations.measured]
 
 
 def _friso(stage: Stage, rtol: float, count: int) -> tuple[str, np.ndarray]:

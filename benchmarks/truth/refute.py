@@ -132,7 +132,7 @@ def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
     if not {"parasitic_position", "motor_position"} & set(bench.kernel.states):
         y[4:6] = y[0:2]
     times = np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
-    x = equations.run(y, times)[:, 0]
+    x = equations.run(y, times)[:, equations.measured]
     if not np.isfinite(x[-1]):
         return "SciPy does not get there"
     swing = float(np.ptp(x) / 2)
