@@ -10,7 +10,7 @@ from friso.studies.rig.experiments.frf import MeasuredLoop
 from friso.studies.rig.experiments.in_position import InPosition, Standstill
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.moves_on_rails import RailRuns
-from friso.studies.thesis.as_built import CyclesOnRails, MovesOnRails, RigLoops
+from friso.studies.thesis.as_built import CyclesOnRails, MovesOnRails, RailTraces, RigLoops
 
 HUNTS, FAILED = 7, -1
 """Peaks of a run that hunts; of one that failed, which says nothing."""
@@ -62,7 +62,18 @@ def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, te
     runs = {("locked", "all"): still([rms[0], locked]), ("free", "all"): still([rms[1], free])}
     damped = still(*([rms[1] - share * (rms[1] - rms[0]), free] for share in (0.0, tenfold, 0.99)))
     damping = np.array([0.5, 5.0, 50.0])
-    return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, {})
+    time = np.linspace(0.0, 12.0, 50)
+    drawn = {case: (time, size * np.sin(time)) for case, size in (("locked", locked), ("free", free))}
+    noises = {factor: (factor * locked, factor * free) for factor in (0.1, 1.0, 10.0)}
+    return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, drawn, noises)
+
+
+def traces() -> RailTraces:
+    """Moves at three crossovers, of which the lowest swings with the joint locked, and on both rails."""
+    time = np.linspace(0.0, 20.0, 200)
+    swing = 5e-4 * np.sin(4 * time)
+    moves = {("locked", 8.0): swing, ("locked", 9.5): 0.1 * swing, ("locked", 14.3): 0 * time, ("free", 8.0): 0 * time}
+    return RailTraces(time, moves, {"even rail": swing, "rail that varies": 0.8 * swing}, 0.09)
 
 
 def loop(tuned: float, *crossings: float) -> MeasuredLoop:

@@ -48,10 +48,10 @@ DIFFER = {
 
 
 def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(design_rules, "_needed_ratio", lambda: 9.0)
+    monkeypatch.setattr(design_rules, "_needed_ratio", lambda rig: 9.0)
     assert judged(HOLD).judgement == "holds"
-    monkeypatch.setattr(design_rules, "_needed_ratio", lambda: 17.0)
-    monkeypatch.setattr(design_rules, "_margins_at_the_top", lambda: {"locked": 0.0, "free": 0.3})
+    monkeypatch.setattr(design_rules, "_needed_ratio", lambda rig: 17.0)
+    monkeypatch.setattr(design_rules, "_margins_at_the_top", lambda rig: {"locked": 0.0, "free": 0.3})
     assert judged(DIFFER).judgement == "differs"
 
 
@@ -60,7 +60,7 @@ def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
     from friso.frequency.crossover import settled_margin
     from friso.studies.thesis.studies import thesis_rig
 
-    ratio = design_rules._needed_ratio()
+    ratio = design_rules._needed_ratio(thesis_rig().to_toml())
     flat = {**thesis_rig().flat(), "joint.locked": False}
     tried = design_rules._RATIOS
     below = tried[tried < ratio * 0.999][-1]

@@ -156,3 +156,17 @@ def test_what_is_compiled_is_named_by_all_that_differs(rig: Stage) -> None:
         ),
     ]
     assert len({form.title for form in forms}) == len(forms)
+
+
+def test_a_move_with_a_cruise_is_a_trapezoid_of_velocity() -> None:
+    """It accelerates, runs at constant speed for so many times as long, and brakes; both steps cover the same way."""
+    flat = {"motion.kind": "there_and_back", "motion.acceleration": 10.0, "motion.acceleration_time": 0.1}
+    flat |= {"motion.return_at": 2.0, "motion.duration": 4.0, motion.CRUISE: 1.5}
+    time = np.linspace(0.0, 3.0, 30001)
+    place = motion.reference(flat, time)
+    speed = np.gradient(place, time)
+    assert motion.size(flat) == pytest.approx(10.0 * 0.1**2 * 2.5) == pytest.approx(place.max())
+    assert place[-1] == pytest.approx(0.0, abs=1e-12)
+    assert speed.max() == pytest.approx(1.0, rel=1e-3) == pytest.approx(-speed.min(), rel=1e-3)
+    assert (np.abs(speed) > 0.999).mean() * 3.0 == pytest.approx(2 * 1.5 * 0.1, rel=0.02)
+    assert motion.last_corner(flat) == pytest.approx(2.0 + 3.5 * 0.1)

@@ -6,8 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -32,12 +31,10 @@ from friso.identification.readings.rate_effect import break_away, share_below, s
 from friso.identification.response.fitting import ResponseFit
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
-    EXPERIMENTS,
     SLOW,
     Experiments,
     LockedLine,
     constant_speed,
-    experiment,
     joint_steps,
     slow_motion,
 )
@@ -629,8 +626,7 @@ def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow(wording
 def judged(claim: str) -> Finding:
     """The judge's finding from what it needs of the experiments, and no other."""
     stage, entry = rig_of_thesis(), registered()[claim]
-    made = SimpleNamespace(**{name: experiment(name, stage) for name in entry.needs & EXPERIMENTS.keys()})
-    return entry.judge(Evidence({}, {}, analysed(stage), cast(Experiments, made)))
+    return entry.judge(Evidence({}, {}, analysed(stage), Experiments(stage)))
 
 
 def of_plant(changes: dict[str, str]) -> Finding:
@@ -642,10 +638,10 @@ def of_plant(changes: dict[str, str]) -> Finding:
 @pytest.mark.parametrize(
     ("claim", "holds"),
     [
-        ("F17", (True, False, True, True)),
-        ("F18", (True, True, False, True)),
-        ("F19", (True, False)),
-        ("F20", (True, True, False)),
+        ("F17", (True, False, True)),
+        ("F18", (True, False)),
+        ("F19", (False,)),
+        ("F20", (True, False)),
         ("F21", (False, False, True)),
     ],
 )
@@ -653,7 +649,7 @@ def test_what_is_found_of_the_identification(claim: str, holds: tuple[bool, ...]
     finding = judged(claim)
     assert finding.pattern == holds, finding
     assert all(part.holds or part.why for part in finding.parts)
-    assert not re.search(r"\bnan\b", str(finding))
+    assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
 
 
 def test_the_judges_recognise_what_holds() -> None:
@@ -679,7 +675,7 @@ def test_the_judges_recognise_what_does_not_hold() -> None:
     assert judged_speeds(lively, lively).pattern[:2] == (False, False)
     assert judged_line(LockedLine(np.full((4, 9), 2.0), np.linspace(0.1, 0.5, 9))).judgement == "differs"
     few = replace(joint_steps(rig_of_thesis()), stiffness=5e3)
-    assert judged_steps(few).judgement == "differs"
+    assert not any(part.holds for part in judged_steps(few).parts)
     assert of_plant({"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz"}).judgement == "differs"
 
 

@@ -22,7 +22,7 @@ from friso.studies.thesis.judges.series_stiffness import (
 )
 from friso.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, Springs, analysed
 from friso.studies.thesis.linear.speeds import abscissa_with_bristles
-from friso.studies.thesis.open_parameters import METHOD, OPEN
+from friso.studies.thesis.space import OPEN
 
 pytestmark = pytest.mark.xdist_group("linear-claims")
 
@@ -57,7 +57,7 @@ def test_the_rig(linear: Linear, claim: str, holds: tuple[bool, ...]) -> None:
     finding = judged(claim, linear)
     assert finding.pattern == holds, finding
     assert all(part.holds or part.why for part in finding.parts)
-    assert not re.search(r"\bnan\b", str(finding))
+    assert not re.search(r"\bnan\b", " ".join(part.number + part.why for part in finding.parts))
 
 
 HOLDS: Mapping[str, Mapping[str, Any]] = {
@@ -107,7 +107,7 @@ def test_parts_of_made_evidence(linear: Linear) -> None:
 
 def test_every_linear_claim_is_tried_both_ways() -> None:
     linear = {claim for claim, entry in registered().items() if entry.needs & NEEDS.keys()}
-    assert HOLDS.keys() == FAILS.keys() == linear - {"E1", "F18"}
+    assert HOLDS.keys() == FAILS.keys() == linear - {"E1", "F18", "S342"}
 
 
 # --- Eq. 1 and 2 ------------------------------------------------------------------------------------------------------
@@ -197,9 +197,10 @@ def test_curves_are_the_loops_of_the_margins(linear: Linear) -> None:
             assert size == pytest.approx(1.0, rel=0.02)
 
 
-def test_what_variants_touch() -> None:
-    touches = {(v.parameter, name) for v in (*OPEN, *METHOD) for name in NEEDS if v.touches_part(NEEDS[name])}
-    every = {"d_l", "parasitic mass", "parasitic damping"}
-    assert {parameter for parameter, name in touches if name == PLANT} == every | {"d_j"}
-    assert {parameter for parameter, name in touches if name == FREE} == every | {"d_j", "alpha", "beta"}
+def test_what_open_values_touch() -> None:
+    touches = {(v.name, name) for v in OPEN for name in NEEDS if v.touches_part(NEEDS[name])}
+    every = {"limiter damping", "parasitic mass over stage mass", "parasitic damping ratio", "stroke", "mass"}
+    joint = {"joint damping"}
+    assert {parameter for parameter, name in touches if name == PLANT} == every | joint
+    assert {parameter for parameter, name in touches if name == FREE} == every | joint | {"alpha", "beta"}
     assert {parameter for parameter, name in touches if name == LOCKED_LOOP} == every | {"alpha", "beta"}

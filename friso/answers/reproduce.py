@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import tolerance_of
 from friso.progress import Progress, silent
+from friso.studies.thesis.plausible import DRAWS
 from friso.studies.thesis.reproduce import POINTS, Reproduction
 
 if TYPE_CHECKING:
@@ -33,10 +35,16 @@ class ReproduceAnswer(Answer):
         return reproduce_document(self.result, self.laws)
 
     def sentences(self) -> Sequence[str]:
-        """How many of the claims hold, and how many survive other friction laws."""
+        """How many of the claims hold, which draw fits best, and how many survive other friction laws."""
         from friso.views.reproduce.laws import laws_sentences
+        from friso.views.reproduce.words import fit_sentence
 
-        return [self._document["conclusion"], *(laws_sentences(self.laws) if self.laws else [])]
+        fit = fit_sentence(self.result.plausible)
+        return [
+            self._document["conclusion"],
+            *([fit] if fit else []),
+            *(laws_sentences(self.laws) if self.laws else []),
+        ]
 
     def tables(self) -> Sequence[AnswerTable]:
         """The conclusions under each law."""
@@ -47,7 +55,7 @@ class ReproduceAnswer(Answer):
     def details(self) -> Sequence[str]:
         """Every claim with its judgement, and the cycles behind the maps."""
         claims = [
-            f"{claim['id']:5} {claim['judgement']:14} {claim['number']}"
+            f"{claim['id']:5} {claim['judgement']:14} {_drawn(claim['space'])}{claim['number']}"
             for claim in self._document["claims"]
             if claim["judgement"] != "not yet covered"
         ]
@@ -75,13 +83,21 @@ class ReproduceAnswer(Answer):
         return reproduce_files(self.result, self.laws)
 
 
+def _drawn(space: dict[str, Any] | None) -> str:
+    """In how many joint draws a claim holds, where any were made."""
+    return f"[{space['holds']} of {space['draws']} draws] " if space else ""
+
+
 @question
 def reproduce(
     names: Iterable[str] | None = None,
     points: int = POINTS,
     rtol: float | str = 1e-6,
     *,
+    only: Iterable[str] | None = None,
+    draws: int = DRAWS,
     laws: bool = False,
+    folder: Path | None = None,
     progress: Progress = silent,
 ) -> ReproduceAnswer:
     """Every figure and claim of the thesis that computation decides, judged.
@@ -94,10 +110,16 @@ def reproduce(
         Values per axis of every map.
     rtol : float
         Relative tolerance of the solver.
+    only : list of str, optional
+        Claims, such as "F15B", that alone are judged, with what they need; default: all of them.
+    draws : int
+        Joint draws of the values that the thesis does not state, in each of which every claim is judged.
     laws : bool
         Whether to judge the conclusions of the thesis under every friction law too.
+    folder : Path, optional
+        Where finished pieces are kept, from which an interrupted run resumes.
     progress : Progress
-        Called as studies are done.
+        Called as pieces are done.
 
     Returns
     -------
@@ -107,15 +129,16 @@ def reproduce(
     Raises
     ------
     InputError
-        For an unknown study or too few points.
+        For an unknown study or claim, too few points, or too many.
 
     Examples
     --------
     >>> import friso
     >>> friso.reproduce(["isolator-crossover"], points=21)  # doctest: +SKIP
     """
+    from friso.studies.thesis.kept import Kept
     from friso.studies.thesis.laws import conclusions_by_law
     from friso.studies.thesis.reproduce import reproduce as reproduced
 
-    result = reproduced(names, points, tolerance_of(rtol), progress)
+    result = reproduced(names, points, tolerance_of(rtol), progress, draws=draws, only=only, kept=Kept(folder))
     return ReproduceAnswer(result, conclusions_by_law(result, progress) if laws else None)

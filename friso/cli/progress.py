@@ -25,7 +25,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def __init__(self, label: str = "", lines: float = math.inf) -> None:
         self.label, self.lines = label, lines
-        self.last = time.monotonic()
+        self.begun = self.last = time.monotonic()
         self.display: Display | None = None
         self.task: TaskID | None = None
 
@@ -47,7 +47,14 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
         elif time.monotonic() - self.last > self.lines:
             self.last = time.monotonic()
             share = f"{100 * done // total} %, " if total else ""
-            print(f"friso: {share}{one_line(label)}", file=sys.stderr, flush=True)
+            print(f"friso: {share}{one_line(label)}{self._to_go(done, total)}", file=sys.stderr, flush=True)
+
+    def _to_go(self, done: int, total: int) -> str:
+        """The time that the rest takes, if it goes on as so far."""
+        if not (done and total):
+            return ""
+        seconds = (self.last - self.begun) * (total - done) / done
+        return f", {seconds / 60:.0f} min to go" if seconds >= 100 else f", {seconds:.0f} s to go"
 
 
 def _display() -> Display:

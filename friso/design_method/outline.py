@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from friso.design_method.prepare import check_designable
+from friso.equations.motion import size
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.quantities import percent
 from friso.stage import Stage
@@ -86,4 +87,4 @@ def _move(stage: Stage) -> tuple[float, float]:
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"]:
         return 1e-2, 10.0
     rate = float(flat["motion.acceleration"])
-    return rate * float(flat["motion.acceleration_time"]) ** 2, rate
+    return float(size(flat)), rate

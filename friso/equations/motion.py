@@ -11,9 +11,30 @@ Piece = tuple[Any, Any, Any, Any]
 """Start time [s], and position [m], velocity [m/s] and acceleration [m/s^2] there."""
 
 
+CRUISE = "motion.cruise_ratio"
+"""Time at constant speed between acceleration and braking, over the acceleration time; without it there is none."""
+
+
+def _there(flat: Mapping[str, Any]) -> Any:
+    """Length of the step there [m]."""
+    return flat["motion.acceleration"] * flat["motion.acceleration_time"] ** 2 * (1 + flat.get(CRUISE, 0.0))
+
+
 def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
     a, ramp, return_at = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
-    size, top = a * ramp**2, a * ramp
+    size, top, cruise = _there(flat), a * ramp, flat.get(CRUISE)
+    if cruise is not None:
+        middle = size - top * ramp / 2
+        return [
+            (0.0, 0.0, 0.0, a),
+            (ramp, top * ramp / 2, top, 0.0),
+            ((1 + cruise) * ramp, middle, top, -a),
+            ((2 + cruise) * ramp, size, 0.0, 0.0),
+            (return_at, size, 0.0, -a),
+            (return_at + ramp, middle, -top, 0.0),
+            (return_at + (1 + cruise) * ramp, top * ramp / 2, -top, a),
+            (return_at + (2 + cruise) * ramp, 0.0, 0.0, 0.0),
+        ]
     return [
         (0.0, 0.0, 0.0, a),
         (ramp, size / 2, top, -a),
@@ -37,7 +58,7 @@ _PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
 }
 
 _SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
-    "there_and_back": lambda flat: flat["motion.acceleration"] * flat["motion.acceleration_time"] ** 2,
+    "there_and_back": _there,
     "release": lambda flat: flat["motion.displacement"],
     "step": lambda flat: flat["motion.size"],
     "ramp": lambda flat: flat["motion.velocity"] * flat["motion.duration"],

@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import last_corner
+from friso.equations.motion import CRUISE, last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
 from friso.hunting.criteria.run_outcome import lasts
@@ -180,7 +180,7 @@ def moves_that_hunt(stage: Stage, target: Target) -> MoveShare | None:
         return None
     acceleration, time = flat["motion.acceleration"], flat["motion.acceleration_time"]
     accelerations = (SHARES[0] * acceleration, SHARES[1] * acceleration)
-    times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
+    times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / (2 + flat.get(CRUISE, 0.0))))
     (low, shortest), (high, longest) = zip(accelerations, times, strict=True)
     across, along = evenly(MOVES)
     moved = {

@@ -162,28 +162,33 @@ class Motion(UncertainSection):
 MOTION = Variants("kind")
 
 
+def _time_there(flat: Mapping[str, Any]) -> Any:
+    """Time of the move there [s]."""
+    return (2 + flat.get("motion.cruise_ratio", 0.0)) * flat["motion.acceleration_time"]
+
+
 @MOTION.register
 class ThereAndBack(Motion):
-    """Two equal steps, there and back, each accelerating for acceleration_time and braking likewise."""
+    """Two equal steps, there and back, each accelerating for acceleration_time and braking likewise; with a
+    cruise_ratio, at constant speed in between for so many times the acceleration_time."""
 
     kind: Literal["there_and_back"]
     acceleration: Annotated[Value, Quantity("m/s^2", non_negative, "100 m/s^2")]
     acceleration_time: Annotated[Value, Quantity("s", non_negative, "30 ms")]
     return_at: Annotated[Value, Quantity("s", non_negative, "5 s")]
+    cruise_ratio: Annotated[float | None, Number(positive, "1.0")] = None
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             ("motion.acceleration_time", "motion.return_at"),
-            lambda f: 2 * f["motion.acceleration_time"] <= f["motion.return_at"] * (1 + ROUNDING),
-            "the move there (2 acceleration_time) finished before return_at",
+            lambda f: _time_there(f) <= f["motion.return_at"] * (1 + ROUNDING),
+            "the move there (2 + cruise_ratio times acceleration_time) finished before return_at",
             'acceleration_time = "30 ms", return_at = "5 s"',
         ),
         Rule(
             ("motion.acceleration_time", "motion.return_at", "motion.duration"),
-            lambda f: (
-                f["motion.return_at"] + 2 * f["motion.acceleration_time"] <= f["motion.duration"] * (1 + ROUNDING)
-            ),
-            "the move back (return_at + 2 acceleration_time) finished within the duration",
+            lambda f: f["motion.return_at"] + _time_there(f) <= f["motion.duration"] * (1 + ROUNDING),
+            "the move back (return_at + 2 + cruise_ratio times acceleration_time) finished within the duration",
             'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
         ),
     )

@@ -9,7 +9,7 @@ import typer
 
 from friso.cli.asking import Details, ask
 from friso.cli.command import WHY, Command
-from friso.cli.common import AsJson, Tolerance
+from friso.cli.common import AsJson, Tolerance, say
 from friso.cli.output import DefaultFolder, Overwrite
 
 
@@ -18,6 +18,12 @@ def reproduce(
         list[str] | None, typer.Argument(metavar="[STUDY]...", help="Studies of Table 3 by name; default: all of them.")
     ] = None,
     points: Annotated[int, typer.Option(metavar="NUMBER", help="Values per axis of every map.")] = 41,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="CLAIM", help="Judge this claim alone, such as F15B; may be repeated.")
+    ] = None,
+    draws: Annotated[
+        int, typer.Option(metavar="NUMBER", help="Joint draws of the values that the thesis does not state.")
+    ] = 48,
     rtol: Tolerance = "1e-6",
     laws: Annotated[bool, typer.Option("--laws", help="Judge the conclusions under every friction law too.")] = False,
     out: DefaultFolder = Path("reproduction"),
@@ -27,13 +33,27 @@ def reproduce(
 ) -> None:
     """Every figure and claim of the thesis that computation decides, judged: reproduction.html, claims.json.
 
-    Example: friso reproduce --points 21 --out reproduction
-    One study: friso reproduce isolator-crossover
+    What is done of an interrupted run stays, and the same command goes on from there.
+    Example: friso reproduce --points 21 --draws 12 --out reproduction
+    One claim: friso reproduce --only F15B
     """
+    from friso.answers.output_folder import UNFINISHED
     from friso.answers.reproduce import reproduce as question
+    from friso.studies.thesis.kept import Kept
 
-    shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
-    ask("reproduce", question, names, points=points, rtol=rtol, laws=laws, **shown)
+    kept = Kept(out / UNFINISHED)
+    shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details, "lines": LINES}
+    asked = {"points": points, "only": only, "draws": draws, "rtol": rtol, "laws": laws}
+    try:
+        ask("reproduce", question, names, **asked, folder=kept.folder, **shown)
+    except KeyboardInterrupt:
+        say(f"{kept.count} pieces of the work are kept in {kept.folder}; the same command resumes from there")
+        raise
+    kept.clear()
+
+
+LINES = 10.0
+"""Seconds between lines of progress where there is no terminal."""
 
 
 COMMAND = Command(reproduce, 130, WHY)

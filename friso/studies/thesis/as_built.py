@@ -34,6 +34,7 @@ from friso.studies.rig.moves_on_rails import (
     move,
     numbers_of,
     on_rails,
+    once,
     released,
     run_moves,
     with_joint,
@@ -50,16 +51,20 @@ AS_BUILT: Mapping[str, Any] = MappingProxyType(
         "drive.current_bandwidth": "2 kHz",
         "drive.encoder_resolution": "1 nm",
         "drive.encoder_noise": "0.5 nm",
+        "drive.relative_noise": "30 nm",
         "rail.seed": 1,
         "rail.static_deviation": 0.2,
         "rail.coulomb_deviation": 0.2,
         "rail.correlation_length": "5 mm",
+        "rail.rolling_pitch": "4 mm",
+        "rail.first_harmonic": 0.05,
+        "rail.second_harmonic": 0.02,
         "cable.stiffness": "5 N/m",
         "cable.drag": "0.1 N*s/m",
     }
 )
-"""The drive by Sec. 3.5.2 (sample time, resolution, peak force); the rest is our choice, as in the example
-thesis_drive.toml."""
+"""The drive by Sec. 3.5.2 (sample time, resolutions, peak force); the rest is our choice. It is that of the example
+thesis_drive.toml, with which `friso rig` runs the same experiments."""
 
 COULOMB_LEVEL = 2.0
 """Over the Coulomb friction of the rig, with the weaker motor: our choice among the levels of
@@ -75,8 +80,11 @@ CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
 DISPLACEMENTS = (-0.05, 0.05)
 """Displacements of the releases over the distance of the move: 5 mm to either side."""
 
-STROKES, LOOPS, GRID_RAILS = np.array([0.02, 0.3, 1.0]), np.array([4.0, 6.0, 8.0, 12.0]) / 8, 2
-"""Strokes over 1 mm and crossovers over 8 Hz of Fig. 26, and the rails of each cell."""
+STROKES, LOOPS = np.array([0.02, 0.1, 0.3, 1.0]), np.array([3.0, 4.0, 5.0, 6.0, 8.0, 12.0]) / 8
+"""Strokes over that of the rig and crossovers over 8 Hz of Fig. 26; each cell has `RAILS`."""
+
+NOISES = (0.1, 0.3, 1.0, 3.0, 10.0)
+"""Noise of the drive's force of Fig. 28, which the thesis does not state, over friso's choice."""
 
 
 @dataclass(frozen=True)
@@ -124,8 +132,8 @@ def moves(stage: Stage) -> MovesOnRails:
 
 
 def grid(stage: Stage) -> StrokeCrossover:
-    """Fig. 26: a small grid on a few rails."""
-    seeds = 1.0 + np.arange(float(GRID_RAILS))
+    """Fig. 26: strokes and crossovers, on all rails."""
+    seeds = 1.0 + np.arange(float(RAILS))
     return stroke_crossover(with_joint(rig_with_drive(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
 
 
@@ -145,12 +153,40 @@ def cycles(stage: Stage) -> CyclesOnRails:
     return CyclesOnRails(run, rails, asymmetry, started(even, SEED, changes, 1, silent, ""))
 
 
-_FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")
+_FIELD = tuple(key.removeprefix("rail.") for key in AS_BUILT if key.startswith("rail.") and key != "rail.seed")
 
 
 def standstill(stage: Stage) -> InPosition:
     """Fig. 28."""
-    return in_position(rig_with_drive(stage), SEED, silent)[0]
+    return in_position(rig_with_drive(stage), SEED, silent, NOISES)[0]
+
+
+@dataclass(frozen=True)
+class RailTraces:
+    """What the drive logs of single moves on the rail of the lowest seed, and on an even one: time [s], shape (n,), and
+    the position less the end of the move [m], by joint and crossover [Hz] and by rail, each of shape (n,); the
+    `distance` of the move [m]."""
+
+    time: np.ndarray
+    moves: Mapping[tuple[str, float], np.ndarray]
+    rails: Mapping[str, np.ndarray]
+    distance: float
+
+
+def traces(stage: Stage) -> RailTraces:
+    """Fig. 24, 25 and 27 in time."""
+    machine = rig_with_drive(stage)
+    frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
+    held, loose = (with_joint(machine, locked) for locked in (True, False))
+    key = CROSSOVER
+    locked = once(held, task, [SEED] * len(frequencies), {key: frequencies})
+    free = once(loose, task, [SEED], {key: frequencies[:1]})
+    even = once(on_rail(held), task, [SEED])
+    logged = locked.logged["position"] - length
+    moves = {("locked", float(f)): row for f, row in zip(frequencies, logged, strict=True)}
+    moves |= {("free", float(frequencies[0])): free.logged["position"][0] - length}
+    rails = {"even rail": even.logged["position"][0] - length, "rail that varies": logged[0]}
+    return RailTraces(locked.time, moves, rails, length)
 
 
 @dataclass(frozen=True)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Literal
 
 from friso.quantities import percent
+from friso.stage import Stage
+from friso.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,13 +34,17 @@ FEW = 0.05
 TREND = 0.5
 """Rank correlation (Spearman) from which there is a "trend"."""
 
+SAME = 0.15
+"""Share within which numbers are “the same”."""
+
 CONVENTIONS = (
     f"Words have the same meaning in all claims: “about” is within a factor of {ABOUT:g}, “of the order of” within a "
-    f"factor of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(FEW)} of a map, a "
-    f"“trend” is a rank correlation of at least {TREND:g}. A cell of a map “keeps moving” where peaks are counted "
-    "after its run (Sec. 3.2.2; where the method is varied: where the run swings at its end), else it “comes to "
-    "rest”. A “limit” lies halfway from the last cell that keeps moving to the next, with none that keeps moving "
-    "beyond it."
+    f"factor of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(FEW)} of a map, “the "
+    f"same” is within {percent(SAME)}, a “trend” is a rank correlation of at least {TREND:g}. Whether a cell of a map "
+    "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
+    "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
+    "as far as it does in all three ways. A “limit” lies between the last cell that keeps moving and the next, where "
+    "the swing, interpolated in its logarithm, falls below what counts; none beyond it keeps moving."
 )
 """How the criteria read the words of the claims: one reading for all."""
 
@@ -55,6 +61,14 @@ class Claim:
     id: str
     where: str
     text: str
+    section: str
+    listed: bool = True
+    """Whether it is in the list of claims that the project began with; others were found by reading on."""
+
+    @property
+    def place(self) -> tuple[int, ...]:
+        """Where the thesis makes it, by section, to sort by."""
+        return tuple(int(number) for number in self.section.split("."))
 
 
 @cache
@@ -68,31 +82,50 @@ def claims() -> tuple[Claim, ...]:
 class Part:
     """One testable statement of a claim: the criterion in words, whether it is met, and the number found.
 
-    `why` is the reason found where it is not met.
+    `why` is the reason found where it is not met. `printed` is a number that the thesis prints and `read` the same as
+    friso finds it, both in the same unit, NaN where there is none. A `self_test` checks that friso finds what friso
+    entered: it says nothing of the thesis, and counts for no judgement.
     """
 
     criterion: str
     holds: bool
     number: str
     why: str = ""
+    printed: float = math.nan
+    read: float = math.nan
+    self_test: bool = False
+
+
+@dataclass(frozen=True)
+class FindingTable:
+    """Numbers of a finding that a sentence would bury: columns, and rows of as many texts."""
+
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """How a claim was judged."""
+    """How a claim was judged, with a table of what was found where it has one."""
 
     parts: tuple[Part, ...]
+    table: FindingTable | None = None
+
+    @property
+    def judged(self) -> tuple[Part, ...]:
+        """The parts that say something of the thesis."""
+        return tuple(part for part in self.parts if not part.self_test)
 
     @property
     def pattern(self) -> tuple[bool, ...]:
-        """Which parts hold."""
-        return tuple(part.holds for part in self.parts)
+        """Which of these hold."""
+        return tuple(part.holds for part in self.judged)
 
     @property
     def judgement(self) -> Judgement:
-        """ "holds" if all parts are met, "differs" if none is, else "holds in part"."""
-        met = sum(part.holds for part in self.parts)
-        return "holds" if met == len(self.parts) else "holds in part" if met else "differs"
+        """ "holds" if all of these are met, "differs" if none is, else "holds in part"."""
+        met = sum(self.pattern)
+        return "holds" if met == len(self.pattern) else "holds in part" if met else "differs"
 
 
 def number_text(value: float, form: str = ".3g", unit: str = "") -> str:
@@ -112,12 +145,13 @@ class Response:
 @dataclass(frozen=True)
 class Evidence:
     """What a judge may look at: maps by study name, responses by name, the linear analysis of the rig, and the
-    identification of it by experiments, each None where that was not made."""
+    identification of it by experiments, each None where that was not made; and the rig itself."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
     linear: Linear | None = None
     identified: Experiments | None = None
+    rig: Stage = field(default_factory=thesis_rig)
 
     @property
     def analysis(self) -> Linear:

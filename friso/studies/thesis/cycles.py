@@ -3,21 +3,24 @@ peak count with what attracts."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from friso.hunting.boundary import KeyRange, Kind, Space, plane
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
+from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.studies import ThesisStudy
+from friso.studies.thesis.ways import by_attraction, by_peak_count
 
 if TYPE_CHECKING:
     import xarray as xr
 
-EVERY = 2
-"""The stage is surveyed at every so many values of each axis, to compare what attracts it with the peak count."""
+SURVEYED = 14
+"""The stage is surveyed at about so many values of each axis: a cell takes a hundred runs."""
 
 NODES = 9
 """Stages along either axis from which curves are looked for."""
@@ -59,21 +62,70 @@ class CyclesOnMap:
     comparison: PeaksAgainstCycles
 
 
-def map_cycles(study: ThesisStudy, runs: xr.Dataset) -> CyclesOnMap:
-    """The hunting cycles over a map of the thesis, from the study and its runs."""
-    return CyclesOnMap(_edges(study, runs), _comparison(runs))
+@dataclass(frozen=True)
+class Surveyed:
+    """Some of the cells of a map, evenly spread; whether anything attracts their stages, and whether that is
+    certain, of the shape of the runs."""
+
+    runs: xr.Dataset
+    attracts: np.ndarray
+    decided: np.ndarray
+
+    @property
+    def attracted(self) -> xr.Dataset:
+        """The runs by what attracts their stages."""
+        return by_attraction(by_peak_count(self.runs), self.attracts, self.decided)
 
 
-def _comparison(runs: xr.Dataset) -> PeaksAgainstCycles:
-    coarse = runs.isel(dict.fromkeys(runs.dims, slice(None, None, EVERY)))
+def map_cycles(study: ThesisStudy, runs: xr.Dataset, surveyed: Surveyed, kept: Kept = NOT_KEPT) -> CyclesOnMap:
+    """The hunting cycles over a map of the thesis, from the study, its runs and what was surveyed of them."""
+    ends = [(name, float(runs[name].values[0]), float(runs[name].values[-1])) for name in runs.dims]
+    about = ("edges", runs.attrs["stage"], runs.attrs["links"], ends)
+    arrays = kept.flags(about, lambda: _as_arrays(_edges(study, runs)))
+    return CyclesOnMap(_from_arrays(arrays), _comparison(surveyed))
+
+
+def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
+    """Edges as arrays by number and name."""
+    return {f"{n}.{key}": np.asarray(value) for n, edge in enumerate(edges) for key, value in vars(edge).items()}
+
+
+def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
+    count = len(arrays) // 4
+    whole = ({key: arrays[f"{n}.{key}"] for key in ("kind", "symmetric", "x", "y")} for n in range(count))
+    return tuple(Edge(cast("Kind", str(edge["kind"])), bool(edge["symmetric"]), edge["x"], edge["y"]) for edge in whole)
+
+
+def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:
+    """What attracts the stages of a map."""
+    coarse = runs.isel({name: slice(None, None, every(size)) for name, size in runs.sizes.items()})
+    axes = [(name, coarse[name].values.tolist()) for name in coarse.dims]
+    flags = kept.flags(("survey", coarse.attrs["stage"], coarse.attrs["links"], axes), lambda: _survey(coarse))
+    shape = coarse["outcome"].shape
+    return Surveyed(coarse, flags["attracts"].reshape(shape), flags["decided"].reshape(shape))
+
+
+def every(values: int) -> int:
+    """Of so many values of an axis each of this many is surveyed."""
+    return max(1, round((values - 1) / (SURVEYED - 1)))
+
+
+def _survey(coarse: xr.Dataset) -> dict[str, np.ndarray]:
     study = study_of(coarse)
     valid = (coarse["outcome"].values != "invalid").ravel()
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
-    for _, cells, survey in cell_attractors(parts, valid):
-        attracts[cells], decided[cells] = (False, True) if survey is None else (survey.attracts, survey.decided)
-    peaks = coarse["keeps_moving"].values.ravel()
-    decided &= valid
+    for _, cells, attractors in cell_attractors(parts, valid):
+        attracts[cells], decided[cells] = (
+            (False, True) if attractors is None else (attractors.attracts, attractors.decided)
+        )
+    return {"attracts": attracts, "decided": decided & valid}
+
+
+def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
+    runs, attracts, decided = by_peak_count(surveyed.runs), surveyed.attracts, surveyed.decided
+    valid = runs["outcome"].values != "invalid"
+    peaks = runs["keeps_moving"].values
     return PeaksAgainstCycles(
         cells=int(valid.sum()),
         both=int((decided & attracts & peaks).sum()),

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
 from types import MappingProxyType
 from typing import Any
@@ -28,12 +28,14 @@ from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.thesis.as_built import (
     CyclesOnRails,
     MovesOnRails,
+    RailTraces,
     RigLoops,
     cycles,
     grid,
     moves,
     rig_loops,
     standstill,
+    traces,
 )
 from friso.studies.thesis.linear import PartNeeded
 from friso.studies.thesis.studies import LOCKED
@@ -105,22 +107,6 @@ class ConstantSpeed:
     result: FrictionPosition
 
 
-@dataclass(frozen=True)
-class Experiments:
-    """What all of them find of one rig; the constant speeds with the joint free, and locked; the loops with its drive
-    as built."""
-
-    locked_line: LockedLine
-    joint_steps: JointSteps
-    slow_motion: tuple[SlowMotion, ...]
-    constant_speed: tuple[ConstantSpeed, ConstantSpeed]
-    moves: MovesOnRails
-    grid: StrokeCrossover
-    cycles: CyclesOnRails
-    standstill: InPosition
-    rig_loops: RigLoops
-
-
 LINE, STEPPED, SLIPS, SPEEDY = "locked_line", "joint_steps", "slow_motion", "constant_speed"
 """The experiments by name, as a judge needs them."""
 
@@ -129,6 +115,9 @@ BUILT = "rig_loops"
 
 MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
 """Those of the rig as built (Sec. 4.3.2)."""
+
+TRACES = "traces"
+"""Single moves of the rig as built, which are shown and not judged."""
 
 EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
     {
@@ -146,18 +135,70 @@ EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
 """What of the stage file plays no part: the first is without its controller, and all have motions of their own."""
 
 
-def experiments_on(stage: Stage) -> Experiments:
-    """All experiments on a rig."""
-    return Experiments(**{name: experiment(name, stage) for name in EXPERIMENTS})
+class Experiments:
+    """The experiments on one rig, each run when it is first asked for; the constant speeds are with the joint free, and
+    locked; the loops with its drive as built."""
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage_file = stage.to_toml()
+
+    @property
+    def locked_line(self) -> LockedLine:
+        """Fig. 17."""
+        return self._result(LINE)
+
+    @property
+    def joint_steps(self) -> JointSteps:
+        """Fig. 19."""
+        return self._result(STEPPED)
+
+    @property
+    def slow_motion(self) -> tuple[SlowMotion, ...]:
+        """Fig. 20."""
+        return self._result(SLIPS)
+
+    @property
+    def constant_speed(self) -> tuple[ConstantSpeed, ConstantSpeed]:
+        """Fig. 21."""
+        return self._result(SPEEDY)
+
+    @property
+    def rig_loops(self) -> RigLoops:
+        """Fig. 17, 18, 22, 23."""
+        return self._result(BUILT)
+
+    @property
+    def moves(self) -> MovesOnRails:
+        """Fig. 24, 25."""
+        return self._result(MOVES)
+
+    @property
+    def grid(self) -> StrokeCrossover:
+        """Fig. 26."""
+        return self._result(GRID)
+
+    @property
+    def cycles(self) -> CyclesOnRails:
+        """Fig. 27."""
+        return self._result(ON_RAILS)
+
+    @property
+    def standstill(self) -> InPosition:
+        """Fig. 28."""
+        return self._result(STANDSTILL)
+
+    @property
+    def traces(self) -> RailTraces:
+        """Fig. 24, 25, 27 in time."""
+        return self._result(TRACES)
+
+    def _result(self, name: str) -> Any:
+        return _experiment(name, self._stage_file)
 
 
-def experiment(name: str, stage: Stage) -> Any:
-    """The field `name` of `Experiments`; kept, since every reproduction asks for the same rigs."""
-    return _experiment(name, stage.to_toml())
-
-
-@cache
+@lru_cache(maxsize=64)
 def _experiment(name: str, stage_file: str) -> Any:
+    """Kept, since judges and figures ask for the same."""
     return _RUNS[name](loads(stage_file))
 
 
@@ -235,5 +276,6 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
         GRID: grid,
         ON_RAILS: cycles,
         STANDSTILL: standstill,
+        TRACES: traces,
     }
 )

@@ -15,9 +15,11 @@ from friso.stage import Stage
 from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, measure_friction
 from friso.studies.laws.verdicts import kept_laws
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
+from friso.studies.thesis.evidence import RESPONSES, maps_of, run_response
 from friso.studies.thesis.linear import analysed
-from friso.studies.thesis.reproduce import RESPONSES, Reproduction, maps_of, run_response
+from friso.studies.thesis.reproduce import Reproduction
 from friso.studies.thesis.studies import STUDIES, thesis_rig
+from friso.studies.thesis.ways import by_peak_count, by_way
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,7 +102,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
 
 
 def _evidence(maps: Mapping[str, xr.Dataset], responses: Mapping[str, Response], stage: Stage) -> Evidence:
-    return Evidence(maps, responses, analysed(stage))
+    return by_way(Evidence(maps, responses, analysed(stage), rig=stage), by_peak_count)
 
 
 def _apart(rig: Stage, conversion: LawConversion) -> LawConversion:

@@ -23,22 +23,41 @@ def verdict_table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray
 
 
 def peak_counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
-    """Counts of distinct peaks, shape (rows, columns)."""
-    return runs["distinct_peaks"].transpose(rows, columns).values
+    """Counts of peaks, shape (rows, columns)."""
+    return runs["count"].transpose(rows, columns).values
 
 
-def ends(values: np.ndarray, moving: np.ndarray) -> np.ndarray:
+def sizes(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray | None:
+    """Swings at the end over what counts as one, shape (rows, columns); None of a map that has none."""
+    return runs["size"].transpose(rows, columns).values if "size" in runs else None
+
+
+def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
     """For each column of `moving`, shape (n, columns), the value beyond which no run keeps moving.
 
-    `values` ascend, shape (n,). The limit lies halfway from the last that keeps moving to the next. Where it is outside
-    the range, the end of the range stands for it."""
-    steps = np.concatenate((values[:1], (values[:-1] + values[1:]) / 2, values[-1:]))
-    return np.array([steps[np.flatnonzero(column)[-1] + 1] if column.any() else steps[0] for column in moving.T])
+    `values` ascend, shape (n,). The limit lies between the last that keeps moving and the next, where the `size` of
+    their swings, interpolated in its logarithm, is 1; halfway where no sizes are known, or both are on one side.
+    Where it is outside the range, the end of the range stands for it."""
+    last = np.where(moving.any(axis=0), len(values) - 1 - np.argmax(moving[::-1], axis=0), -1)
+    after = np.minimum(last + 1, len(values) - 1)
+    share = np.full(last.shape, 0.5)
+    if size is not None:
+        columns = np.arange(len(last))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inside, outside = (np.log(np.maximum(size[row, columns], LEAST)) for row in (last, after))
+            between = inside / (inside - outside)
+        share = np.where((inside > 0) & (outside < 0), between, share)
+    within = values[last] + share * (values[after] - values[last])
+    return np.where(last < 0, values[0], within)
 
 
-def begins(values: np.ndarray, moving: np.ndarray) -> np.ndarray:
+def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
     """As `ends`, but the value below which no run keeps moving yet."""
-    return -ends(-values[::-1], moving[::-1])
+    return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
+
+
+LEAST = 1e-9
+"""Swing over what counts as one, below which none is told from rest."""
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:

@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.engine.simulate import simulate
 from friso.errors import InputError
 from friso.frequency.bode import Bode, bode
-from friso.hunting.criteria.peak_count import DISTINCT_CRITERION
-from friso.hunting.criteria.run_outcome import CREEPS, CRITERION, RESTS, SWINGS
 from friso.progress import Progress, Tally, silent
-from friso.studies.sweep import sweep
+from friso.quantities import quoted
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
-from friso.studies.thesis.cycles import CyclesOnMap, map_cycles
-from friso.studies.thesis.experiments import EXPERIMENTS, experiment, experiments_on
-from friso.studies.thesis.judges.shares import NARROW, WIDE
-from friso.studies.thesis.linear import NEEDS, Linear, analysed
-from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
-from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, thesis_rig
+from friso.studies.thesis.cycles import CyclesOnMap, Surveyed, map_cycles, survey
+from friso.studies.thesis.evidence import RESPONSES, evidence, map_of
+from friso.studies.thesis.experiments import EXPERIMENTS, Experiments
+from friso.studies.thesis.kept import NOT_KEPT, Kept
+from friso.studies.thesis.linear import NEEDS, Linear
+from friso.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
+from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
+from friso.studies.thesis.ways import COUNT, CYCLE, by_peak_count, by_way, weakest
 
 if TYPE_CHECKING:
     import xarray as xr
 
-POINTS = 41
-"""Values per axis: 0.4 Hz apart in Fig. 16."""
+POINTS, MOST_POINTS = 41, 1001
+"""Values per axis: 0.4 Hz apart in Fig. 16; at most, a million cells in every map."""
+
+MOST_DRAWS = 10_000
+
+RTOL = 1e-4
+"""The thesis's relative tolerance (Sec. 3.2.3)."""
 
 VERIFIED = 0.05
 """Share of the cells of a shown map that are run again at a tighter tolerance."""
@@ -36,37 +40,36 @@ VERIFIED = 0.05
 TIGHT = 1e-8
 """Second relative tolerance for Fig. 14B, besides the thesis's own."""
 
-RESPONSES: Mapping[str, Mapping[str, object]] = {
-    "locked": LOCKED,
-    WIDE: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "0.5 N"},
-    NARROW: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "1.5 N"},
-}
-"""The runs shown in time, Fig. 5 and 13: what each changes in the rig."""
-
 SHOWN = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
-_PARTS = {**NEEDS, **EXPERIMENTS}
-"""What every evidence has besides maps and responses."""
+SURVEY_WORK, PART_WORK = 20_000, 4000
+"""Steps of the progress, of which a run counts one: what attracts the stages of a map; a part of the linear analysis or
+an experiment."""
 
 
 @dataclass(frozen=True)
 class Reproduction:
     """All results.
 
-    Maps by study name and responses by name; the linear analysis of the rig, and in `bode` its curves over the
-    frequency; the map of Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one
-    of them only, and whose peak count differs between them (NaN if not computed); a verdict per claim; the hunting
-    cycles behind each map by study name; values per axis of the maps (`points`), which are those of every variant too.
+    Maps by study name and responses by name, judged by the thesis's count; the linear analysis of the rig, and in
+    `bode` its curves over the frequency, and the experiments, each None where no claim of this run needs it, with the
+    names of those that were made (`experimented`); the map of
+    Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one of them only, and whose
+    peak count differs between them (NaN if not computed); a verdict per claim; the claims over the joint draws of what
+    the thesis leaves open; the hunting cycles behind each map by study name; values per axis of the maps (`points`).
     """
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
-    linear: Linear
-    bode: Bode
+    linear: Linear | None
+    bode: Bode | None
+    experiments: Experiments | None
+    experimented: frozenset[str]
     tolerances: Mapping[float, xr.Dataset]
     changed: tuple[float, float]
     verdicts: tuple[Verdict, ...]
+    plausible: Plausible
     cycles: Mapping[str, CyclesOnMap]
     points: int
     rtol: float
@@ -78,134 +81,175 @@ def reproduce(
     rtol: float = 1e-6,
     progress: Progress = silent,
     with_cycles: bool = True,
+    draws: int = DRAWS,
+    only: Iterable[str] | None = None,
+    kept: Kept = NOT_KEPT,
 ) -> Reproduction:
-    """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims.
+    """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims, or `only`
+    some of them, with what these need.
 
-    A claim that needs a study left out is "not yet covered". `with_cycles` the hunting cycles behind every map are
-    computed too, which takes several times as long as all the maps. `progress` is called with steps done, steps in all
-    and what comes next. Raises InputError for an unknown study or too few points, ValueError for an unusable rtol.
+    A claim that is left out is "not yet covered". `with_cycles` the hunting cycles behind every map are computed too,
+    the third way in which its claims are judged; with `draws` every claim is judged in as many joint draws of the
+    values that the thesis leaves open. What is `kept` of an earlier run is not computed again. `progress` is called
+    with steps done, steps in all and what comes next. Raises InputError for an unknown study or claim and for numbers
+    that are too low or too high, ValueError for an unusable rtol.
     """
-    studies = _chosen(names)
-    if points < 3:
-        raise InputError("points", str(points), "3 or more values per axis", "41")
-    variants = (*OPEN, *METHOD)
-    tally = Tally(progress, 2 + len(variants) + (len(studies) if with_cycles else 0))
-    tally.add(0, "maps")
-    responses = {name: run_response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
-    maps = maps_of(studies, points, rtol, VERIFIED)
-    baseline = Evidence(maps, responses, analysed(thesis_rig()), experiments_on(thesis_rig()))
-    tally.add(1, "Fig. 14B at two tolerances")
-    tolerances = {
-        tolerance: _map(s, NOTHING, points, tolerance)
-        for s in studies
-        if s.panel == "14B"
-        for tolerance in (RTOL, TIGHT)
+    chosen, asked = _studies(names), _claims(only)
+    _check("points", points, 3, MOST_POINTS, "41")
+    _check("draws", draws, 0, MOST_DRAWS, str(DRAWS))
+    entries = {
+        name: entry
+        for name, entry in registered().items()
+        if (asked is None or name in asked) and not {n for n in entry.needs if n in STUDIES} - chosen.keys()
     }
-    entries = {claim: entry for claim, entry in registered().items() if not _missing(entry, baseline)}
-    varied: list[tuple[Variant, Mapping[str, Finding]]] = []
-    for variant in variants:
-        tally.add(1, f"{variant.parameter} {variant.value}")
-        varied.append((variant, _findings(entries, _with_variant(studies, points, rtol, variant, baseline))))
+    needs = _needs(entries, chosen, asked)
+    studies = {name: study for name, study in chosen.items() if name in needs}
+    parts = sorted(needs & PARTS.keys())
+    cells, coarse = points**2, (-(-points // 2)) ** 2
+    total = len(studies) * (cells + coarse) + PART_WORK * len(parts) + work_of(entries, draws)
+    total += with_cycles * SURVEY_WORK * len(studies) + 2 * cells * ("isolator-damping" in studies)
+    tally = Tally(progress, total)
+    tally.add(0, "responses")
+    base = evidence(needs - STUDIES.keys(), points, rtol, kept=kept)
+    maps: dict[str, xr.Dataset] = {}
+    loose: dict[str, xr.Dataset] = {}
+    for name, study in studies.items():
+        maps[name] = map_of(study, points, rtol, VERIFIED, kept=kept)
+        tally.add(cells, f"map {study.panel}")
+        loose[name] = map_of(study, -(-points // 2), RTOL, kept=kept)
+        tally.add(coarse, f"map {study.panel} at the thesis's tolerance")
+    base = replace(base, maps=maps)
+    tolerances = _tolerances(studies, points, kept, tally)
+    for part in parts:
+        if part in EXPERIMENTS:
+            getattr(base.experiments, part)
+        tally.add(PART_WORK, part.replace("_", " "))
+    surveyed: dict[str, Surveyed] = {}
     behind: dict[str, CyclesOnMap] = {}
-    for study in studies if with_cycles else ():
-        tally.add(1, f"hunting cycles, {study.name}")
-        behind[study.name] = map_cycles(study, baseline.maps[study.name])
-    tally.add(1, "done")
-    verdicts, curves = _verdicts(entries, baseline, varied), bode(thesis_rig(), SHOWN, series=True)
-    results = (baseline.maps, baseline.responses, baseline.analysis, curves)
-    return Reproduction(*results, tolerances, _changed(tolerances), verdicts, behind, points, rtol)
+    for name, study in studies.items() if with_cycles else ():
+        surveyed[name] = survey(maps[name], kept)
+        behind[name] = map_cycles(study, maps[name], surveyed[name], kept)
+        tally.add(SURVEY_WORK, f"what attracts, map {study.panel}")
+    ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
+    own = {name: findings[COUNT] for name, findings in ways.items()}
+    space = plausible(entries, draws, own, kept, tally)
+    others = _others(entries, base, loose)
+    verdicts = tuple(_verdict(claim, entries, ways, space, others, chosen) for claim in claims())
+    curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
+    shown = by_way(base, by_peak_count)
+    return Reproduction(
+        shown.maps, shown.responses, base.linear, curves, base.identified if parts else None,
+        frozenset(parts) & EXPERIMENTS.keys(), tolerances,
+        _changed(tolerances), verdicts, space, behind, points, rtol,
+    )  # fmt: skip
 
 
-def _verdicts(
-    entries: Mapping[str, Registered], baseline: Evidence, varied: Sequence[tuple[Variant, Mapping[str, Finding]]]
-) -> tuple[Verdict, ...]:
-    fine, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
-    return tuple(_judge(claim, baseline, fine, coarse, varied) for claim in claims())
+def _verdict(
+    claim: Claim,
+    entries: Mapping[str, Registered],
+    ways: Mapping[str, Mapping[str, Finding]],
+    space: Plausible,
+    others: Mapping[str, Mapping[str, Finding]],
+    chosen: Mapping[str, ThesisStudy],
+) -> Verdict:
+    if claim.id not in entries:
+        entry = registered().get(claim.id)
+        missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys()) if entry else []
+        reason = ", ".join(missing) or "this claim was not asked for"
+        return not_covered(claim, f"not computed in this run: {reason}" if entry else "no judge decides on it")
+    findings = ways[claim.id]
+    return verdict(
+        claim,
+        entries[claim.id].figure,
+        findings,
+        weakest(findings),
+        space.claims.get(claim.id),
+        {name: by_claim[claim.id] for name, by_claim in others.items() if claim.id in by_claim},
+    )
 
 
-def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
+def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
+    """The findings of a judge in all the ways in which its evidence can be read."""
+    findings, maps = ways_of(entry, base), entry.needs & STUDIES.keys()
+    if maps and maps <= surveyed.keys():
+        attracted = {name: surveyed[name].attracted for name in maps}
+        lasting = by_way(replace(base, maps={}), by_peak_count)
+        findings[CYCLE] = entry.judge(replace(lasting, maps=attracted))
+    return findings
+
+
+def _others(
+    entries: Mapping[str, Registered], base: Evidence, loose: Mapping[str, xr.Dataset]
+) -> dict[str, dict[str, Finding]]:
+    """The findings on maps of every second value of each axis, and on those at the thesis's tolerance, by the two ways
+    that need the runs alone."""
+    grids = {
+        "every second value of each axis": {name: _second(runs) for name, runs in base.maps.items()},
+        f"the thesis's relative tolerance, {RTOL:g},": dict(loose),
+    }
+    return {
+        method: {
+            name: _two(entry, replace(base, maps=maps))
+            for name, entry in entries.items()
+            if entry.needs & STUDIES.keys()
+        }
+        for method, maps in grids.items()
+    }
+
+
+def _two(entry: Registered, base: Evidence) -> Finding:
+    return weakest(ways_of(entry, base))
+
+
+def _second(runs: xr.Dataset) -> xr.Dataset:
+    """Every second value of each axis; of less than five values all."""
+    return runs.isel(dict.fromkeys(runs.dims, slice(None, None, 2))) if min(runs.sizes.values()) >= 5 else runs
+
+
+def _needs(
+    entries: Mapping[str, Registered], chosen: Mapping[str, ThesisStudy], asked: frozenset[str] | None
+) -> set[str]:
+    """What is computed: what the claims need, and all studies and responses where none is asked for by name."""
+    needs = {need for entry in entries.values() for need in entry.needs}
+    return needs if asked is not None else needs | chosen.keys() | RESPONSES.keys() | NEEDS.keys()
+
+
+def _tolerances(studies: Mapping[str, ThesisStudy], points: int, kept: Kept, tally: Tally) -> dict[float, xr.Dataset]:
+    """The map of Fig. 14B at the thesis's tolerance and a tight one."""
+    maps = {}
+    for study in studies.values():
+        for tolerance in (RTOL, TIGHT) if study.panel == "14B" else ():
+            maps[tolerance] = by_peak_count(map_of(study, points, tolerance, kept=kept))
+            tally.add(points**2, f"map 14B at {tolerance:g}")
+    return maps
+
+
+def _studies(names: Iterable[str] | None) -> dict[str, ThesisStudy]:
     if names is None:
-        return tuple(STUDIES.values())
+        return dict(STUDIES)
     chosen = list(names)
     for name in chosen:
         if name not in STUDIES:
-            raise InputError("study", repr(name), f"one of {', '.join(STUDIES)}", "path")
-    return tuple(study for name, study in STUDIES.items() if name in chosen)
+            raise InputError("study", quoted(name), f"one of {', '.join(STUDIES)}", "path")
+    return {name: study for name, study in STUDIES.items() if name in chosen}
 
 
-def _coarser(evidence: Evidence) -> Evidence:
-    """The evidence with every second value of each axis of the maps, which shows what hangs on the grid; maps of less
-    than five values stay."""
-    second = slice(None, None, 2)
-    maps = {
-        name: runs.isel(dict.fromkeys(runs.dims, second)) if min(runs.sizes.values()) >= 5 else runs
-        for name, runs in evidence.maps.items()
-    }
-    return replace(evidence, maps=maps)
+def _claims(only: Iterable[str] | None) -> frozenset[str] | None:
+    """The claims asked for, whatever their case; all where none is."""
+    if only is None:
+        return None
+    ids = {claim.id.upper(): claim.id for claim in claims()}
+    chosen = set()
+    for name in only:
+        if name.upper() not in ids:
+            raise InputError("only", quoted(name), f"a claim, one of {', '.join(ids.values())}", "only=F15B")
+        chosen.add(ids[name.upper()])
+    return frozenset(chosen)
 
 
-def _missing(entry: Registered, evidence: Evidence) -> list[str]:
-    return sorted(entry.needs - evidence.maps.keys() - evidence.responses.keys() - _PARTS.keys())
-
-
-def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str, Finding]:
-    return {claim: entry.judge(evidence) for claim, entry in entries.items()}
-
-
-def _with_variant(
-    studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence
-) -> Evidence:
-    """The evidence with one variant; what it does not touch is the baseline's."""
-    tolerance = variant.rtol or rtol
-    touched = [study for study in studies if variant.touches(study)]
-    maps = {**plain.maps, **maps_of(touched, points, tolerance, changes=variant.changes)}
-    responses = {name: run_response(changes, variant.changes, tolerance) for name, changes in RESPONSES.items()}
-    if variant.kind == "metric":
-        maps = {name: lasting(runs) for name, runs in maps.items()}
-        responses = {name: Response(lasting(response.cell), response.trace) for name, response in responses.items()}
-    stage, linear = thesis_rig().replace(dict(variant.changes)), plain.linear
-    if any(variant.touches_part(need) for need in NEEDS.values()):
-        linear = analysed(stage)
-    other = {name: experiment(name, stage) for name, need in EXPERIMENTS.items() if variant.touches_part(need)}
-    return Evidence(maps, responses, linear, replace(plain.experiments, **other))
-
-
-def maps_of(
-    studies: Iterable[ThesisStudy],
-    points: int,
-    rtol: float,
-    verify: float = 0.0,
-    changes: Mapping[str, object] = NOTHING,
-) -> dict[str, xr.Dataset]:
-    """The maps of some studies by name, `points` values per axis, `changes` being made to the rig before."""
-    return {study.name: _map(study, changes, points, rtol, verify) for study in studies}
-
-
-def _map(
-    study: ThesisStudy, changes: Mapping[str, object], points: int, rtol: float, verify: float = 0.0
-) -> xr.Dataset:
-    runs = sweep(study.stage(changes), study.axes(points), links=dict(study.links), rtol=rtol, verify=verify)
-    return by_peak_count(runs)
-
-
-def run_response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
-    """One run in time; a variant's changes come before the run's own, which distinguish it from the others."""
-    stage = thesis_rig().replace(dict(changes)).replace(dict(own_changes))
-    cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
-    return Response(by_peak_count(cell), simulate(stage, rtol))
-
-
-def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
-    """The runs with `keeps_moving` by the thesis's metric: whether distinct peaks are counted."""
-    return runs.assign(keeps_moving=(runs["distinct_peaks"] > 0).assign_attrs(criterion=DISTINCT_CRITERION))
-
-
-def lasting(runs: xr.Dataset) -> xr.Dataset:
-    """The same by the end of the run: whether it swings there; the peaks of others do not count, but for invalid and
-    failed cells."""
-    swings = (runs["outcome"] == SWINGS).assign_attrs(criterion=CRITERION)
-    ended = runs["outcome"].isin([SWINGS, CREEPS, RESTS])
-    return runs.assign(keeps_moving=swings, distinct_peaks=runs["distinct_peaks"].where(swings | ~ended, 0.0))
+def _check(name: str, value: int, least: int, most: int, example: str) -> None:
+    if not least <= value <= most:
+        raise InputError(name, str(value), f"from {least} to {most}", f"{name}={example}")
 
 
 def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
@@ -214,38 +258,6 @@ def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
     if not tolerances:
         return np.nan, np.nan
     loose, tight = tolerances.values()
-    first, second = loose["distinct_peaks"].values, tight["distinct_peaks"].values
+    first, second = loose["count"].values, tight["count"].values
     other_count = (first != second) & ~(np.isnan(first) & np.isnan(second))
     return float((loose["keeps_moving"] != tight["keeps_moving"]).mean()), float(other_count.mean())
-
-
-def _judge(
-    claim: Claim,
-    baseline: Evidence,
-    fine: Mapping[str, Finding],
-    coarse: Mapping[str, Finding],
-    varied: Iterable[tuple[Variant, Mapping[str, Finding]]],
-) -> Verdict:
-    entry = registered().get(claim.id)
-    if entry is None:
-        return not_covered(claim, "work of a later step")
-    missing = _missing(entry, baseline)
-    if missing:
-        return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
-    findings = [(variant, other[claim.id]) for variant, other in varied if _enters(variant, entry.needs)]
-    return verdict(claim, entry.figure, fine[claim.id], coarse[claim.id], findings)
-
-
-def _enters(variant: Variant, needs: Iterable[str]) -> bool:
-    """Whether a variant changes anything of what is named."""
-    return any(_changes(variant, name) for name in needs)
-
-
-def _changes(variant: Variant, name: str) -> bool:
-    """Whether a variant changes the map, the part of the linear analysis, the experiment or the response named."""
-    if name in STUDIES:
-        return variant.touches(STUDIES[name])
-    if need := _PARTS.get(name):
-        return variant.touches_part(need)
-    response = RESPONSES[name]
-    return variant.changes_more_than(response.keys(), bool(response.get("joint.locked")))

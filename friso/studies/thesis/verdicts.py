@@ -2,35 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
 
+from friso.quantities import percent
+from friso.shares import Share
 from friso.studies.thesis.claims import Claim, Finding, Judgement
-from friso.studies.thesis.open_parameters import Variant
+from friso.studies.thesis.plausible import ClaimInSpace
+from friso.studies.thesis.space import OPEN
 
-_ORDER: dict[Judgement, int] = {"differs": 0, "holds in part": 1, "holds": 2}
+ROBUST = 0.25
+"""Share of the space in which a claim may hold after all, up to which its contradiction is called robust: 13 draws
+without it."""
 
-
-@dataclass(frozen=True)
-class Dependence:
-    """A variant under which other parts hold: its judgement, and the numbers of the parts that turned."""
-
-    variant: Variant
-    judgement: Judgement
-    numbers: tuple[str, ...]
-
-    def __str__(self) -> str:
-        turned = "; ".join(self.numbers)
-        return f"{self.variant.parameter} {self.variant.value}: {self.judgement} ({turned})"
+NO_WAYS: Mapping[str, Finding] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class Verdict:
     """What stands beside a claim; `finding` is None for one that is not covered.
 
-    `depends_on` are the open parameters at which other parts hold than in the baseline, out of the `tried` values that
-    enter its evidence; `hangs_on` the same for tolerance and metric; `grid` says what a coarser grid does to the
-    baseline, empty for nothing.
+    `ways` are the findings by the way in which hunting is judged, of which the finding is the weakest; `space` the
+    claim over joint draws of the values that the thesis leaves open, None where none enters or no draw was made;
+    `turned` is what a coarser grid, or the thesis's tolerance, does to the judgement.
     """
 
     claim: Claim
@@ -38,37 +33,60 @@ class Verdict:
     figure: str
     finding: Finding | None
     reason: str
-    depends_on: tuple[Dependence, ...] = ()
-    hangs_on: tuple[Dependence, ...] = ()
-    grid: str = ""
-    tried: int = 0
+    ways: Mapping[str, Finding] = field(default_factory=lambda: NO_WAYS)
+    space: ClaimInSpace | None = None
+    turned: tuple[str, ...] = ()
+
+    @property
+    def contradiction(self) -> str:
+        """Of a claim that does not hold: "arbitrary" where it does in some draw, "robust" where it does in none and its
+        share is at most `ROBUST` by its interval, else "open": too few draws tell; empty of one that holds."""
+        if self.finding is None or self.judgement == "holds":
+            return ""
+        if self.space is None:
+            return "open"
+        if self.space.count:
+            return "arbitrary"
+        return "robust" if self.space.holds.high <= ROBUST else "open"
 
     @property
     def dependence(self) -> str:
-        """One sentence on the open parameters, and one on tolerance and metric where they matter."""
+        """In which share of the space it holds, and on what that hangs."""
         if self.finding is None:
             return ""
-        opened = "No open parameter of the thesis enters this claim."
-        if self.tried:
-            turns = (
-                f"the judgement changes with {_by_parameter(self.depends_on)}"
-                if self.depends_on
-                else "no judgement changes"
+        if self.space is None:
+            sentence = "No joint draws of the values that the thesis leaves open were made for this claim."
+        else:
+            sentence = f"By the runs it holds in {share_text(self.space.holds, self.space.count, self.space.draws)}"
+            sentence += (
+                f", {percent(self.space.undecided / self.space.draws)} undecided" if self.space.undecided else ""
             )
-            opened = f"Parameters left open by the thesis, varied one at a time ({self.tried} values): {turns}."
-        return (
-            f"{opened} Method: the judgement changes with {_by_parameter(self.hangs_on)}." if self.hangs_on else opened
-        )
+            sentence += f"{_HANGS[bool(self.space.hangs_on)]}{_listed(self.space)}."
+            sentence += _KINDS.get(self.contradiction, "")
+        return " ".join((sentence, *(f"Method: {text}." for text in self.turned)))
 
 
-def _by_parameter(dependences: Iterable[Dependence]) -> str:
-    """Each parameter once, with what is judged at which value."""
-    by_name: dict[str, list[str]] = {}
-    for dependence in dependences:
-        by_name.setdefault(dependence.variant.parameter, []).append(
-            f"{dependence.variant.value}: {dependence.judgement}"
-        )
-    return "; ".join(f"{name} ({', '.join(values)})" for name, values in by_name.items())
+_HANGS = {True: "; that hangs on ", False: ""}
+_KINDS = {
+    "robust": " The contradiction is robust: no choice of the unstated values tried removes it.",
+    "arbitrary": " The contradiction is arbitrary: other values, as plausible as friso's, remove it.",
+}
+
+
+def share_text(share: Share, count: int, draws: int) -> str:
+    """The share of the joint draws in words."""
+    return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
+
+
+def _listed(space: ClaimInSpace) -> str:
+    """The values on which a claim hangs, the most decisive first."""
+    either = {value.name: value for value in OPEN}
+    words = []
+    for item in space.hangs_on:
+        more = "more" if either[item.value].scale != "either" else "the higher"
+        less = "less" if either[item.value].scale != "either" else "the lower"
+        words.append(f"{item.value} (with {more if item.correlation > 0 else less} it holds, {item.correlation:+.2f})")
+    return ", ".join(words)
 
 
 def not_covered(claim: Claim, reason: str) -> Verdict:
@@ -77,42 +95,31 @@ def not_covered(claim: Claim, reason: str) -> Verdict:
 
 
 def verdict(
-    claim: Claim, figure: str, baseline: Finding, coarse: Finding, varied: Sequence[tuple[Variant, Finding]]
+    claim: Claim,
+    figure: str,
+    ways: Mapping[str, Finding],
+    together: Finding,
+    space: ClaimInSpace | None = None,
+    others: Mapping[str, Finding] = NO_WAYS,
 ) -> Verdict:
-    """The baseline's judgement, and the variants under which other parts hold.
-
-    `varied` has the variants that enter the evidence of the claim, on the grid of the baseline; `coarse` is the
-    baseline on a coarser one, which is mentioned where it changes a part.
-    """
-    depends, hangs = [], []
-    for variant, finding in varied:
-        if finding.pattern != baseline.pattern:
-            dependence = Dependence(variant, finding.judgement, _turned(baseline, finding))
-            (depends if variant.kind == "unknown parameter" else hangs).append(dependence)
-    tried = sum(variant.kind == "unknown parameter" for variant, _ in varied)
-    grid = ""
-    if coarse.pattern != baseline.pattern:
-        grid = f"with every second value of each axis: {coarse.judgement} ({'; '.join(_turned(baseline, coarse))})"
-    reason = _reason(baseline, [*depends, *hangs], grid)
-    return Verdict(claim, baseline.judgement, figure, baseline, reason, tuple(depends), tuple(hangs), grid, tried)
+    """The verdict from the findings of all `ways` and the one that they allow `together`; `others` are findings by
+    another method, by its name, which are mentioned where other parts hold."""
+    turned = tuple(
+        f"with {name} {_change(together, finding)}"
+        for name, finding in others.items()
+        if finding.pattern != together.pattern
+    )
+    reasons = (
+        () if together.judgement == "holds" else dict.fromkeys(p.why for p in together.judged if not p.holds and p.why)
+    )
+    reason = "; ".join(reasons)
+    if not reason and together.judgement != "holds":
+        reason = "no reason was found"
+    return Verdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned)
 
 
-def _turned(first: Finding, second: Finding) -> tuple[str, ...]:
-    """The numbers of the other's parts that hold where the first's do not, or the reverse."""
-    pairs = zip(first.parts, second.parts, strict=True)
-    return tuple(after.number for before, after in pairs if before.holds != after.holds)
-
-
-def _reason(baseline: Finding, other: Sequence[Dependence], grid: str) -> str:
-    """Why a claim does not hold: the variants under which it holds better, by kind, and what the judge found itself."""
-    if baseline.judgement == "holds":
-        return ""
-    better: dict[str, list[str]] = {}
-    for dependence in other:
-        if _ORDER[dependence.judgement] > _ORDER[baseline.judgement]:
-            kind = f"{dependence.variant.kind} ({dependence.judgement} with"
-            better.setdefault(kind, []).append(f"{dependence.variant.parameter} {dependence.variant.value}")
-    named = [f"{kind} {', '.join(values)})" for kind, values in better.items()]
-    reasons = dict.fromkeys(part.why for part in baseline.parts if not part.holds and part.why)
-    text = "; ".join((*named, *reasons, *([grid] if grid else [])))
-    return text or "none of the values tried makes it hold"
+def _change(first: Finding, second: Finding) -> str:
+    """How a finding is judged otherwise, with the numbers of the parts that turned."""
+    pairs = zip(first.judged, second.judged, strict=True)
+    numbers = "; ".join(after.number for before, after in pairs if before.holds != after.holds)
+    return f"the claim is judged: {second.judgement} ({numbers})"

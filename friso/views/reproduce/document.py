@@ -6,15 +6,21 @@ from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from friso.studies.thesis import CONVENTIONS, thesis_rig
+from friso.studies.thesis.space import OPEN, SEED
+from friso.studies.thesis.ways import COUNT, CYCLE, SWING
 from friso.version import VERSION
 from friso.views.documents import plain_json
 from friso.views.drawing.prefixes import listed
 from friso.views.reproduce.laws import laws_document
+from friso.views.reproduce.words import numbers
 
 if TYPE_CHECKING:
+    from friso.shares import Share
     from friso.studies.thesis import Reproduction, Verdict
-    from friso.studies.thesis.claims import Judgement
+    from friso.studies.thesis.claims import Judgement, Part
     from friso.studies.thesis.laws import ConclusionsByLaw
+    from friso.studies.thesis.plausible import ClaimInSpace, Plausible
+    from friso.studies.thesis.space import OpenValue
 
 
 def conclusion(reproduction: Reproduction) -> str:
@@ -53,6 +59,10 @@ def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None
         if tolerances
         else None,
         "cycles": {name: vars(cycles.comparison) for name, cycles in reproduction.cycles.items()},
+        "ways": [COUNT, SWING, CYCLE],
+        "unstated_values": [_open(value) for value in OPEN],
+        "draws": [{"seed": [SEED, draw.number], "values": dict(draw.values)} for draw in reproduction.plausible.draws],
+        "best_fit": _fit(reproduction.plausible),
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
         **({"friction_laws": laws_document(laws)} if laws else {}),
     }
@@ -67,22 +77,60 @@ def _entry(verdict: Verdict) -> dict[str, Any]:
         "judgement": verdict.judgement,
         "figure": verdict.figure or None,
         "number": numbers(verdict) or None,
-        "criterion": "; ".join(part.criterion for part in verdict.finding.parts) if verdict.finding else None,
+        "criterion": "; ".join(part.criterion for part in verdict.finding.judged) if verdict.finding else None,
+        "section": verdict.claim.section,
+        "parts": [_part(part) for part in verdict.finding.judged] if verdict.finding else [],
+        "self_tests": [_part(part) for part in verdict.finding.parts if part.self_test] if verdict.finding else [],
+        "ways": {way: finding.judgement for way, finding in verdict.ways.items()},
         "reason": verdict.reason or None,
-        "values_varied": verdict.tried if verdict.finding else None,
-        "depends_on": [
-            {
-                "kind": dependence.variant.kind,
-                "parameter": dependence.variant.parameter,
-                "value": dependence.variant.value,
-                "judgement": dependence.judgement,
-                "number": "; ".join(dependence.numbers),
-            }
-            for dependence in (*verdict.depends_on, *verdict.hangs_on)
-        ],
+        "contradiction": verdict.contradiction or None,
+        "method": list(verdict.turned),
+        "space": _space(verdict.space) if verdict.space else None,
     }
 
 
-def numbers(verdict: Verdict) -> str:
-    """The numbers of all parts in one line; empty for a claim that is not covered."""
-    return "; ".join(part.number for part in verdict.finding.parts) if verdict.finding else ""
+def _part(part: Part) -> dict[str, Any]:
+    return {
+        "criterion": part.criterion,
+        "holds": part.holds,
+        "number": part.number,
+        "why": part.why or None,
+        "printed": part.printed,
+        "read": part.read,
+    }
+
+
+def _space(space: ClaimInSpace) -> dict[str, Any]:
+    """A claim over the joint draws."""
+    return {
+        "draws": space.draws,
+        "undecided": space.undecided,
+        "holds": space.count,
+        "share": _share(space.holds),
+        "by_way": {way: _share(share) for way, share in space.by_way.items()},
+        "parts": [_share(share) for share in space.parts],
+        "hangs_on": [vars(item) for item in space.hangs_on],
+        "seeds": [list(seed) for seed in space.seeds],
+    }
+
+
+def _share(share: Share) -> dict[str, float]:
+    return {"share": share.probability, "low": share.low, "high": share.high}
+
+
+def _open(value: OpenValue) -> dict[str, Any]:
+    keep = ("name", "low", "high", "unit", "scale", "baseline", "reason")
+    return {name: getattr(value, name) for name in keep} | {"keys": sorted(value.keys)}
+
+
+def _fit(plausible: Plausible) -> dict[str, Any] | None:
+    fit = plausible.fit
+    if fit is None:
+        return None
+    return {
+        "draw": fit.draw.number,
+        "values": dict(fit.draw.values),
+        "misfit": fit.misfit,
+        "misfit_at_baseline": fit.at_baseline,
+        "numbers": [vars(item) for item in fit.numbers],
+    }

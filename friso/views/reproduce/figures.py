@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.criteria import distinct_peaks
+from friso.hunting.criteria import counted_peaks
 from friso.hunting.criteria.peak_count import RULE
 from friso.quantities import percent
 from friso.studies.thesis.judges.shares import NARROW, WIDE
@@ -19,6 +19,7 @@ from friso.views.drawing.figure import GREY, INK, PINK, VERMILLION, Axis, Figure
 from friso.views.map.figures import map_panel
 from friso.views.map.findings import statement
 from friso.views.reproduce.loops import loop_figures
+from friso.views.reproduce.rig_figures import rig_figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -32,6 +33,12 @@ _TITLES = {
     "15": "Isolator: masses; friction forces",
     "16": "Isolator: crossover and stroke at two stiffnesses",
 }
+MARKER = (
+    "The marker is friso's evaluation point: crossover, friction, stiffness and masses as the thesis prints them; "
+    "alpha, beta, path, stroke and limiter damping by friso's choice, since its own markers are not printed in numbers."
+)
+"""What stands below every map."""
+
 _HUNTING = ("edge of the attracting cycle", VERMILLION)
 _PAIR = ("edge of the asymmetric cycles that bound its basin", PINK)
 _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5 and 13
@@ -39,7 +46,9 @@ _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5
 
 def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
     """The figures by their number in the thesis, in its order, those whose studies were run."""
-    figures = {"5": _response(reproduction), "13": _shares(reproduction), **loop_figures(reproduction)}
+    figures = {**_in_time(reproduction), **loop_figures(reproduction)}
+    if reproduction.experiments is not None:
+        figures |= rig_figures(reproduction.experiments, reproduction.experimented)
     figures |= {number: _maps(reproduction, number) for number in _TITLES}
     return {number: figures[number] for number in sorted(figures, key=int) if figures[number].panels}
 
@@ -52,9 +61,10 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
             continue
         letter = study.panel[-1]
         for title, runs in _runs_shown(reproduction, study, letter).items():
-            panels.append(_with_edges(map_panel(runs, "distinct_peaks", study.marker, title), reproduction, study))
-            statements.append(f"{title}. {statement(runs, 'distinct_peaks')}".replace("\n", " "))
+            panels.append(_with_edges(map_panel(runs, "peaks", study.marker, title), reproduction, study))
+            statements.append(f"{title}. {statement(runs, 'peaks')}".replace("\n", " "))
         zeros += [f"{letter}: {study.zeros}"] if study.zeros else []
+    zeros.append(MARKER)
     if number == "14" and reproduction.tolerances:
         verdicts, counts = reproduction.changed
         zeros.append(
@@ -93,6 +103,13 @@ def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> 
     return {f"{letter}: {study.title}": reproduction.maps[study.name]}
 
 
+def _in_time(reproduction: Reproduction) -> dict[str, Figure]:
+    """The figures of single runs, of those that were made."""
+    made = reproduction.responses.keys()
+    figures = {"5": _response(reproduction)} if "locked" in made else {}
+    return figures | ({"13": _shares(reproduction)} if {WIDE, NARROW} <= made else {})
+
+
 def _response(reproduction: Reproduction) -> Figure:
     """Position of the locked rig after the return move, with the counted peaks."""
     response = reproduction.responses["locked"]
@@ -101,7 +118,7 @@ def _response(reproduction: Reproduction) -> Figure:
     late = time >= _SHOWN_FROM
     deviation = (trace["position"] - trace["reference"]).values
     turns = [trace[name].values for name in ("turning_time", "turning_deviation")]
-    (peaks,) = distinct_peaks(turns[0][None], turns[1][None], np.array([turns[0].size]))
+    (peaks,) = counted_peaks(turns[0][None], turns[1][None], np.array([turns[0].size]))
     markers = ()
     if peaks.any():
         markers = (Markers(turns[0][peaks], turns[1][peaks], f"counted peaks: {peaks.sum()}", INK, "triangle"),)

@@ -33,7 +33,9 @@ _SHOWN = {
 
 
 def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
-    """The figures by their number in the thesis."""
+    """The figures by their number in the thesis; none where no linear analysis was made."""
+    if reproduction.linear is None or reproduction.bode is None:
+        return {}
     by_name = {figure.name: figure for figure in bode_figures(reproduction.bode)}
     figures = {
         number: replace(

@@ -6,6 +6,7 @@ import base64
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
@@ -15,21 +16,24 @@ from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report, print_image
-from friso.views.reproduce.document import numbers, reproduce_document
+from friso.views.reproduce import words
+from friso.views.reproduce.document import conclusion, reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
 from friso.views.reproduce.laws import laws_rows, laws_sentences
+from friso.views.reproduce.questions import QUESTIONS, method_rows
+from friso.views.reproduce.summary import save_summary
 
 if TYPE_CHECKING:
     from friso.studies.thesis import Reproduction, Verdict
     from friso.studies.thesis.laws import ConclusionsByLaw
 
-_COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not yet covered": GREY}
+COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not yet covered": GREY}
 
 
 @dataclass(frozen=True)
 class FigureSection:
-    """One figure of the thesis with the verdicts on the claims that it bears out; `figure` is None where the evidence
-    is no drawing."""
+    """One item of the thesis with the verdicts on what it claims there; `figure` is None where the evidence is no
+    drawing."""
 
     key: str
     title: str
@@ -38,19 +42,21 @@ class FigureSection:
 
 
 def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Content]:
-    """The page, the claims, and every figure as PNG and SVG in a folder of its own."""
+    """The page, a summary of one sheet, the claims, and every figure as PNG and SVG in a folder of its own."""
     text = json.dumps(reproduce_document(reproduction, laws), indent=2, ensure_ascii=False, allow_nan=False)
     figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
         "reproduction.html": reproduce_html(reproduction, laws),
+        "summary.pdf": partial(save_summary, reproduction.verdicts, conclusion(reproduction), COLOURS),
         "claims.json": text + "\n",
         **{f"figures/{name}": content for name, content in figures.items()},
     }
 
 
 def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> str:
-    """The whole page: a table of all claims, then the figures with theirs. It opens offline."""
-    parts = sections(reproduction_figures(reproduction), reproduction.verdicts)
+    """The whole page: all claims at a glance, then item by item in the order of the thesis. It opens offline."""
+    verdicts = words.in_order(reproduction.verdicts)
+    parts = sections(reproduction_figures(reproduction), verdicts)
     figures = [section.figure for section in parts if section.figure]
     return Report(
         "reproduce",
@@ -59,10 +65,11 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
         source=thesis_rig().source,
         scripted=bool(figures),
         values={
-            "verdicts": reproduction.verdicts,
-            "counts": _counts(reproduction.verdicts),
-            "colours": _COLOURS,
-            "numbers": numbers,
+            "verdicts": verdicts,
+            "counts": _counts(verdicts),
+            "colours": COLOURS,
+            "words": words,
+            "places": {verdict.claim.id: s.key for s in parts for verdict in s.verdicts},
             "sections": parts,
             "images": {figure.name: _printed(figure) for figure in figures},
             "interactive": {
@@ -73,6 +80,13 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "law_rows": laws_rows(laws) if laws else [],
             "law_sentences": laws_sentences(laws) if laws else [],
             "cycles": [(STUDIES[name], edges.comparison) for name, edges in reproduction.cycles.items()],
+            "self_tests": words.self_tests(verdicts),
+            "open_rows": words.open_rows(),
+            "fit_sentence": words.fit_sentence(reproduction.plausible),
+            "fit_rows": words.fit_rows(reproduction.plausible),
+            "questions": QUESTIONS,
+            "method_rows": method_rows(reproduction),
+            "draws": len(reproduction.plausible.draws),
             "points": reproduction.points,
             "rtol": f"{reproduction.rtol:g}",
         },
@@ -80,21 +94,28 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tuple[FigureSection, ...]:
-    """The figures in their order, then whatever else judges name as evidence; claims that are not covered stand in
-    the table alone. A panel's claims, such as those of "11A", stand with the figure."""
-    groups: dict[str, list[Verdict]] = {number: [] for number in figures}
+    """The items in the order of the verdicts, each figure where its first claim stands, those of no claim at the end;
+    claims that are not covered stand in the table alone. A panel's claims, such as those of "11A", stand with the
+    figure."""
+    groups: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
         if verdict.finding:
             groups.setdefault(verdict.figure.rstrip("ABCD"), []).append(verdict)
+    groups |= {number: [] for number in figures if number not in groups}
     return tuple(
         FigureSection(
             f"section-{place}",
-            figures[number].title if number in figures else f"Figure {number}" if number.isdigit() else number,
+            figures[number].title if number in figures else _titled(number, group),
             figures.get(number),
             tuple(group),
         )
         for place, (number, group) in enumerate(groups.items())
     )
+
+
+def _titled(place: str, group: Iterable[Verdict]) -> str:
+    """An item without a figure of its own, by where the thesis makes its claims."""
+    return f"Figure {place}" if place.isdigit() else ", ".join(dict.fromkeys(item.claim.where for item in group))
 
 
 def _printed(figure: Figure) -> str:
@@ -108,4 +129,4 @@ def _printed(figure: Figure) -> str:
 def _counts(verdicts: Iterable[Verdict]) -> dict[str, int]:
     """How many claims got each judgement, those that occur."""
     parts = [verdict.judgement for verdict in verdicts]
-    return {judgement: parts.count(judgement) for judgement in _COLOURS if judgement in parts}
+    return {judgement: parts.count(judgement) for judgement in COLOURS if judgement in parts}

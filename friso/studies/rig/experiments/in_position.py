@@ -6,7 +6,7 @@ Thesis, Fig. 28: which disturbance moves the stage, and what damping recovers.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -67,8 +67,9 @@ class InPosition:
     """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance, each of one run, and the
     spectra's `frequencies` [Hz]. `damped`: free with all disturbances, by `damping` [N s/m]; `own` is the joint's.
 
-    `amplifier` is the RMS [N] of the force noise; `own_floor` says whether the floor is the stage's. `after_move`: by
-    case, with all disturbances, as soon after the move as others after their start.
+    `louder` has the largest deviations [m] locked and free by the factor on the force noise. `amplifier` is the RMS
+    [N] of the force noise; `own_floor` says whether the floor is the stage's. `after_move`: by case, with all
+    disturbances, as soon after the move as others after their start.
     """
 
     crossover: float
@@ -81,6 +82,7 @@ class InPosition:
     own_damping: float
     damped: Standstill
     traces: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    louder: Mapping[float, tuple[float, float]] = field(default_factory=dict)
 
     def ratio(self, source: str) -> float:
         """RMS with the joint free over that with it locked."""
@@ -104,8 +106,11 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     return Outcome("in-position", stage, seed, logs, result, notes)
 
 
-def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition, dict[str, tuple[Recorded, Stage]]]:
-    """All standstills, and by case the run with all disturbances and its stage."""
+def in_position(
+    stage: Stage, seed: int, progress: Progress, noises: tuple[float, ...] = ()
+) -> tuple[InPosition, dict[str, tuple[Recorded, Stage]]]:
+    """All standstills, with all disturbances also at other `noises` of the force, over that assumed; and by case the
+    run with all disturbances and its stage."""
     fast = with_joint(stage, locked=False).replace({crossover_key(stage): f"{FASTER * crossover(stage):.6g} Hz"})
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
@@ -134,6 +139,14 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
         task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, step)
         after[case] = _standstill(_recorded(shaken.replace({"joint.locked": locked}), task, seed), SETTLING)
     progress(done, total, "joint free, more and less damping")
+
+    def peaks(factor: float) -> tuple[float, float]:
+        task = with_noise(standstill, factor * force, seed, step)
+        locked, free = (_recorded(shaken.replace({"joint.locked": held}), task, seed) for held in CASES.values())
+        first, second = (float(_standstill(recorded, SETTLING).true[0, 1]) for recorded in (locked, free))
+        return first, second
+
+    louder = {factor: peaks(factor) for factor in noises}
     flat = stage.flat()
     damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
     damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
@@ -143,7 +156,7 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
     frequencies = np.fft.rfftfreq(segment(logged_each), logged_each)
     return InPosition(
         FASTER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
-        float(flat["joint.damping"]), damped, traces,
+        float(flat["joint.damping"]), damped, traces, louder,
     ), recordings  # fmt: skip
 
 

@@ -5,6 +5,7 @@ its finding without a change.
 """
 
 from friso.studies.thesis.judges import (
+    arguments,
     control_and_friction,
     crossover,
     design_rules,
@@ -23,6 +24,7 @@ from friso.studies.thesis.judges import (
 )
 
 __all__ = [
+    "arguments",
     "control_and_friction",
     "crossover",
     "design_rules",

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
+from friso.stage import Stage, loads
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges, number_text
-from friso.studies.thesis.maps import begins, ends, verdict_table
+from friso.studies.thesis.judges.control_and_friction import smallest_gap
+from friso.studies.thesis.maps import begins, ends, sizes, verdict_table
 from friso.studies.thesis.studies import thesis_rig
 
 _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
@@ -18,6 +20,9 @@ _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
 
 _WORKS, _LOCKED = 5.25, 15.0
 """Crossovers [Hz] from which the isolator works, the middle of 5 and 5.5 Hz, and which the locked rig needs."""
+
+_MOVING_MASS, _WEIGHED = 2.5, 1.7
+"""Moving mass [kg] of the rig to which the abstract ties them, and the mass weighed, that of the simulations."""
 
 _HIGHEST = 48.0
 """Crossover [Hz] up to which the thesis's rig was stable (Sec. 4.3.1, 4.3.3)."""
@@ -29,15 +34,17 @@ _RATIOS = np.geomspace(2.0, 80.0, 16)
 @judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
 def rules_of_design(evidence: Evidence) -> Finding:
     """Each rule by the maps of the parameter study, and that on parasitic modes by linear analysis."""
-    return Finding((_soft(evidence), _far(), _stroke(evidence), _gap(evidence), *_crossovers(evidence), _up_to()))
+    rig = evidence.rig
+    return Finding((_soft(evidence), _far(rig), _stroke(evidence), _gap(evidence), *_crossovers(evidence), _up_to(rig)))
 
 
 def _soft(evidence: Evidence) -> Part:
     """Whether a joint that is softer than one that does, does too."""
-    stiffness, stroke, moving, _ = verdict_table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    runs, axes = evidence.maps["isolator-stiffness"], ("joint.stiffness", "joint.stroke")
+    stiffness, stroke, moving, _ = verdict_table(runs, *axes)
     enough = stroke >= _STROKE
     softest = ~moving[0, enough]
-    limit = begins(stiffness, moving)[enough]
+    limit = begins(stiffness, moving, sizes(runs, *axes))[enough]
     return Part(
         f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range comes to rest, "
         "and at most of these strokes the stage keeps moving with a stiffer one",
@@ -48,28 +55,29 @@ def _soft(evidence: Evidence) -> Part:
     )
 
 
-@cache
-def _needed_ratio() -> float:
+@lru_cache(maxsize=256)
+def _needed_ratio(stage_file: str) -> float:
     """The least parasitic frequency over the crossover from which the rig has a modulus margin of 0.5 in all settled
     states; NaN if it never has."""
-    flat = {**thesis_rig().flat(), "joint.locked": False}
+    flat = {**loads(stage_file).flat(), "joint.locked": False}
     crossover = flat[CROSSOVER]
-    margins = [settled_margin({**flat, "parasitic.frequency": ratio * crossover}) for ratio in _RATIOS]
-    short = np.flatnonzero(np.array(margins) < WANTED)
-    if not short.size:
-        return float(_RATIOS[0])
-    return float(_RATIOS[short[-1] + 1]) if short[-1] + 1 < len(_RATIOS) else np.nan
+    enough = np.nan
+    for ratio in map(float, _RATIOS[::-1]):
+        if settled_margin({**flat, "parasitic.frequency": ratio * crossover}) < WANTED:
+            break
+        enough = ratio
+    return enough
 
 
-@cache
-def _margins_at_the_top() -> dict[str, float]:
+@lru_cache(maxsize=256)
+def _margins_at_the_top(stage_file: str) -> dict[str, float]:
     """The least modulus margin of the settled states at the highest crossover, joint locked and free; 0: unstable."""
-    flat = {**thesis_rig().flat(), CROSSOVER: _HIGHEST}
+    flat = {**loads(stage_file).flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
 
 
-def _up_to() -> Part:
-    margins = _margins_at_the_top()
+def _up_to(rig: Stage) -> Part:
+    margins = _margins_at_the_top(rig.to_toml())
     return Part(
         f"the crossover may be up to {_HIGHEST:g} Hz: there all settled states are stable, locked and free, without "
         "sampling and delay",
@@ -78,8 +86,8 @@ def _up_to() -> Part:
     )
 
 
-def _far() -> Part:
-    ratio = _needed_ratio()
+def _far(rig: Stage) -> Part:
+    ratio = _needed_ratio(rig.to_toml())
     return Part(
         f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {ABOUT:g}) for a "
         f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
@@ -92,28 +100,30 @@ def _far() -> Part:
 
 def _stroke(evidence: Evidence) -> Part:
     """The stroke beyond which nothing keeps moving at 8 Hz."""
-    stiffness, stroke, moving, _ = verdict_table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    runs, axes = evidence.maps["isolator-stiffness"], ("joint.stroke", "joint.stiffness")
+    stroke, stiffness, moving, _ = verdict_table(runs, *axes)
+    by_stiffness = ends(stroke, moving, sizes(runs, *axes))
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
-    needed = float(ends(stroke, moving[nearest][:, None])[0])
+    needed = float(by_stiffness[nearest])
     return Part(
         f"with {stiffness[nearest]:.3g} N/m at 8 Hz, nothing keeps moving from a stroke of about "
         f"{_STROKE * 1e3:g} mm on "
         f"(within a factor of {ABOUT:g})",
         about(needed, _STROKE),
         f"{needed * 1e3:.3g} mm",
+        printed=_STROKE,
+        read=needed,
         why="of the order of the stroke that the rule states, yet it depends on the limiter's damping, which is open",
     )
 
 
 def _gap(evidence: Evidence) -> Part:
-    static, coulomb, moving, _ = verdict_table(evidence.maps["friction"], "friction.static", "friction.coulomb")
-    gap = static[:, None] - coulomb[None, :]
-    smallest = float(gap[moving].min()) if moving.any() else np.nan
+    smallest = smallest_gap(evidence)
     return Part(
         f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
         f"{ABOUT:g})",
         about(smallest, _GAP),
-        number_text(smallest, ".2g", "N") if moving.any() else "no cell keeps moving",
+        number_text(smallest, ".2g", "N") if np.isfinite(smallest) else "no cell keeps moving",
     )
 
 
@@ -131,11 +141,10 @@ def _locked_edge() -> str:
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     """From where on the isolated and the locked rig come to rest."""
-    crossover, stroke, moving, _ = verdict_table(evidence.maps["isolator-crossover"], CROSSOVER, "joint.stroke")
-    free = float(np.mean(ends(crossover, moving)[stroke >= _STROKE]))
-    crossover, mass, moving, _ = verdict_table(evidence.maps["system"], CROSSOVER, "mass")
-    nearest = int(np.abs(mass - 1.7).argmin())
-    locked = float(ends(crossover, moving)[nearest])
+    runs = evidence.maps["isolator-crossover"]
+    crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")
+    free = float(np.mean(ends(crossover, moving, sizes(runs, CROSSOVER, "joint.stroke"))[stroke >= _STROKE]))
+    locked, weighed = (locked_limit(evidence, mass) for mass in (_MOVING_MASS, _WEIGHED))
     return (
         Part(
             f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to "
@@ -143,12 +152,23 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
             f"(within a factor of {ABOUT:g})",
             about(free, _WORKS),
             f"{free:.3g} Hz on average",
+            printed=_WORKS,
+            read=free,
         ),
         Part(
-            f"locked, with {mass[nearest]:.2g} kg, nothing keeps moving from about {_LOCKED:g} Hz on (within a factor "
-            f"of {ABOUT:g})",
+            f"locked, with the {_MOVING_MASS:g} kg that the abstract gives, nothing keeps moving from about "
+            f"{_LOCKED:g} Hz on (within a factor of {ABOUT:g})",
             about(locked, _LOCKED),
-            f"{locked:.3g} Hz",
+            f"{locked:.3g} Hz; {weighed:.3g} Hz with the {_WEIGHED:g} kg weighed",
             why=_locked_edge(),
+            printed=_LOCKED,
+            read=locked,
         ),
     )
+
+
+def locked_limit(evidence: Evidence, mass: float) -> float:
+    """The crossover [Hz] above which the locked rig of a mass [kg] comes to rest, between those of the map."""
+    runs = evidence.maps["system"]
+    crossover, masses, moving, _ = verdict_table(runs, CROSSOVER, "mass")
+    return float(np.interp(mass, masses, ends(crossover, moving, sizes(runs, CROSSOVER, "mass"))))

@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.identification.readings.rate_effect import static_friction
 from friso.quantities import percent
-from friso.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
+from friso.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso.studies.thesis.experiments import (
     RANGE,
     SLIPS,
@@ -51,6 +51,7 @@ def judged_steps(steps: JointSteps) -> Finding:
                 "forth, "
                 f"{STANDS:g} s each; no noise",
                 why=read.reason or "method: the interval misses it, or is wide",
+                self_test=True,
             ),
             Part(
                 f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(CLOSE)})",
@@ -94,6 +95,7 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
                 f"{number_text(read.value, unit='N')} ({read.low:.3g} to {read.high:.3g}) of {truth:.3g} N: "
                 f"{read.method}",
                 why=read.reason or "method: the interval misses it",
+                self_test=True,
             ),
             Part(
                 f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
@@ -129,6 +131,11 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
         for name, friction in named.items()
     }
     listed = "; ".join(f"{name} {', '.join(f'{s:.2g}' for s in shares)}" for name, shares in swings.items())
+    rows = tuple(
+        (name, f"{1e3 * speed:g} mm/s", f"{passage.mean.value:.3g} N", percent(swing))
+        for name, friction in named.items()
+        for speed, passage, swing in zip(free.speeds, friction.passes, swings[name], strict=False)
+    )
     repeats = ", ".join(f"{name} {friction.repeatability.value:.2f}" for name, friction in named.items())
     return Finding(
         (
@@ -154,5 +161,6 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
                 not any(friction.separated for friction in named.values()),
                 f"free: {free.result.verdict} Locked: {locked.result.verdict}",
             ),
-        )
+        ),
+        FindingTable(("joint", "speed", "mean force", "standard deviation over mean"), rows),
     )

@@ -96,6 +96,7 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 f"a parasitic mode is about {_PARASITIC:g} Hz (within {percent(CLOSE)})",
                 bool(abs(stuck.parasitic / _PARASITIC - 1) <= CLOSE),
                 f"{stuck.parasitic:.4g} Hz (entered in the simulation, from this figure)",
+                self_test=True,
             ),
             Part(
                 f"the mass line between them is nearer {seen:g} than the {weighed:g} kg weighed (by their ratios)",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, FindingTable, Part, about, judges
 from friso.studies.thesis.linear import PARASITIC, PLANT, LimitCase
 
 _FIRST = 10.0
@@ -20,7 +20,20 @@ _FREE, _TOUCHED = ("stuck", "sliding"), ("stuck-touched", "sliding-touched")
 def four_limit_cases(evidence: Evidence) -> Finding:
     """Resonances, antiresonances and mass lines of the plant."""
     plants = evidence.analysis.plants
-    return Finding((*_joint_modes(plants), *_high_modes(plants), _mass_lines(plants)))
+    return Finding((*_joint_modes(plants), *_high_modes(plants), _mass_lines(plants)), _table(plants))
+
+
+def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
+    """Every limit case with its modes and its mass line."""
+    rows = []
+    for name in (*_FREE, *_TOUCHED):
+        case = plants[name]
+        pair = case.pair_above
+        above = f"{pair[0]:.4g} and {pair[1]:.4g} Hz" if pair else "none"
+        below = ", ".join(f"{f:.3g} Hz" for f in case.antiresonances if f < case.first) or "none"
+        rows.append((name, below, f"{case.first:.4g} Hz", f"{case.parasitic:.4g} Hz", above, f"{case.mass:.3g} kg"))
+    columns = ("limit case", "antiresonance below", "first resonance", "parasitic mode", "pair above it", "mass line")
+    return FindingTable(columns, tuple(rows))
 
 
 def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:

@@ -7,7 +7,7 @@ import numpy as np
 from friso.frequency.crossover import HIGHEST, WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
-from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges, number_text
+from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, FindingTable, Part, about, judges, number_text
 from friso.studies.thesis.experiments import BUILT
 from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig
 from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
@@ -162,12 +162,13 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
                 f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
                 f"{_MEASURED / ABOUT:.3g} to {_MEASURED * ABOUT:.3g} Hz)",
                 highest is not None and about(highest, _MEASURED),
-                f"in continuous time {_hertz(highest)}; {_sampled(analysis)}; {_edges(analysis, _MEASURED)}",
+                f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
                 why="idealisation: the simulated controller neither samples nor delays; the rig's does, but the thesis "
                 "gives no delay. Besides, its frame has resonances (Sec. 4.3.1) that the model does not have",
             ),
             *on_the_rig(evidence, measured_free),
-        )
+        ),
+        _sampled(analysis),
     )
 
 
@@ -189,13 +190,13 @@ def _hertz(crossover: float | None) -> str:
     return f"{HIGHEST / 1e3:g} kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
 
 
-def _sampled(analysis: Linear) -> str:
+def _sampled(analysis: Linear) -> FindingTable:
     """What sampling and delays leave of the highest stable crossover."""
-    by_delay = ", ".join(
-        f"{_hertz(free)} and {_hertz(analysis.locked.sampled[delay])} with {_micro(delay)}"
+    rows = tuple(
+        (_micro(delay), _hertz(free), _hertz(analysis.locked.sampled[delay]))
         for delay, free in analysis.free.sampled.items()
     )
-    return f"sampled at {SAMPLED}, by delay, free and locked: {by_delay}"
+    return FindingTable((f"delay, sampled at {SAMPLED}", "highest stable setting, joint free", "joint locked"), rows)
 
 
 def _edges(analysis: Linear, setting: float) -> str:

@@ -7,11 +7,24 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, free_square, overlap, share_text, trend, trend_text, verdict_table
+from friso.studies.thesis.maps import (
+    ends,
+    free_square,
+    overlap,
+    peak_counts,
+    share_text,
+    sizes,
+    trend,
+    trend_text,
+    verdict_table,
+)
 from friso.studies.thesis.studies import STUDIES
 
 _ENDS = 20.0
 """Crossover above which the thesis saw no hunting [Hz] (Sec. 4.1)."""
+
+TRAVEL = 0.16
+"""Travel of the rig's actuator [m] (Sec. 3.5): longer paths of Fig. 11A are simulated alone."""
 
 
 @judges("F11A", figure="11A", needs=("path",))
@@ -22,8 +35,9 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
     )
     moved = (acceleration > 0)[:, None] & (time > 0)[None, :] & valid
     lines = [*moving[acceleration > 0][:, time > 0], *moving[acceleration > 0][:, time > 0].T]
-    free_lines = sum(not line.any() for line in lines)
-    square = free_square(moving, moved)
+    free_lines = float(np.mean([not line.any() for line in lines]))
+    fits = moved & (acceleration[:, None] * time[None, :] ** 2 <= TRAVEL)
+    square, short_square = free_square(moving, moved), free_square(moving, fits)
     speed = acceleration[:, None] * time[None, :]
     resting = moved & ~moving
     bound = float(speed[resting].max(initial=0.0))
@@ -31,11 +45,20 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                "every acceleration and every acceleration time that moves the stage has cells that keep moving, and "
-                f"the largest square at rest covers few cells (at most {percent(FEW)})",
-                free_lines == 0 and square <= FEW,
-                f"{percent(overlap(moving, moved))} of the paths that move the stage keep it moving; {free_lines} "
-                f"lines and a square of {percent(square, 3)} come to rest",
+                "all but a few of the accelerations and acceleration times that move the stage have cells that keep "
+                f"moving, and the largest square at rest covers few cells (at most {percent(FEW)})",
+                free_lines <= FEW and square <= FEW,
+                f"{percent(overlap(moving, moved))} of the paths that move the stage keep it moving; "
+                f"{percent(free_lines)} of the lines and a square of {percent(square, 3)} come to rest",
+            ),
+            Part(
+                f"so it is among the paths that fit the {TRAVEL * 1e3:g} mm of the rig (Sec. 3.5): the largest square "
+                "at rest covers few of them",
+                bool(moving[fits].any() and short_square <= FEW),
+                f"{percent(overlap(fits, moved))} of the paths fit; {percent(overlap(moving, fits))} of these keep it "
+                f"moving, and a square of {percent(short_square, 3)} of them comes to rest",
+                why="most of the paths of Fig. 11A are longer than the rig is, and among the others a block comes to "
+                "rest",
             ),
             Part(
                 "above some hyperbola, acceleration times its time constant, every path keeps the stage "
@@ -52,8 +75,9 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
     """The highest crossover that keeps moving, over all masses and for each."""
-    crossover, mass, moving, _ = verdict_table(evidence.maps["system"], CROSSOVER, "mass")
-    by_mass = ends(crossover, moving)
+    runs = evidence.maps["system"]
+    crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
+    by_mass = ends(crossover, moving, sizes(runs, CROSSOVER, "mass"))
     highest, falls = by_mass.max(), trend(mass, by_mass)
     marker = moving[:, np.argmin(np.abs(mass - STUDIES["system"].marker["mass"]))]
     ended = marker & ~moving[:, -1]
@@ -63,7 +87,10 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
                 f"the limit above which no mass keeps moving is about {_ENDS:g} Hz (from {_ENDS / ABOUT:.3g} to "
                 f"{_ENDS * ABOUT:.3g} Hz)",
                 bool(_ENDS / ABOUT <= highest <= _ENDS * ABOUT),
-                f"limit {highest:.3g} Hz",
+                f"limit {highest:.3g} Hz{_at_the_limit(moving, peak_counts(runs, CROSSOVER, 'mass'))}; "
+                f"median over the masses {np.median(by_mass):.3g} Hz",
+                printed=_ENDS,
+                read=float(highest),
             ),
             Part(
                 "at some crossovers the stage keeps moving with the marker's mass and comes to rest with the "
@@ -74,3 +101,14 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
             ),
         )
     )
+
+
+def _at_the_limit(moving: np.ndarray, peaks: np.ndarray) -> str:
+    """How many cells keep moving at the highest crossover at which any does, and with how many peaks."""
+    rows = np.flatnonzero(moving.any(axis=1))
+    if not rows.size:
+        return ""
+    row = rows[-1]
+    most = np.nanmax(np.where(moving[row], peaks[row], np.nan))
+    cells = int(moving[row].sum())
+    return f", set by {cells} {'cell' if cells == 1 else 'cells'} of at most {most:g} counted peaks"

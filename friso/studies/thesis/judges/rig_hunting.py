@@ -12,7 +12,7 @@ from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMIL
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
-from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges, number_text
+from friso.studies.thesis.claims import ORDER, Evidence, Finding, FindingTable, Part, about, judges, number_text
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 
 _ASSUMED = (
@@ -222,9 +222,9 @@ def judged_standstill(standstill: InPosition) -> Finding:
             Part(
                 f"locked the deviation is of the order of {_DEVIATIONS[0] * 1e6:g} um, free of "
                 f"{_DEVIATIONS[1] * 1e6:g} um",
-                all(about(peak, size, ORDER) for peak, size in zip(peaks, _DEVIATIONS, strict=True)),
+                _sized((peaks[0], peaks[1])),
                 f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
-                why="the disturbances are assumed",
+                why=_over_noise(standstill),
             ),
             Part(
                 f"free it is of the order of {expected:g} times as large as locked",
@@ -239,5 +239,32 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 why="stiffness: the sticking bearing holds the locked stage with its bristles, the free one is held "
                 "only by the joint and the controller",
             ),
-        )
+        ),
+        _noises(standstill),
     )
+
+
+def _sized(peaks: tuple[float, float]) -> bool:
+    return all(about(peak, size, ORDER) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
+
+
+def _over_noise(standstill: InPosition) -> str:
+    """At which noises of the force the deviations are as measured."""
+    met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
+    tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
+    where = f"with {', '.join(met)} times the noise it is met" if met else "it is met with none of these"
+    return (
+        f"the disturbances are assumed; of {tried} times the noise of the force {where}"
+        if tried
+        else "the disturbances are assumed"
+    )
+
+
+def _noises(standstill: InPosition) -> FindingTable | None:
+    """The deviations over the noise of the force, where it was varied."""
+    rows = tuple(
+        (f"{factor:g}", f"{locked * 1e6:.2g} um", f"{free * 1e6:.2g} um", f"{free / locked:.2g}")
+        for factor, (locked, free) in standstill.louder.items()
+    )
+    columns = "noise of the force over that assumed", "joint locked", "joint free", "ratio"
+    return FindingTable(columns, rows) if rows else None

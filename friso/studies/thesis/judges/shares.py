@@ -99,13 +99,13 @@ def sticking(response: Response) -> Sticking:
     time, force, integral, friction = (
         np.asarray(trace[name].values) for name in ("time", "force", "force_i", "friction_force")
     )
-    spells = [(i, k) for i, k in _slow_spells(trace) if time[k] >= COUNTED_AFTER]
+    spells = [(i, k) for i, k in slow_spells(trace) if time[k] >= COUNTED_AFTER]
     peaks = np.array([i + int(np.argmax(np.abs(friction[i : k + 1]))) for i, k in spells], dtype=int)
     lengths = np.array([time[k] - time[i] for i, k in spells])
     return Sticking(lengths, integral[peaks] / force[peaks], np.sign(force[peaks]).astype(int))
 
 
-def _slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
+def slow_spells(trace: xr.Dataset) -> list[tuple[int, int]]:
     """First and last sample of each spell below the Stribeck velocity that is longer than a turning about and over
     before the run ends."""
     slow = np.abs(trace["cart_velocity"].values) < STRIBECK_VELOCITY

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, ORDER, TREND, Evidence, Finding, Part, Response, judges
-from friso.studies.thesis.maps import begins, ends, trend, trend_text, verdict_table
-from friso.studies.thesis.studies import thesis_rig
+from friso.studies.thesis.maps import begins, ends, sizes, trend, trend_text, verdict_table
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,13 +28,13 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
     """The stiffness above which the isolated rig keeps moving, at each stroke."""
     runs = evidence.maps["isolator-stiffness"]
     stiffness, stroke, moving, _ = verdict_table(runs, "joint.stiffness", "joint.stroke")
-    limits = begins(stiffness, moving)
+    limits = begins(stiffness, moving, sizes(runs, "joint.stiffness", "joint.stroke"))
     works = ~moving[0]  # strokes at which the softest joint of the range comes to rest
     rises = trend(stroke[works], limits[works])
     shortest = stroke[works][0] * 1e3 if works.any() else np.nan
     span = f"{limits[works][0]:.3g} N/m at {shortest:.2g} mm, {limits[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
     force = limits[works] * stroke[works]
-    static = thesis_rig().flat()["friction.static"]
+    static = evidence.rig.flat()["friction.static"]
     why = (
         f"idealisation: below {shortest:.2g} mm the stage keeps moving even with the softest joint of the range, and "
         f"at the limit the joint carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static "
@@ -70,22 +70,24 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
     """The cells of stroke 0, compared with the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
-    peaks, same = int(locked.cell["distinct_peaks"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
-    counted = none["distinct_peaks"].values
+    peaks, same = int(locked.cell["count"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
+    counted = none["count"].values
     return Part(
         "at stroke 0 every cell has counted peaks where the locked rig has, and its count within one",
-        bool(same.all() and np.all(np.abs(counted - peaks) <= 1)),
-        f"{same.sum()} of {same.size} cells agree; counts {counted.min():g} to {counted.max():g} against {peaks}",
+        bool(same.all() and np.nanmax(np.abs(counted - peaks), initial=0.0) <= 1),
+        f"{percent(same.mean())} of the cells agree; counts {np.nanmin(counted):g} to {np.nanmax(counted):g} against "
+        f"{peaks}"
+        if np.isfinite(counted).any()
+        else "no counts are known",
     )
 
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     """The stroke from which runs come to rest where the limiter is damped much, and the amplitude."""
-    damping, stroke, moving, _ = verdict_table(
-        evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke"
-    )
-    needed = np.exp(ends(np.log(stroke), moving.T))
+    runs, axes = evidence.maps["isolator-damping"], ("joint.stroke", "joint.limiter_damping")
+    stroke, damping, moving, _ = verdict_table(runs, *axes)
+    needed = np.exp(ends(np.log(stroke), moving, sizes(runs, *axes)))
     large, small = needed[damping >= _LARGE_DAMPING], needed[damping < _SMALL_DAMPING]
     at_large = float(np.median(large))
     locked = evidence.responses["locked"].cell
@@ -100,6 +102,8 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
                 bool(_NEEDED / ABOUT <= at_large <= _NEEDED * ABOUT),
                 f"stroke needed {at_large * 1e3:.2g} mm; with damping below {_SMALL_DAMPING:g} N s/m "
                 f"{np.median(small) * 1e3:.2g} mm",
+                printed=_NEEDED,
+                read=at_large,
             ),
             Part(
                 f"that stroke is far below the amplitude of the locked rig's cycle (at most {1 / ORDER:.2g} of it)",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from types import MappingProxyType
 
 from friso.frequency.margins import Margins
@@ -77,7 +77,7 @@ def analysed(stage: Stage) -> Linear:
     return _analysed(stage.to_toml())
 
 
-@cache
+@lru_cache(maxsize=8)
 def _analysed(stage_file: str) -> Linear:
     stage = loads(stage_file)
     return Linear(

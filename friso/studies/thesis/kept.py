@@ -1,0 +1,115 @@
+"""What is done of a long reproduction, kept in a folder until all is: an interrupted run goes on from there."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.engine.cache import code_digest
+from friso.studies.cells import WORDS
+from friso.studies.store_files import put, stored, stored_arrays
+from friso.studies.study import Study, equations_version
+from friso.studies.sweep import dataset
+from friso.studies.thesis.claims import Finding, Part
+from friso.whole_file import whole_file
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Findings = dict[str, Finding]
+"""Findings by a name, such as that of a claim."""
+
+
+@dataclass(frozen=True)
+class Kept:
+    """Where maps and findings are kept, a folder; None keeps nothing. What other code made, or is damaged, is made
+    again."""
+
+    folder: Path | None = None
+
+    @property
+    def count(self) -> int:
+        """How many pieces are kept."""
+        if self.folder is None or not self.folder.exists():
+            return 0
+        return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
+
+    def clear(self) -> None:
+        """Forget them."""
+        if self.folder is not None:
+            shutil.rmtree(self.folder, ignore_errors=True)
+
+    def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
+        """The runs of a study, as they were kept or made now."""
+        axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
+        file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
+        columns = None if file is None else stored_arrays(file)
+        notes = None if columns is None else columns.pop("notes", None)
+        if columns is not None and notes is not None and columns.keys() == set(study.metrics):
+            runs = dataset(study, {name: values.reshape(study.shape) for name, values in columns.items()})
+            runs.attrs |= json.loads(str(notes))
+            return runs
+        runs = make()
+        if file is not None:
+            arrays: dict[str, Any] = {name: runs[name].values.astype(WORDS.get(name, "f8")) for name in study.metrics}
+            verified = {name: value for name, value in runs.attrs.items() if name.startswith("verified")}
+            with whole_file(file) as stream:
+                np.savez_compressed(stream, notes=np.array(json.dumps(verified)), **arrays)
+        return runs
+
+    def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
+        """Arrays by name `about` something, as they were kept or made now."""
+        file = self._file("npz", "flags", *about)
+        columns = None if file is None else stored_arrays(file)
+        if columns is not None:
+            return columns
+        arrays = make()
+        if file is not None:
+            with whole_file(file) as stream:
+                np.savez_compressed(stream, allow_pickle=False, **arrays)
+        return arrays
+
+    def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
+        """Findings `about` something, as they were kept or made now."""
+        file = self._file("json", "findings", *about)
+        if file is not None and (kept := _read(file)) is not None:
+            return kept
+        findings = make()
+        if file is not None:
+            document = {name: [asdict(part) for part in item.parts] for name, item in findings.items()}
+            put(file, json.dumps(document).encode("utf-8"))
+        return findings
+
+    def _file(self, suffix: str, *about: Any) -> Path | None:
+        if self.folder is None:
+            return None
+        self.folder.mkdir(parents=True, exist_ok=True)
+        digest = hashlib.sha256(repr((equations_version(), _sources(), about)).encode()).hexdigest()
+        return self.folder / f"{digest[:24]}.{suffix}"
+
+
+NOT_KEPT = Kept()
+"""Keeps nothing."""
+
+
+def _read(file: Path) -> Findings | None:
+    """Findings from a file; None where there are none, or it is damaged."""
+    try:
+        document = json.loads(stored(file))
+        return {name: Finding(tuple(Part(**part) for part in parts)) for name, parts in document.items()}
+    except (OSError, ValueError, TypeError, AttributeError):
+        return None
+
+
+@cache
+def _sources() -> str:
+    """A digest of the code that judges, beside that of the equations."""
+    return code_digest("studies/thesis", "studies/rig", "virtual_rig", "frequency", "identification", "leaf_springs")

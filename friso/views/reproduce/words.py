@@ -1,0 +1,122 @@
+"""What `friso reproduce` says of a claim: what was found, and what agrees, in short and in full."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+from friso.quantities import percent
+from friso.studies.thesis.space import OPEN
+from friso.studies.thesis.verdicts import Verdict
+
+if TYPE_CHECKING:
+    from friso.studies.thesis.claims import Part
+    from friso.studies.thesis.plausible import Plausible
+
+SHORT = 160
+"""Letters of a number in short."""
+
+AGREEMENT = {"holds": "agrees", "holds in part": "in part", "differs": "contradicts", "not yet covered": "not computed"}
+"""The judgements as the word of agreement."""
+
+
+def in_order(verdicts: Iterable[Verdict]) -> list[Verdict]:
+    """The verdicts in the order in which the thesis makes the claims."""
+    return sorted(verdicts, key=lambda verdict: verdict.claim.place)
+
+
+def short(text: str) -> str:
+    """The first statement of a number: up to its first semicolon or sentence, if that is short enough."""
+    first = text.split(". Assumed", 1)[0]
+    if len(first) > SHORT:
+        first = first.split("; ", 1)[0]
+    return first if len(first) <= SHORT else first[:SHORT].rsplit(" ", 1)[0] + " …"
+
+
+def numbers(verdict: Verdict) -> str:
+    """The numbers of all parts in one line; empty for a claim that is not covered."""
+    return "; ".join(part.number for part in verdict.finding.judged) if verdict.finding else ""
+
+
+def met(verdict: Verdict) -> str:
+    """How many criteria are met."""
+    if verdict.finding is None:
+        return ""
+    pattern = verdict.finding.pattern
+    return f"{sum(pattern)} of {len(pattern)}"
+
+
+def share(verdict: Verdict) -> str:
+    """In how many draws it holds, and the interval of the share."""
+    if verdict.space is None:
+        return ""
+    space = verdict.space
+    return f"{space.count} of {space.draws} ({percent(space.holds.low)} to {percent(space.holds.high)})"
+
+
+def ways(verdict: Verdict) -> list[tuple[str, str]]:
+    """The word of agreement by each way of judging, where there are several."""
+    if len(verdict.ways) < 2:
+        return []
+    return [(way, AGREEMENT[finding.judgement]) for way, finding in verdict.ways.items()]
+
+
+def reason(verdict: Verdict) -> str:
+    """Why it does not hold, the first sentence; the rest is among the details."""
+    return short(verdict.reason) if verdict.finding else verdict.reason
+
+
+def self_tests(verdicts: Iterable[Verdict]) -> list[tuple[str, Part]]:
+    """The parts by which friso only tests itself, with the claim they stand at."""
+    return [
+        (verdict.claim.id, part)
+        for verdict in verdicts
+        if verdict.finding
+        for part in verdict.finding.parts
+        if part.self_test
+    ]
+
+
+def open_rows() -> list[Sequence[str]]:
+    """The values that the thesis leaves open: range, how it is drawn, friso's own, and the reason."""
+    drawn = {"even": "evenly", "log": "evenly in the logarithm", "either": "one of the two"}
+    return [
+        (
+            value.name,
+            f"{value.low:g} to {value.high:g} {value.unit}".rstrip(),
+            drawn[value.scale],
+            f"{value.baseline:g} {value.unit}".rstrip(),
+            value.reason,
+        )
+        for value in OPEN
+    ]
+
+
+def fit_sentence(plausible: Plausible) -> str:
+    """Which draw fits the printed numbers best."""
+    fit = plausible.fit
+    if fit is None:
+        return ""
+    units = {value.name: value.unit for value in OPEN}
+    values = ", ".join(f"{name} {value:.3g} {units[name]}".rstrip() for name, value in fit.draw.values.items())
+    return (
+        f"Of {len(plausible.draws)} joint draws, number {fit.draw.number} fits the printed numbers best: they are off "
+        f"by a factor of {_factor(fit.misfit)} on average (RMS of the logarithm), at friso's own choice by "
+        f"{_factor(fit.at_baseline)}. Its values: {values}."
+    )
+
+
+def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
+    """The printed numbers, beside those of the best draw."""
+    if plausible.fit is None:
+        return []
+    return [
+        (item.claim, item.criterion, f"{item.printed:g}", f"{item.read:.3g}", f"{item.read / item.printed:.2f}")
+        for item in plausible.fit.numbers
+    ]
+
+
+def _factor(misfit: float) -> str:
+    import math
+
+    return f"{math.exp(misfit):.2f}" if math.isfinite(misfit) else "more than can be said (one is not found at all)"
