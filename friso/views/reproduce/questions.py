@@ -66,8 +66,8 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
             "3. Drive stiffness from static friction and stroke",
             f"{_STATIC:g} N over {_STROKE * 1e3:g} mm allow {softest / 1e3:g} N/mm; built: 2.4 N/mm, first parasitic "
             f"mode {_PARASITIC:g} Hz",
-            f"built: {2.4e3 * _STROKE:.2g} N at full stroke; parasitic mode at {_PARASITIC / rig_crossover():.3g} times "
-            f"the crossover (10 wanted): it would allow {_PARASITIC / 10:.3g} Hz",
+            f"built: {2.4e3 * _STROKE:.2g} N at full stroke; parasitic mode at {_PARASITIC / rig_crossover():.3g} "
+            f"times the crossover (10 wanted): it would allow {_PARASITIC / 10:.3g} Hz",
         ),
         (
             "4. Gains for the largest mass",
