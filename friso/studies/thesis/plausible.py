@@ -113,7 +113,7 @@ def plausible(
     drawn = tuple(draw(number) for number in range(draws))
     by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
     for one in drawn:
-        groups = [(cheap, MAP_WORK)] + ([(costly, COSTLY_WORK)] if one.number % EVERY == 0 else [])
+        groups = [(cheap, MAP_WORK)] + ([(costly, COSTLY_WORK)] if one.number % EVERY == EVERY - 1 else [])
         for group, work in groups:
             if not group:
                 continue
@@ -131,7 +131,7 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
     """Steps that the draws take."""
     cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
     costly = any(entry.needs & PARTS.keys() for entry in entries.values())
-    return cheap * draws * MAP_WORK + costly * -(-draws // EVERY) * COSTLY_WORK
+    return cheap * draws * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
 
 
 def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
