@@ -10,7 +10,6 @@ from friso.identification.causes import UNKNOWN, causes
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import explains
 from friso.identification.quality import Quality, halves, whole_error
 from friso.quantities import percent
 
@@ -33,12 +32,11 @@ WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb 
 
 def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float) -> Quality:
     """How good a fit is, with what is wrong with it in sentences."""
-    counted = max(float(fit.problem.counted.sum()), 1.0)
-    left = float(np.sqrt(np.sum(fit.residual**2) / counted))
+    left = fit.left
     noise_left = noise * fit.problem.passes
     flat, unit = fit.stage, log.unit("force")
     plain = Quality(noise, left, noise_left, inverse.error, whole_error(flat, inverse))
-    if explains(fit, noise):
+    if fit.problem.closed and fit.explains(noise):
         return plain
     doubts, poor = [], inverse.error > POOR
     reasons = causes(log, inverse, cart_share) if plain.lacks_something or poor else []

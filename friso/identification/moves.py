@@ -26,6 +26,7 @@ from friso.identification.output_error.changes import changes_beside, drift_of_f
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
+from friso.identification.output_error.one_way import reaching_either_way
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
 from friso.identification.output_error.profile import Profile
@@ -101,6 +102,8 @@ def identify_moves(
     quality = quality_of(log, inverse, fit, noise, share)
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, progress)
+    if not fit.explains(noise):
+        fit = reaching_either_way(fit, moved.velocity)
     fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
     estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
     if quality.failed:
@@ -111,7 +114,7 @@ def identify_moves(
         estimates = all_with_model_error(estimates, inverse, flat, quality)
     estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
     estimates = with_halves(estimates, flat, quality)
-    simulated = (loop or follows).record(fit.inner)
+    simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
         errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),

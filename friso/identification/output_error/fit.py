@@ -17,21 +17,26 @@ from friso.identification.output_error.refine import bounds_of, costs, refine_fi
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
 
-STARTS, KEPT = 1024, 6
-"""Starts that are simulated, and how many of them are refined."""
+STARTS, TRIED, KEPT = 1024, 20, 6
+"""Starts that are simulated, how many of them are refined at first, and how many to the end."""
 
-NARROW = 0.3
-"""Share by which the starts of core parameters are off the inverse model's values, each way."""
+NARROW, LINEAR = 0.3, 0.02
+"""Share by which the starts of core parameters are off the inverse model's values, each way; of those whose logarithm
+is not fitted, and which may be 0, the share of their range."""
 
 SCREENED, STRETCHES = 1e7, 8
 """Samples that the starts are simulated over, all together: long records are cut for them, into so many stretches."""
 
-ROUGH, FINE = 12, 30
-"""Iterations of the refinement of the starts kept, and most evaluations of lmfit times the parameters."""
+FIRST, ROUGH, FINE = 4, 8, 30
+"""Iterations of the refinement of the starts tried, further ones of those kept, and most evaluations of lmfit times the
+parameters."""
 
 NEARBY, FAR = 127, 3.0
 """Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
 hunts has optima of its own, and the fit it starts from is of another problem."""
+
+EXPLAINED = 2.0
+"""A fit that leaves no more than so many times the noise of the record explains it."""
 
 ALIKE = 1e-3
 """Share of the largest singular value below which fitted numbers cannot be distinguished."""
@@ -53,6 +58,15 @@ class OutputErrorFit:
     @property
     def cost(self) -> float:
         return float(np.mean(self.residual**2))
+
+    @property
+    def left(self) -> float:
+        """What the fit leaves [N], RMS, where it counts."""
+        return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
+
+    def explains(self, noise: float) -> bool:
+        """Whether it leaves little more than the `noise` [N] of the log's force."""
+        return self.left < EXPLAINED * noise * self.problem.passes
 
     @property
     def independent(self) -> float:
@@ -80,24 +94,29 @@ def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
 
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErrorFit:
     """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
-    which are refined; the others stay as in the first of them."""
+    which are refined; the others stay as in the first of them. What a start is worth shows after a few iterations: of a
+    stage that sticks and slips the best of the starts as they are lead to other optima."""
     mask = np.zeros(starts.shape[1], bool)
     mask[list(free)] = True
-    screened = _screened(problem, starts)
-    refined = refine_fit(problem, screened, np.tile(mask, (len(screened), 1)), ROUGH)
-    best = refined.inner[np.argmin(refined.cost)]
-    return _polished(problem, tuple(free), best)
+    tried = _screened(problem, starts)
+    for most, iterations in ((TRIED, FIRST), (KEPT, ROUGH)):
+        refined = refine_fit(problem, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations)
+        tried = refined.inner[np.argsort(refined.cost)]
+    return polished(problem, tuple(free), tried[0])
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
     """Many starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
-    find parameters that not every motion shows."""
+    find parameters that not every motion shows. Core parameters start about the inverse model's values: a first fit
+    of them alone to motion that sticks and slips can be anywhere."""
     low, high = bounds_of(problem)
     core = np.array([parameter.core for parameter in problem.parameters])
-    half = np.array(
-        [NARROW if parameter.logarithmic else NARROW * abs(parameter.start) for parameter in problem.parameters]
+    logarithmic = np.array([parameter.logarithmic for parameter in problem.parameters])
+    centre, half = first_values(problem.parameters), np.where(logarithmic, NARROW, LINEAR * (high - low))
+    low, high = (
+        np.where(core, np.maximum(centre - half, low), low),
+        np.where(core, np.minimum(centre + half, high), high),
     )
-    low, high = np.where(core, first - half, low), np.where(core, first + half, high)
     shares = qmc.Sobol(len(first), rng=SEED).random(STARTS)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
     return np.vstack([first, starts])
@@ -121,11 +140,11 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
 
 
 def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
-    """The best starts, shape (kept, parameters), the first one always among them."""
-    if len(starts) <= KEPT:
+    """The best starts, shape (tried, parameters), the first one always among them."""
+    if len(starts) <= TRIED:
         return starts
     screened = np.sum([costs(problem.part(part), starts[1:]) for part in _parts(problem, len(starts))], axis=0)
-    return np.vstack([starts[0], starts[1:][np.argsort(screened)[: KEPT - 1]]])
+    return np.vstack([starts[0], starts[1:][np.argsort(screened)[: TRIED - 1]]])
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:
@@ -138,7 +157,7 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
     return [slice(int(first), int(first) + most // STRETCHES) for first in firsts]
 
 
-def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:
+def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:
     """The end of the fit by lmfit, with derivatives from runs side by side."""
     low, high = bounds_of(problem)
     mask = np.isin(np.arange(len(inner)), free)
@@ -165,10 +184,21 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Out
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
     groups = groups_of(*(signal[counted] for signal in (problem.inputs.reference, velocity, acceleration)))
     covariance = spread_of(slopes[counted], rest[counted], groups)
-    for inputs in problem.unsettled:
-        off = _moved_by(inputs, problem, best, slopes, rest) / COVERAGE
-        covariance = covariance + np.outer(off, off)
-    return OutputErrorFit(problem, best, free, covariance, rest)
+    moved = [_moved_by(inputs, problem, best, slopes, rest) for inputs in problem.unsettled]
+    return OutputErrorFit(problem, best, free, _reaching_over(covariance, moved), rest)
+
+
+def _reaching_over(covariance: np.ndarray, moved: Sequence[np.ndarray]) -> np.ndarray:
+    """The covariance of fitted numbers, shape (free, free), with deviations whose intervals hold those about what other
+    inputs make of them, which are `moved` by so much, each of shape (free,): one of these is true, not one between."""
+    if not moved:
+        return covariance
+    wanted = np.sqrt(np.diag(covariance)) + np.linalg.norm(moved, axis=0) / COVERAGE
+    further = covariance + sum(np.outer(off, off) for off in moved) / COVERAGE**2
+    deviation = np.sqrt(np.diag(further))
+    finite = np.isfinite(deviation) & (deviation > 0)
+    wider = np.divide(wanted, deviation, out=np.ones_like(wanted), where=finite)
+    return further * np.outer(wider, wider)
 
 
 def _moved_by(inputs: Inputs, problem: Problem, best: np.ndarray, slopes: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from friso.identification.output_error.coverage import NEAR, Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
+from friso.identification.output_error.holding import with_force_settled
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, bends
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import Profile, profile
@@ -21,9 +22,6 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 
 STEP_OUT = 1.5
 """A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
-
-EXPLAINED = 2.0
-"""A fit that leaves no more than so many times the noise of the record explains it."""
 
 SURE = 0.99
 """Probability that parameters which no motion shows one by one improve the fit all the same."""
@@ -70,10 +68,10 @@ def fit_identifiable(
         numbers = tuple(range(len(names)))
         progress(1, STEPS, "moves: all parameters in closed loop")
         full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]))
-        if explains(full, noise):
+        if full.explains(noise):
             return _believed(full, core, covered, progress, explained=True)
     progress(3, STEPS, "moves: all parameters along the log")
-    along = _identifiable_on_log(follows, plain, core, covered, progress)
+    along = _identifiable_on_log(follows, plain, core, covered, noise, progress)
     if loop is None:
         return along
     progress(STEPS - 1, STEPS, "moves: the closed loop from there")
@@ -84,13 +82,8 @@ def fit_identifiable(
     return replace(along, fit=looped) if _in_step(looped, along.fit, bandwidth) else along
 
 
-def explains(fit: OutputErrorFit, noise: float) -> bool:
-    """Whether a fit in the machine's own loop leaves little more than the noise [N] of the record."""
-    return bool(fit.problem.closed and np.sqrt(fit.cost) < EXPLAINED * noise)
-
-
 def _identifiable_on_log(
-    follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress
+    follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, noise: float, progress: Progress
 ) -> Identified:
     """What the stage that follows the log shows."""
     names = [parameter.name for parameter in follows.parameters]
@@ -98,7 +91,7 @@ def _identifiable_on_log(
     if not hopeful:
         return Identified(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
-    full = fit(follows, numbers, everywhere(follows, numbers, plain.inner))
+    full = with_force_settled(fit(follows, numbers, everywhere(follows, numbers, plain.inner)), noise)
     believed = _believed(full, core, covered, progress)
     if _pays(full, plain) or believed.shown == hopeful:
         return believed
@@ -106,7 +99,7 @@ def _identifiable_on_log(
         return replace(believed, fit=plain)
     free = _numbers(names, core | believed.shown)
     neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
-    return replace(believed, fit=fit(follows, free, neutral[None]))
+    return replace(believed, fit=fit(full.problem, free, neutral[None]))
 
 
 def _believed(

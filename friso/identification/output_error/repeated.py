@@ -65,4 +65,5 @@ def _simulated_logs(
         signals["position"][part] = record.position + blur * rng.standard_normal(len(measured))
         force = problem.inputs.force + record.force
         signals["force"][part] = force + noise * rng.standard_normal(len(measured))
-        yield tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
+        like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
+        yield replace(like, inputs=replace(like.inputs, held=problem.inputs.held))

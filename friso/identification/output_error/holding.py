@@ -1,0 +1,31 @@
+"""Whether the force of a log is held between its samples or follows straight lines, as far as a fit tells."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from scipy.stats import chi2
+
+from friso.identification.output_error.fit import OutputErrorFit, polished
+
+SURE = 0.999
+"""Probability with which the worse of both has to be wrong."""
+
+
+def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
+    """The better of two fits to a log, with its force held between the samples and not.
+
+    Half a sample apart, they move the damping of the bristles by half a sample times their stiffness. The other one no
+    longer counts where the better explains the record, to the `noise` [N] of its force, and the other clearly less.
+    """
+    problem = fit.problem
+    other = next((inputs for inputs in problem.unsettled if inputs.held != problem.inputs.held), None)
+    if other is None:
+        return fit
+    sharper = tuple(inputs for inputs in problem.unsettled if inputs is not other)
+    turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
+    swapped = polished(replace(problem, inputs=other, unsettled=(problem.inputs, *turned)), fit.free, fit.inner)
+    better, worse = sorted((fit, swapped), key=lambda one: one.cost)
+    if not better.explains(noise) or worse.cost < better.cost * (1 + chi2.ppf(SURE, 1) / better.independent):
+        return better
+    return polished(replace(better.problem, unsettled=turned if better is swapped else sharper), fit.free, better.inner)
