@@ -31,7 +31,7 @@ pytestmark = pytest.mark.xdist_group("identify-moves")
 
 SMALL: dict[Any, dict[str, Any]] = {
     profiles: {"POINTS": 3, "ROUNDS": 1},
-    fitting: {"STARTS": 64, "KEPT": 2, "NEARBY": 15},
+    fitting: {"STARTS": 64, "TRIED": 4, "KEPT": 2, "NEARBY": 15},
 }
 """Sizes with which a log is identified in seconds."""
 

@@ -21,18 +21,21 @@ from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import profile as profiles
-from friso.identification.output_error.fit import everywhere, first_values, fit, nearby
+from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
+from friso.identification.output_error.holding import with_force_settled
 from friso.identification.output_error.identifiable import BRISTLES
-from friso.identification.output_error.parameters import HIGHEST_RATIO, SHORTEST
-from friso.identification.output_error.problem import loop_problem
+from friso.identification.output_error.one_way import reaching_either_way
+from friso.identification.output_error.parameters import HIGHEST_RATIO, RATIO, SHORTEST, fit_parameters
+from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.refine import bounds_of, costs
+from friso.intervals import COVERAGE
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
 ROOT = Path(__file__).parents[1]
 SMALL: dict[Any, dict[str, Any]] = {
     profiles: {"POINTS": 3, "ROUNDS": 1},
-    fitting: {"STARTS": 256, "KEPT": 3, "NEARBY": 31},
+    fitting: {"STARTS": 256, "TRIED": 10, "KEPT": 3, "NEARBY": 31},
 }
 """Sizes with which a fit takes seconds: coarser profiles are no narrower, and fewer starts do for quiet logs."""
 
@@ -158,6 +161,53 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     assert fitted.cost < 1e-6 * float(costs(exact, first[None])[0])
     assert fitted.value("mass") == pytest.approx(flat["masses.cart"], rel=1e-3)
     assert fitted.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
+
+
+def followed(log: Log, flat: dict[str, Any]) -> OutputErrorFit:
+    """A stage that follows the first moves of a log, fitted from its truth."""
+    part = slice(0, 2500)
+    levels = {"mass": flat["masses.cart"], "offset": -flat["bias.cart"]}
+    levels |= {name: flat[f"friction.{name}"] for name in ("coulomb", "viscous")}
+    top = flat["motion.acceleration"] * flat["motion.acceleration_time"]
+    parameters = fit_parameters(flat, levels, top, float(np.ptp(log["position"])), True)
+    first = first_values(parameters)
+    first[[one.name for one in parameters].index(RATIO)] = flat["friction.static"] / flat["friction.coulomb"]
+    return polished(tracking(flat, log, part, parameters, 20.0), tuple(range(len(parameters))), first)
+
+
+def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:
+    """That of a controller in continuous time is not, whatever is assumed at first."""
+    machine = drawn(3, False)
+    log = moves(machine, bare=True)
+    as_held = followed(log, {**machine.flat, "drive.sample_time": log.sample_time})
+    assert as_held.problem.inputs.held
+    settled = with_force_settled(as_held, np.inf)
+    assert not settled.problem.inputs.held
+    assert all(not inputs.held for inputs in settled.problem.unsettled)
+    assert settled.cost < as_held.cost
+
+
+def test_an_interval_holds_what_inputs_that_a_log_allows_as_well_make_of_it() -> None:
+    """One of them is true: half of the distance would be an interval that never holds it."""
+    moved = [np.array([1.0, 0.0]), np.array([0.0, 3.0])]
+    wider = fitting._reaching_over(np.diag([0.25, 0.0]), moved)
+    assert COVERAGE * np.sqrt(np.diag(wider)) == pytest.approx([0.5 * COVERAGE + 1.0, 3.0])
+
+
+def test_intervals_reach_to_what_either_direction_shows() -> None:
+    machine = drawn(3, False)
+    log = moves(machine, bare=True)
+    speed = np.gradient(log["position"], log.sample_time)
+    more = 0.3 * machine.flat["friction.coulomb"] * np.exp(-((speed / machine.flat["friction.stribeck_velocity"]) ** 2))
+    log = replace(log, signals={**log.signals, "force": log["force"] + more * (speed > 0)})
+    both = followed(log, machine.flat)
+    wider = reaching_either_way(both, speed[:2500])
+    names = [parameter.name for parameter in both.problem.parameters]
+    place = names.index("friction.stribeck_velocity")
+    assert wider.inner == pytest.approx(both.inner)
+    assert np.all(np.diag(wider.covariance) >= np.diag(both.covariance) * (1 - 1e-9))
+    off = abs(both.inner[place] - np.log(machine.flat["friction.stribeck_velocity"]))
+    assert off < COVERAGE * np.sqrt(wider.covariance[place, place])
 
 
 # --- the record of the EMPS benchmark ------------------------------------------------------------------------------
