@@ -24,7 +24,7 @@ from friso.identification.output_error import profile as profiles
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled
 from friso.identification.output_error.identifiable import BRISTLES
-from friso.identification.output_error.one_way import reaching_either_way
+from friso.identification.output_error.one_way import either_way
 from friso.identification.output_error.parameters import HIGHEST_RATIO, RATIO, SHORTEST, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.refine import bounds_of, costs
@@ -194,20 +194,23 @@ def test_an_interval_holds_what_inputs_that_a_log_allows_as_well_make_of_it() ->
     assert COVERAGE * np.sqrt(np.diag(wider)) == pytest.approx([0.5 * COVERAGE + 1.0, 3.0])
 
 
-def test_intervals_reach_to_what_either_direction_shows() -> None:
+def test_static_friction_of_one_direction_is_named_and_intervals_reach_to_what_either_shows() -> None:
     machine = drawn(3, False)
     log = moves(machine, bare=True)
     speed = np.gradient(log["position"], log.sample_time)
     more = 0.3 * machine.flat["friction.coulomb"] * np.exp(-((speed / machine.flat["friction.stribeck_velocity"]) ** 2))
     log = replace(log, signals={**log.signals, "force": log["force"] + more * (speed > 0)})
     both = followed(log, machine.flat)
-    wider = reaching_either_way(both, speed[:2500])
+    apart = either_way(both, speed[:2500])
+    wider = apart.fit
     names = [parameter.name for parameter in both.problem.parameters]
     place = names.index("friction.stribeck_velocity")
     assert wider.inner == pytest.approx(both.inner)
     assert np.all(np.diag(wider.covariance) >= np.diag(both.covariance) * (1 - 1e-9))
     off = abs(both.inner[place] - np.log(machine.flat["friction.stribeck_velocity"]))
     assert off < COVERAGE * np.sqrt(wider.covariance[place, place])
+    assert apart.less is not None
+    assert apart.less < both.left
 
 
 # --- the record of the EMPS benchmark ------------------------------------------------------------------------------

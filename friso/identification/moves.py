@@ -26,7 +26,7 @@ from friso.identification.output_error.changes import changes_beside, drift_of_f
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
-from friso.identification.output_error.one_way import reaching_either_way
+from friso.identification.output_error.one_way import either_way
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
 from friso.identification.output_error.profile import Profile
@@ -103,7 +103,7 @@ def identify_moves(
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, progress)
     if not fit.explains(noise):
-        fit = reaching_either_way(fit, moved.velocity)
+        fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"))
     fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
     estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
     if quality.failed:
@@ -120,6 +120,21 @@ def identify_moves(
         errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
         residual_of(fit.residual, moved, log.sample_time), loop, quality,
     )  # fmt: skip
+
+
+def _with_directions(
+    fit: OutputErrorFit, quality: Quality, velocity: np.ndarray, unit: str
+) -> tuple[OutputErrorFit, Quality]:
+    """A fit with intervals that allow for friction that differs by direction, and the quality that says so where the
+    model, of one friction for both, cannot describe it; `velocity` [m/s] is smooth, `unit` that of the force."""
+    apart = either_way(fit, velocity)
+    if apart.less is None:
+        return apart.fit, quality
+    doubt = (
+        f"Friction differs between forward and backward motion by more than its level: either alone leaves "
+        f"{apart.less:.2g} {unit} unexplained, both together {fit.left:.2g} {unit}"
+    )
+    return apart.fit, replace(quality, doubts=(*quality.doubts, doubt), spoilt=True)
 
 
 def _with_changes(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,27 +16,41 @@ ITERATIONS = 12
 LEAST = 0.2
 """Share of the samples that count of which a direction consists at least."""
 
+CLEARLY = 0.5
+"""Share of the sum of squares that both directions, each by itself, leave at most where friction differs between them
+by more than its level: our choice."""
+
 EITHER = ("friction.viscous_asymmetry", "bias.cart", "bias.stage")
 """What one direction alone does not tell from friction."""
 
 
-def reaching_either_way(fit: OutputErrorFit, velocity: np.ndarray) -> OutputErrorFit:
-    """The fit with deviations that reach, beyond chance, to what either direction of the motion alone shows.
+@dataclass(frozen=True)
+class EitherWay:
+    """A `fit` whose deviations reach to what either direction alone shows, and what both leave [N], RMS, where that is
+    so much `less` that friction differs between them by more than its level."""
+
+    fit: OutputErrorFit
+    less: float | None = None
+
+
+def either_way(fit: OutputErrorFit, velocity: np.ndarray) -> EitherWay:
+    """A fit beside those to the forward and to the backward motion of its record.
 
     The model has one static friction, one Stribeck velocity and one set of bristles for both; where these differ, what
-    a fit to both makes of them need not be between them. `velocity` [m/s], shape (n,), is smooth.
+    a fit to both makes of them need not be between them. `velocity` [m/s], shape (n,), is smooth. Deviations reach
+    there, beyond chance.
     """
     names = [parameter.name for parameter in fit.problem.parameters]
     free = np.array([i in fit.free and name not in EITHER for i, name in enumerate(names)])
     counted = fit.problem.counted
     ways = [counted * (way * velocity > 0) for way in (1, -1)]
     if min(way.sum() for way in ways) < LEAST * counted.sum():
-        return fit
-    one_way = [
-        refine_fit(replace(fit.problem, counted=way), fit.inner[None], free[None], ITERATIONS).inner[0] for way in ways
-    ]
+        return EitherWay(fit)
+    alone = [refine_fit(replace(fit.problem, counted=way), fit.inner[None], free[None], ITERATIONS) for way in ways]
     deviation = np.sqrt(np.diag(fit.covariance))
-    apart = np.abs(one_way - fit.inner).max(axis=0)[list(fit.free)] / COVERAGE
+    off = np.abs([one.inner[0] - fit.inner for one in alone]).max(axis=0)[list(fit.free)] / COVERAGE
     usable = np.isfinite(deviation) & (deviation > 0)
-    wider = np.divide(np.maximum(apart - deviation, 0.0), deviation, out=np.zeros_like(apart), where=usable) + 1
-    return replace(fit, covariance=fit.covariance * np.outer(wider, wider))
+    wider = np.divide(np.maximum(off - deviation, 0.0), deviation, out=np.zeros_like(off), where=usable) + 1
+    left = sum(float(one.cost[0]) for one in alone) * len(counted) / counted.sum()
+    reaching = replace(fit, covariance=fit.covariance * np.outer(wider, wider))
+    return EitherWay(reaching, float(np.sqrt(left)) if left < CLEARLY * fit.left**2 else None)
