@@ -201,7 +201,7 @@ def test_static_friction_of_one_direction_is_named_and_intervals_reach_to_what_e
     more = 0.3 * machine.flat["friction.coulomb"] * np.exp(-((speed / machine.flat["friction.stribeck_velocity"]) ** 2))
     log = replace(log, signals={**log.signals, "force": log["force"] + more * (speed > 0)})
     both = followed(log, machine.flat)
-    apart = either_way(both, speed[:2500])
+    apart = either_way(both, speed[:2500], False)
     wider = apart.fit
     names = [parameter.name for parameter in both.problem.parameters]
     place = names.index("friction.stribeck_velocity")

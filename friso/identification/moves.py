@@ -127,7 +127,7 @@ def _with_directions(
 ) -> tuple[OutputErrorFit, Quality]:
     """A fit with intervals that allow for friction that differs by direction, and the quality that says so where the
     model, of one friction for both, cannot describe it; `velocity` [m/s] is smooth, `unit` that of the force."""
-    apart = either_way(fit, velocity)
+    apart = either_way(fit, velocity, quality.lacks_something)
     if apart.less is None:
         return apart.fit, quality
     doubt = (

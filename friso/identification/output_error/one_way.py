@@ -6,12 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.refine import refine_fit
+from friso.identification.output_error.fit import OutputErrorFit, everywhere, fit
 from friso.intervals import COVERAGE
-
-ITERATIONS = 12
-"""Of each of these fits, which begin at that of both directions."""
 
 LEAST = 0.2
 """Share of the samples that count of which a direction consists at least."""
@@ -33,24 +29,27 @@ class EitherWay:
     less: float | None = None
 
 
-def either_way(fit: OutputErrorFit, velocity: np.ndarray) -> EitherWay:
+def either_way(both: OutputErrorFit, velocity: np.ndarray, thorough: bool) -> EitherWay:
     """A fit beside those to the forward and to the backward motion of its record.
 
     The model has one static friction, one Stribeck velocity and one set of bristles for both; where these differ, what
     a fit to both makes of them need not be between them. `velocity` [m/s], shape (n,), is smooth. Deviations reach
-    there, beyond chance.
+    there, beyond chance. A `thorough` search begins everywhere, since that fit may be an optimum that neither direction
+    has, and another one with it.
     """
-    names = [parameter.name for parameter in fit.problem.parameters]
-    free = np.array([i in fit.free and name not in EITHER for i, name in enumerate(names)])
-    counted = fit.problem.counted
+    names = [parameter.name for parameter in both.problem.parameters]
+    free = tuple(i for i in both.free if names[i] not in EITHER)
+    counted = both.problem.counted
     ways = [counted * (way * velocity > 0) for way in (1, -1)]
     if min(way.sum() for way in ways) < LEAST * counted.sum():
-        return EitherWay(fit)
-    alone = [refine_fit(replace(fit.problem, counted=way), fit.inner[None], free[None], ITERATIONS) for way in ways]
-    deviation = np.sqrt(np.diag(fit.covariance))
-    off = np.abs([one.inner[0] - fit.inner for one in alone]).max(axis=0)[list(fit.free)] / COVERAGE
+        return EitherWay(both)
+    problems = [replace(both.problem, counted=way, unsettled=()) for way in ways]
+    starts = everywhere(both.problem, free, both.inner) if thorough else both.inner[None]
+    alone = [fit(problem, free, starts) for problem in problems]
+    deviation = np.sqrt(np.diag(both.covariance))
+    off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
     usable = np.isfinite(deviation) & (deviation > 0)
     wider = np.divide(np.maximum(off - deviation, 0.0), deviation, out=np.zeros_like(off), where=usable) + 1
-    left = sum(float(one.cost[0]) for one in alone) * len(counted) / counted.sum()
-    reaching = replace(fit, covariance=fit.covariance * np.outer(wider, wider))
-    return EitherWay(reaching, float(np.sqrt(left)) if left < CLEARLY * fit.left**2 else None)
+    left = sum(one.cost for one in alone) * len(counted) / counted.sum()
+    reaching = replace(both, covariance=both.covariance * np.outer(wider, wider))
+    return EitherWay(reaching, float(np.sqrt(left)) if left < CLEARLY * both.left**2 else None)
