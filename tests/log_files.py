@@ -1,5 +1,7 @@
 """Sample logs of every format, written by the tests: text, TwinCAT Scope CSV, MAT, TDMS, UFF, LVM."""
 
+import struct
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -183,3 +185,13 @@ def write_lvm(path: Path, signals: dict[str, tuple[str, np.ndarray]], step: floa
         head.append("\t".join([f"{i * step:.6f}", *(f"{values[i]:.9f}" for _, values in signals.values())]))
     path.write_text("\n".join(head) + "\n", encoding="utf-8")
     return path
+
+
+def cells_in_cells_as_mat(path: Path, levels: int) -> None:
+    """A small MAT file of cells within cells, compressed."""
+    above = ((6, 8, 1, 0), (5, 8, 1, 1), (1, 0))
+    parts = [(14, 48 * (levels + 1)), *above] * levels
+    number = struct.pack("<14id", 14, 56, 6, 8, 6, 0, 5, 8, 1, 1, 1, 0, 9, 8, 1.0)
+    data = zlib.compress(b"".join(struct.pack(f"<{len(part)}i", *part) for part in parts) + number, 9)
+    head = b"MATLAB 5.0 MAT-file".ljust(116) + bytes(8) + struct.pack("<H", 0x0100) + b"IM"
+    path.write_bytes(head + struct.pack("<ii", 15, len(data)) + data)

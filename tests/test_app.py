@@ -13,12 +13,13 @@ import struct
 import threading
 import time
 import zipfile
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+import log_files
 import numpy as np
 import pytest
 import uvicorn
@@ -249,6 +250,35 @@ def test_no_mapping_of_the_user_s_has_a_say_in_what_was_dropped(
     kept = json.loads(served.request("POST", "/logs/mine.csv", log)[2])["file"]
     for question in ("logs", "identify"):
         assert "friso.toml" not in str(served.ask(question, RIG, files=[kept]))
+
+
+def log_that_is_elsewhere(folder: Path) -> bytes:
+    """A MAT file whose values stand in another file of this machine."""
+    import h5py
+
+    with h5py.File(folder / "secret.h5", "w") as file:
+        file["secret"] = np.arange(400.0)
+    with h5py.File(folder / "a.mat", "w") as file:
+        file["time"] = np.arange(400) * 1e-3
+        file["x"] = h5py.ExternalLink(str(folder / "secret.h5"), "secret")
+    return (folder / "a.mat").read_bytes()
+
+
+def log_that_crashes(folder: Path) -> bytes:
+    """A MAT file of cells in cells, which ends the process that reads it."""
+    log_files.cells_in_cells_as_mat(folder / "a.mat", 200_000)
+    return (folder / "a.mat").read_bytes()
+
+
+@pytest.mark.parametrize("made", [log_that_is_elsewhere, log_that_crashes])
+def test_a_hostile_log_is_refused_and_the_server_goes_on(
+    served: Served, tmp_path: Path, made: Callable[[Path], bytes]
+) -> None:
+    kept = json.loads(served.request("POST", "/logs/a.mat", made(tmp_path))[2])["file"]
+    for question in ("logs", "identify"):
+        last = served.ask(question, RIG, files=[kept])[-1]
+        assert last["kind"] == "refused" or last.get("problems"), last
+    assert served.ask("machine", RIG)[-1]["kind"] != "refused"
 
 
 def identify_logs(folder: Path, log: bytes) -> None:

@@ -548,19 +548,9 @@ def test_a_file_that_never_ends_is_an_error_of_its_own(
         read_table(tmp_path / "a.mat")
 
 
-def cells_in_cells_as_mat(path: Path, levels: int) -> None:
-    """A small MAT file of cells within cells, compressed."""
-    above = ((6, 8, 1, 0), (5, 8, 1, 1), (1, 0))
-    parts = [(14, 48 * (levels + 1)), *above] * levels
-    number = struct.pack("<14id", 14, 56, 6, 8, 6, 0, 5, 8, 1, 1, 1, 0, 9, 8, 1.0)
-    data = zlib.compress(b"".join(struct.pack(f"<{len(part)}i", *part) for part in parts) + number, 9)
-    head = b"MATLAB 5.0 MAT-file".ljust(116) + bytes(8) + struct.pack("<H", 0x0100) + b"IM"
-    path.write_bytes(head + struct.pack("<ii", 15, len(data)) + data)
-
-
 def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused: Refused) -> None:
     """By a signal: its reader calls itself for each level."""
-    cells_in_cells_as_mat(tmp_path / "a.mat", 200_000)
+    log_files.cells_in_cells_as_mat(tmp_path / "a.mat", 200_000)
     assert (tmp_path / "a.mat").stat().st_size < 30_000
     with refused("log"):
         read_table(tmp_path / "a.mat")
