@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import friso
-from benchmarks.trust import campaign
+from benchmarks.trust import campaign, commands
 from benchmarks.trust.arguments import ARGUMENTS, CALLS, LINES
 from benchmarks.trust.campaign import failure, run_part
 from benchmarks.trust.damage import damaged
@@ -57,3 +57,9 @@ def test_a_crash_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_function_and_command_is_tried() -> None:
     assert {*CALLS} == {name for name in friso.__all__ if inspect.isfunction(getattr(friso, name))}
     assert {*LINES} == {*REGISTERED}
+
+
+def test_every_command_that_writes_is_struck() -> None:
+    functions = {name: REGISTERED[name].function for name in REGISTERED}
+    writes = {name for name, function in functions.items() if "overwrite" in inspect.signature(function).parameters}
+    assert {line[0] for line in commands.WRITING.values()} == writes
