@@ -27,7 +27,7 @@ class Piecewise(sp.Piecewise):
     may hold.
     """
 
-    def __new__(cls, *cases: Any, **options: Any) -> sp.Basic:
+    def __new__(cls, *cases: Any, **options: Any) -> Any:
         kept: list[_Case] = []
         for case in cases:
             kept.append(_Case(*getattr(case, "args", case)))
