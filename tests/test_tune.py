@@ -45,7 +45,7 @@ from friso.views.tune.sensitivity_words import ranked_sentences
 from friso.views.tune.words import DOUBTS, _without_friction, answer, changes, failing, rows
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-TINY = Budget(points=3, generations=2, machines=4, surveyed=2, fresh=6)
+TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6)
 
 
 @pytest.fixture(scope="module")

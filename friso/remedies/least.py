@@ -21,6 +21,9 @@ STEPS = (1.0, 1.05, 1.15, 1.3)
 """Powers of the factors of the least change that are verified, one after the other: the least of all is the one that
 just works on the machines of the search, which is not to say on others."""
 
+PARTS = (0.15, 0.3, 0.5, 0.7)
+"""How far from the least change to the settings that work points are tried that change more keys."""
+
 MORE = 2
 """Factor of machines in the moves that are tried, against a search for the settings that settle soonest: the least
 change is at the edge of what works."""
@@ -82,7 +85,8 @@ def _ends(remedy: Remedy) -> np.ndarray:
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """The least change of those tried that break nothing, (variables,), then the same change taken further."""
+    """The least change of those tried that break nothing, (variables,), the same change taken further, and then points
+    on the way from it to the settings that work: those with which nothing attracts the machines."""
     if not search.tried:
         return
     points = search.points
@@ -90,8 +94,10 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     if not len(free):
         return
     least = free[int(change_costs(search.remedy, free).argmin())]
-    home = _ends(search.remedy)[:, 0]
-    for step in STEPS:
-        shares = np.clip(home + step * (least - home), 0, 1)
-        if search.clear(shares[None])[0]:
-            yield shares
+    home, works = _ends(search.remedy).T
+    further = [home + step * (least - home) for step in STEPS]
+    towards = [least + part * (works - least) for part in PARTS]
+    tried = np.clip([*further, *towards], 0, 1)
+    kept = tried[search.measured(tried).meets(search.goal)]
+    if len(kept):
+        yield from kept[search.clear(kept)]

@@ -112,7 +112,7 @@ def tune(
     _moves(stage)
     ideal = _ideal(stage)
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    later = (PAIRS + 1) * (budget.generations + 4)  # pairs and the least change, about
+    later = (PAIRS + 1) * (budget.generations + budget.refined + 4)  # pairs and the least change, about
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
@@ -249,7 +249,7 @@ class _Session:
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     """The settings against friction that came closest to the goal, or met it, each together with the bandwidth."""
-    names = {setting.name for setting in SETTINGS.values()}
+    names = {setting.name for name, setting in SETTINGS.items() if name != "dither"}  # which no cycle verifies
     tried = [outcome for outcome in outcomes if outcome.remedy.name in names and outcome.points]
     closest = sorted(tried, key=lambda outcome: outcome.least_cost(goal))
     return [with_bandwidth(outcome.remedy) for outcome in closest[:PAIRS]]
@@ -284,7 +284,7 @@ def _ideal(stage: Stage) -> Stage:
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
     """How many reports a remedy makes, about."""
-    return (2 if len(remedy.variables) == 1 else budget.generations) + 4
+    return (2 if len(remedy.variables) == 1 else budget.generations + budget.refined) + 4
 
 
 class _Report:

@@ -34,8 +34,11 @@ BATCH, MOST = 3, 8
 MOST_POINTS = 40
 """Points of a generation at most."""
 
-WORK = 5e8
-"""Work of a search (see `friso.engine.allowance`): about 6 s on one core. Moves that chatter take most of it."""
+WORK = 6e8
+"""Work of a search (see `friso.engine.allowance`): about 7 s on one core. Moves that chatter take most of it."""
+
+NEAR = 0.12
+"""Share of the ranges about the best point, to both sides, in which a search goes on."""
 
 SPARE = 1e-3
 """Share by which a bandwidth stays below its limit: numbers are rounded, and bandwidths taken from a grid."""
@@ -46,14 +49,15 @@ APART = 0.03
 
 @dataclass(frozen=True)
 class Budget:
-    """Points of a generation for each variable, and generations; machines in the moves that are tried and in the
-    surveys; fresh machines on which an answer is measured."""
+    """Points of a generation for each variable, generations, and those about the best of these; machines in the moves
+    that are tried and in the surveys; fresh machines on which an answer is measured."""
 
     points: int = 10
     generations: int = 10
+    refined: int = 8
     machines: int = 12
     surveyed: int = 8
-    fresh: int = 40
+    fresh: int = 100
 
 
 @dataclass(frozen=True)
@@ -158,21 +162,18 @@ class Search:
             at = points.shares[int(best), 0]
             cost(np.clip(np.linspace(at - 1 / count, at + 1 / count, self.budget.points * 2), 0, 1)[None])
             return
-        size = min(self.budget.points * variables, MOST_POINTS)
-        drawn = np.random.default_rng(SEED).random((max(size, 5), variables))
+        size = max(5, min(self.budget.points * variables, MOST_POINTS))
+        drawn = np.random.default_rng(SEED).random((size, variables))
         if start is not None:
-            drawn[: len(start)] = start[: len(drawn)]
-        differential_evolution(
-            cost,
-            [(0.0, 1.0)] * variables,
-            maxiter=self.budget.generations - 1,
-            init=drawn,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
-            tol=0.01,
-            rng=SEED,
-            polish=False,
-            vectorized=True,
-            updating="deferred",
-        )
+            drawn[: len(start)] = start[:size]
+        _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations)
+        points = self.points
+        best = points.shares[int(points.cost(self.goal, None if wanted is None else wanted(points.shares)).argmin())]
+        ends = [(max(0.0, at - NEAR), min(1.0, at + NEAR)) for at in best]
+        low, high = np.array(ends).T
+        near = low + (high - low) * drawn
+        near[0] = best
+        _evolve(cost, near, ends, self.budget.refined)
 
     def _at_the_limit(self) -> np.ndarray:
         """Where a remedy of the bandwidth alone is at the limit of that, (1,), or (0,)."""
@@ -185,8 +186,7 @@ class Search:
     def measured(self, shares: np.ndarray) -> TriedPoints:
         """Points on the machines: the moves are run only where the loop is stable and has half of the margin."""
         goal, count = self.goal, len(shares)
-        few = self.machines.take(np.arange(min(6, self.machines.count)))
-        margin = quantile(-modulus_margins(self.remedy, shares, few, self.drive), goal.share) * -1
+        margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
         stable = np.flatnonzero(margin > goal.margin / 2)
         columns = [np.full(count, np.inf) for _ in range(4)]
         if stable.size:
@@ -223,6 +223,23 @@ class Search:
             batch = _apart(left, BATCH)
             yield from batch[self.clear(batch)]
             left = left[np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1) > APART]
+
+
+def _evolve(
+    cost: Callable[[np.ndarray], np.ndarray], start: np.ndarray, ends: list[tuple[float, float]], generations: int
+) -> None:
+    """Differential evolution from points (points, variables) between `ends`."""
+    differential_evolution(
+        cost,
+        ends,
+        maxiter=generations - 1,
+        init=start,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
+        tol=0.01,
+        rng=SEED,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+    )
 
 
 def _apart(shares: np.ndarray, most: int) -> np.ndarray:

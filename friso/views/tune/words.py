@@ -20,7 +20,7 @@ from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
-from friso.stage.controllers import CONTROLLER
+from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
 from friso.views.drawing.prefixes import NOTHING, listed, share_with_interval, with_unit
 from friso.views.loop_words import unstable_loop
@@ -110,6 +110,20 @@ def answer(tuning: Advice) -> list[str]:
         lines.append(_works(fastest, tuning, "What settles soonest"))
     elif len(tuning.working) > 1:
         lines.append(_works(tuning.working[1], tuning, "The next best"))
+    return [*lines, *unknown(tuning)]
+
+
+def unknown(tuning: Advice) -> list[str]:
+    """What limits a machine that neither the stage file nor an option tells, and what is assumed instead."""
+    stage, goal, flat = tuning.stage, tuning.goal, tuning.stage.flat()
+    lines = []
+    if stage.parasitic is None and not stage.flexure and goal.bandwidth_limit is None:
+        lines.append(
+            "Not known: modes of the machine. None is assumed; they make fast controllers unstable, so state "
+            '[parasitic], or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").'
+        )
+    if goal.force_limit is None and FORCE_LIMIT not in flat:
+        lines.append('Not known: the force of the actuator. No limit is assumed; state one (--force-limit "200 N").')
     return lines
 
 
@@ -357,11 +371,6 @@ def _without_friction(flat: Mapping[str, Any], goal: Goal) -> Iterator[str]:
 def assumptions(tuning: Advice) -> list[str]:
     """What is not known of the machine, what is assumed instead, and how the machines were drawn."""
     lines, stage, machines = [], tuning.stage, tuning.machines
-    if stage.parasitic is None and not stage.flexure:
-        lines.append(
-            "The stage file has no parasitic mode: none is assumed. State [parasitic], or the highest bandwidth that "
-            'the machine allows (--bandwidth-limit "25 Hz"): modes that are not stated make fast controllers unstable.'
-        )
     lines += _without_friction(stage.flat(), tuning.goal)
     lines.append(
         "Margins include the sampling and delay of the file; hunting and moves are those of a controller in continuous "
