@@ -120,14 +120,17 @@ def _windows(tuning: Advice) -> list[Panel]:
         return []
     tuned = [float(v.at(share)) for v, share in zip(least.remedy.variables, least.shares, strict=True)]
     ends = [(window.low / at, window.high / at) for window, at in zip(least.windows, tuned, strict=True)]
-    names, rows = tuple(window.name for window in least.windows), np.arange(len(ends), dtype=float)
+    rows = [str(number) for number in range(1, len(ends) + 1)]
     series = tuple(
-        Series(np.array(pair), np.full(2, row), "", BLUE, width=6) for row, pair in zip(rows, ends, strict=True)
+        Series(
+            np.array(pair), np.full(2, float(row)), f"{rows[row]}: {window.name}", COLOURS[row % len(COLOURS)], width=6
+        )
+        for row, (window, pair) in enumerate(zip(least.windows, ends, strict=True))
     )
-    marks = (Markers(np.ones(len(rows)), rows, "as tuned", INK),)
+    marks = (Markers(np.ones(len(rows)), np.arange(len(rows), dtype=float), "as tuned", INK),)
     reach = 1.2 * max(1.2, *(max(high, 1 / low) for low, high in ends))
-    x = Axis("Factor of the tuned number", "", (1 / reach, reach), log=True)
-    return [Panel("Where it works", x, Axis("", "", (-0.5, len(rows) - 0.5), words=names), series, marks)]
+    x, y = Axis("Factor of the tuned number", "", (1 / reach, reach), log=True), (-0.5, len(rows) - 0.5)
+    return [Panel("Where the least change works", x, Axis("Number", "", y, words=tuple(rows)), series, marks)]
 
 
 def _sensitivity(lines: Lines) -> Panel:

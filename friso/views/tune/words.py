@@ -105,11 +105,11 @@ def answer(tuning: Advice) -> list[str]:
         return [*lines, *_nothing(tuning)]
     least, fastest = tuning.least, tuning.fastest
     assert least is not None
-    lines.append(_works(least, tuning, "The least change that works"))
+    lines += _works(least, tuning, "The least change that works")
     if fastest is not None and fastest is not least:
-        lines.append(_works(fastest, tuning, "What settles soonest"))
+        lines += _works(fastest, tuning, "What settles soonest")
     elif len(tuning.working) > 1:
-        lines.append(_works(tuning.working[1], tuning, "The next best"))
+        lines += _works(tuning.working[1], tuning, "The next best")
     return [*lines, *unknown(tuning)]
 
 
@@ -146,20 +146,21 @@ def _interrupted(tuning: Advice) -> list[str]:
     ]
 
 
-def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> str:
+def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
+    """What to set, and what that brings and costs."""
     assert outcome.stage is not None
     assert outcome.measured is not None
-    return (
+    return [
         f"{what}: set {listed(changes(tuning.stage, outcome.stage), 'and')} ({outcome.remedy.name}; "
-        f"{size_words(tuning.size(outcome))}). {_brings(outcome.measured, tuning)}. "
-        f"{price(outcome.measured, tuning, outcome.remedy.buys_joint)}"
-    )
+        f"{size_words(tuning.size(outcome))}).",
+        f"{_brings(outcome.measured, tuning)}. {price(outcome.measured, tuning, outcome.remedy.buys_joint)}",
+    ]
 
 
 def size_words(size: ChangeSize) -> str:
     """How large a change is."""
     keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
-    factor = f", by a factor of {size.factor:.3g}{' in all' * (size.keys > 1)}" if size.factor > 1 else ""
+    factor = f", by a factor of {plain(size.factor)}{' in all' * (size.keys > 1)}" if size.factor > 1 else ""
     return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
 
 
@@ -191,7 +192,12 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
 
 
 def _ratio(now: float, before: float) -> str:
-    return f"{now / before:.3g}" if before > 0 and math.isfinite(now / before) else NOTHING
+    return plain(now / before) if before > 0 and math.isfinite(now / before) else NOTHING
+
+
+def plain(factor: float) -> str:
+    """A factor with three digits, without an exponent."""
+    return f"{float(f'{factor:.3g}'):.15g}"
 
 
 def _nothing(tuning: Advice) -> list[str]:
