@@ -417,7 +417,8 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     apart = made_up(**{name: range(2 * k, 2 * k + 2) for k, name in enumerate(PARTS)})
     assert apart[1].share(FORCE_LIMITED).probability == pytest.approx(0.8)
     assert unmet_goals(*apart, FORCE_LIMITED) == ("together",)
-    assert unmet_goals(*made_up(**dict.fromkeys(PARTS, range(2))), FORCE_LIMITED) == ()
+    assert unmet_goals(*made_up(400, **dict.fromkeys(PARTS, range(12))), FORCE_LIMITED) == ()
+    assert unmet_goals(*made_up(400, **dict.fromkeys(PARTS, range(20))), FORCE_LIMITED) == ("together",)  # by chance
     assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
 
 
