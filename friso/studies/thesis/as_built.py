@@ -163,7 +163,7 @@ def standstill(stage: Stage) -> InPosition:
 
 @dataclass(frozen=True)
 class RailTraces:
-    """What the drive logs of single moves on the rail of the lowest seed, and on an even one: time [s], shape (n,), and
+    """What the drive logs of single moves on one rail that varies, and on an even one: time [s], shape (n,), and
     the position less the end of the move [m], by joint and crossover [Hz] and by rail, each of shape (n,); the
     `distance` of the move [m]."""
 
@@ -173,14 +173,15 @@ class RailTraces:
     distance: float
 
 
-def traces(stage: Stage) -> RailTraces:
-    """Fig. 24, 25 and 27 in time."""
+def traces(stage: Stage, rail: int) -> RailTraces:
+    """Fig. 24, 25 and 27 in time, on the rail of a number from 0 on."""
     machine = rig_with_drive(stage)
     frequencies, task, length = crossover(machine) * CROSSOVERS, move(machine), distance(machine)
     held, loose = (with_joint(machine, locked) for locked in (True, False))
     key = CROSSOVER
-    locked = once(held, task, [SEED] * len(frequencies), {key: frequencies})
-    free = once(loose, task, [SEED], {key: frequencies[:1]})
+    place = {"rail.seed": 1.0 + rail}
+    locked = once(held, task, [SEED + rail] * len(frequencies), {key: frequencies, **place})
+    free = once(loose, task, [SEED + rail], {key: frequencies[:1], **place})
     even = once(on_rail(held), task, [SEED])
     logged = locked.logged["position"] - length
     moves = {("locked", float(f)): row for f, row in zip(frequencies, logged, strict=True)}

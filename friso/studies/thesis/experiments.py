@@ -265,6 +265,12 @@ def _with_motion(stage: Stage, **motion: Any) -> Stage:
     return loads(f"{text[:begin]}[motion]\n{rows}\n{text[end + 1 :] if end >= 0 else ''}")
 
 
+def _lively_rail(moves: MovesOnRails) -> int:
+    """The first rail on which peaks are counted at the lowest crossover, joint locked; the first where there is
+    none."""
+    return int(np.argmax(moves.locked.counted[0]))
+
+
 _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
     {
         LINE: locked_line,
@@ -276,6 +282,6 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
         GRID: grid,
         ON_RAILS: cycles,
         STANDSTILL: standstill,
-        TRACES: traces,
+        TRACES: lambda stage: traces(stage, _lively_rail(_experiment(MOVES, stage.to_toml()))),
     }
 )

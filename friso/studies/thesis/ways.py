@@ -75,7 +75,7 @@ def weakest(findings: Mapping[str, Finding]) -> Finding:
         rest = {name: other.parts[number] for name, other in zip(names, others, strict=True)}
         failing = {name: other for name, other in rest.items() if other.holds != part.holds}
         parts.append(_together(part, failing))
-    return Finding(tuple(parts))
+    return Finding(tuple(parts), first.table)
 
 
 def _together(part: Part, different: Mapping[str, Part]) -> Part:
