@@ -163,9 +163,9 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     assert fitted.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
 
 
-def followed(log: Log, flat: dict[str, Any]) -> OutputErrorFit:
+def followed(log: Log, flat: dict[str, Any], count: int = 2500) -> OutputErrorFit:
     """A stage that follows the first moves of a log, fitted from its truth."""
-    part = slice(0, 2500)
+    part = slice(0, count)
     levels = {"mass": flat["masses.cart"], "offset": -flat["bias.cart"]}
     levels |= {name: flat[f"friction.{name}"] for name in ("coulomb", "viscous")}
     top = flat["motion.acceleration"] * flat["motion.acceleration_time"]
@@ -179,7 +179,7 @@ def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:
     """That of a controller in continuous time is not, whatever is assumed at first."""
     machine = drawn(3, False)
     log = moves(machine, bare=True)
-    as_held = followed(log, {**machine.flat, "drive.sample_time": log.sample_time})
+    as_held = followed(log, {**machine.flat, "drive.sample_time": log.sample_time}, 1250)
     assert as_held.problem.inputs.held
     settled = with_force_settled(as_held, np.inf)
     assert not settled.problem.inputs.held
