@@ -119,12 +119,14 @@ def test_what_counts_as_a_unit() -> None:
 
 @pytest.mark.parametrize("name", friso.__all__)
 def test_the_public_list(name: str) -> None:
-    """Everything has a docstring, and every argument is in that of its function."""
+    """Everything has a docstring; that of a function has every argument, the errors raised, and an example."""
     value = getattr(friso, name)
     if name == "__version__":
         return
     text = inspect.getdoc(value) or ""
     assert len(text.split()) > 3
     if inspect.isfunction(value):
+        assert "Raises" in text
+        assert ">>>" in text
         arguments = set(inspect.signature(value).parameters) - COMMON
         assert {argument for argument in arguments if not re.search(rf"\b{argument}\b", text)} == set()

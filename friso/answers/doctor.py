@@ -64,6 +64,11 @@ def doctor(full_paths: bool = False, *, progress: Progress = silent) -> DoctorAn
     DoctorAnswer
         What was looked at.
 
+    Raises
+    ------
+    InputError
+        For a `full_paths` that is neither true nor false.
+
     Examples
     --------
     >>> import friso

@@ -27,7 +27,7 @@ def frame(value: Any) -> bytes:
     return struct.pack("<II", len(text), len(numbers)) + text + numbers
 
 
-def drawn(figure: Figure, narrow: bool = False) -> dict[str, Any]:
+def figure_on_page(figure: Figure, narrow: bool = False) -> dict[str, Any]:
     """A figure as a page draws it: name, title, caption, and what plotly takes; on a narrow page, panels one below the
     other."""
     if narrow and not any(panel.coloured for panel in figure.panels):

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import friso
 from friso.app import machine as machines
 from friso.app.archive import archive
-from friso.app.frames import drawn
+from friso.app.frames import figure_on_page
 from friso.app.ghosts import ghosts_of, with_places
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
@@ -66,7 +66,7 @@ def parts_of(
 ) -> Part:
     """An answer as a page shows it, each figure with what is shown `beside`."""
     with speaking_of(answer.axis_kind):
-        figures = [drawn(beside(figure), asked.narrow) for figure in answer.figures()]
+        figures = [figure_on_page(beside(figure), asked.narrow) for figure in answer.figures()]
         return {
             "kind": "answer",
             "sentences": [*answer.sentences()],

@@ -25,7 +25,7 @@ SPEEDS = np.geomspace(1e-2, 1e3, 201)
 """Speeds, in Stribeck velocities, at which steady friction is compared."""
 
 
-Shown = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions"]
+MeasuredKind = Literal["curve", "static", "stiffness", "virgin", "damping", "viscous", "conditions"]
 """What measurements show: steady friction over speed, break-away, stiffness before sliding, the virgin curve, damping
 at rest, viscous damping; and the conditions under which they were taken."""
 
@@ -36,7 +36,7 @@ class MeasuredChange:
     share of static friction for curves and of the number itself for numbers; it is kept where that is below
     `allowed`."""
 
-    kind: Shown
+    kind: MeasuredKind
     unit: str
     before: float
     after: float
@@ -144,7 +144,7 @@ def _text(value: float, unit: str) -> Any:
     return f"{value!r} {unit}" if unit else value
 
 
-def _number(kind: Shown, unit: str, before: float, after: float) -> MeasuredChange:
+def _number(kind: MeasuredKind, unit: str, before: float, after: float) -> MeasuredChange:
     size = max(abs(before), abs(after)) or 1.0
     return MeasuredChange(kind, unit, before, after, abs(after - before) / size)
 

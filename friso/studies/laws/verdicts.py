@@ -19,14 +19,14 @@ from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import (
     ELEMENTS,
     LawConversion,
-    Shown,
+    MeasuredKind,
     compared,
     convert,
     convertible,
     measure_friction,
 )
 
-NEEDED: frozenset[Shown] = frozenset(("curve", "static", "stiffness", "viscous"))
+NEEDED: frozenset[MeasuredKind] = frozenset(("curve", "static", "stiffness", "viscous"))
 """What a law has to keep to be tried."""
 
 
@@ -116,7 +116,7 @@ class VerdictsByLaw:
 
     stage: Stage
     verdicts: tuple[LawVerdict, ...]
-    left_out: Mapping[str, tuple[Shown, ...]]
+    left_out: Mapping[str, tuple[MeasuredKind, ...]]
 
     @property
     def in_hertz(self) -> bool:
@@ -161,7 +161,7 @@ def verdicts_by_law(
     """What becomes of a stage under each law that keeps what is measured of its own. Raises InputError for a law that
     does not declare what that is."""
     conversions, left_out = kept_laws(stage, elements)
-    planned = [(conversion, list(drawn(conversion))) for conversion in conversions]
+    planned = [(conversion, list(stages_left_open(conversion))) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
     kernels(set[KernelRequest]().union(*(needed_kernels(conversion.stage) for conversion in conversions)))
     verdicts = []
@@ -177,11 +177,11 @@ def verdicts_by_law(
     return VerdictsByLaw(stage, tuple(verdicts), left_out)
 
 
-def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[Shown, ...]]]:
+def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[str, tuple[MeasuredKind, ...]]]:
     """The stage as it is, and under the other laws that keep what is measured of it; and what the others lose."""
     own = stage.flat()["friction.model"]
     kept = [compared(stage, stage, measure_friction(stage.flat()))]
-    left_out: dict[str, tuple[Shown, ...]] = {}
+    left_out: dict[str, tuple[MeasuredKind, ...]] = {}
     for law in convertible():
         if law == own:
             continue
@@ -192,7 +192,7 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
                 raise
             left_out[law] = ("conditions",)  # that the law cannot follow
             continue
-        lost: tuple[Shown, ...] = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
+        lost: tuple[MeasuredKind, ...] = tuple(item.kind for item in conversion.lost if item.kind in NEEDED)
         if lost:
             left_out[law] = lost
         else:
@@ -206,14 +206,14 @@ def frictions_that_keep(stage: Stage, elements: int = ELEMENTS) -> dict[str, dic
     declare what is measured of it."""
     frictions = {}
     for conversion in kept_laws(stage, elements)[0][1:]:
-        for changes in drawn(conversion):
+        for changes in stages_left_open(conversion):
             flat = conversion.stage.with_numbers(changes).flat()
             name = ", ".join([conversion.law, *(f"{key} {value:.3g}" for key, value in changes.items())])
             frictions[name] = {key: value for key, value in flat.items() if key.startswith("friction.")}
     return frictions
 
 
-def drawn(conversion: LawConversion) -> Iterator[dict[str, float]]:
+def stages_left_open(conversion: LawConversion) -> Iterator[dict[str, float]]:
     """What the measurements leave open: as the conversion has it, and at both ends of the ranges; as it is for the
     stage's own law."""
     yield {}

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.studies.laws.conversion import ELEMENTS, LawConversion, Shown, compared, measure_friction
+from friso.studies.laws.conversion import ELEMENTS, LawConversion, MeasuredKind, compared, measure_friction
 from friso.studies.laws.verdicts import kept_laws
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
 from friso.studies.thesis.evidence import RESPONSES, maps_of, run_response
@@ -56,7 +56,7 @@ class ConclusionsByLaw:
     `left_out`: what they do not keep."""
 
     laws: tuple[str, ...]
-    left_out: Mapping[str, tuple[Shown, ...]]
+    left_out: Mapping[str, tuple[MeasuredKind, ...]]
     conclusions: tuple[ConclusionByLaw, ...]
 
     @property

@@ -10,9 +10,9 @@ from friso.stage.stage import declared_keys
 from friso.views.drawing.prefixes import listed, with_unit
 
 if TYPE_CHECKING:
-    from friso.studies.laws.conversion import LawConversion, MeasuredChange, Shown
+    from friso.studies.laws.conversion import LawConversion, MeasuredChange, MeasuredKind
 
-SHOWN: Mapping[Shown, str] = {
+SHOWN: Mapping[MeasuredKind, str] = {
     "curve": "steady friction over speed",
     "static": "break-away",
     "stiffness": "stiffness before sliding",
