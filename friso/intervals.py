@@ -15,7 +15,7 @@ from pydantic_core import CoreSchema, core_schema
 from friso.errors import InputError
 from friso.quantities import Number, Quantity, Value, non_negative, quoted
 
-Form = Literal["value", "tolerance", "range"]
+IntervalForm = Literal["value", "tolerance", "range"]
 
 _MARKS = ("..", "+/-", "±")
 
@@ -36,7 +36,7 @@ class Interval:
     low: float
     high: float
     text: str
-    form: Form = "range"
+    form: IntervalForm = "range"
 
     @property
     def single(self) -> bool:

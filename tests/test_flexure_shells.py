@@ -13,11 +13,11 @@ import shells
 
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.closed_model import closed_form_model
-from friso.leaf_springs.evaluation import Evaluation, Model
+from friso.leaf_springs.evaluation import Evaluation, LeafModel
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 
-MODELS: dict[str, Model] = {"closed forms": closed_form_model, "beams": beams}
+MODELS: dict[str, LeafModel] = {"closed forms": closed_form_model, "beams": beams}
 MECHANISMS = {
     # leaves, length, width, thickness, spacing [mm], material, mass [kg], x of its centre beyond the leaf ends [mm]
     "the thesis's": (2, 70, 45, 0.35, 60, "stainless 1.4310", 0.5, 0),
@@ -125,7 +125,7 @@ def by_model(evaluation: Evaluation, half: Evaluation) -> dict[str, float]:
     return results | both | {"drive, straight": evaluation.drive[0], "drive, deflected": evaluation.drive[-1]}
 
 
-def errors(name: str, model: Model, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
+def errors(name: str, model: LeafModel, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
     example = mechanism(name)
     results, expected = (
         by_model(model(example, example.length / 50), model(example, example.length / 100)),

@@ -371,7 +371,9 @@ def quick() -> compute.Guideline:
     """A guideline of invented sweeps and a shortened rig: what is shown, not what is found."""
     patch = pytest.MonkeyPatch()
     patch.setattr(sweeps, "find_edges", invented)
-    patch.setattr(compute, "simulate_samples", lambda sweep, most: checks.Checked(most, most, 0, most, 0, 100, 0))
+    patch.setattr(
+        compute, "simulate_samples", lambda sweep, most: checks.SimulationCheck(most, most, 0, most, 0, 100, 0)
+    )
     patch.setattr(compute, "worked", shown)
     patch.setattr(compute, "_compile", lambda: None)
     patch.setattr(parasitic, "FREQUENCIES", (300.0,))

@@ -21,7 +21,7 @@ from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Identification, identify
 from friso.identification.moves import IdentifiedMoves
 from friso.identification.output_error.coverage import coverage
-from friso.identification.output_error.identifiable import Identified
+from friso.identification.output_error.identifiable import IdentifiableFit
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.readings.common import LINEARITY, record
 from friso.identification.sources import log_with_signals, read_all
@@ -159,7 +159,7 @@ def test_static_friction_is_less_certain_where_the_stage_follows_the_log(in_loop
     sure = replace(fit, free=every, covariance=1e-12 * np.eye(len(every)))
     names = frozenset(parameter.name for parameter in fit.problem.parameters)
     covered = coverage(axis()["position"], motion(axis()["position"], DT, 25.0), MASS, COULOMB, DT)
-    estimates = {one.name: one for one in estimates_of(Identified(sure, {}, names), covered)[0]}
+    estimates = {one.name: one for one in estimates_of(IdentifiableFit(sure, {}, names), covered)[0]}
     static, coulomb = (estimates[f"friction.{name}"] for name in ("static", "coulomb"))
     assert static.half_width == pytest.approx(max(share, LINEARITY) * static.value, rel=1e-3)
     assert coulomb.half_width == pytest.approx(LINEARITY * coulomb.value, rel=1e-3)

@@ -28,17 +28,17 @@ from friso.studies.rig.moves_on_rails import (
 )
 from friso.views.rig.document import rig_document
 from friso.views.rig.page import figures, sentences
-from friso.virtual_rig.run import Recorded
+from friso.virtual_rig.run import RecordedRuns
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
 
 
-def recorded(*deviations: np.ndarray, step: float = 1e-3) -> Recorded:
+def recorded(*deviations: np.ndarray, step: float = 1e-3) -> RecordedRuns:
     """Runs whose position deviates so [m] from a reference of 0."""
     position = np.array(deviations)
     statuses = np.where(np.isfinite(position).all(axis=1), Status.DONE, Status.DONE + 1)
     logged = {"position": position, "reference": np.zeros_like(position)}
-    return Recorded(np.arange(len(position)), step, logged, {"position": position}, statuses)
+    return RecordedRuns(np.arange(len(position)), step, logged, {"position": position}, statuses)
 
 
 def test_a_cycle_of_known_shape() -> None:

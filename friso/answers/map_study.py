@@ -17,7 +17,7 @@ from friso.answers.output_folder import check_file, check_store_folder, refuse_p
 from friso.errors import InputError, StoreError
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.studies.axes import Values
+from friso.studies.axes import AxisValues
 from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
@@ -40,7 +40,7 @@ BYTES = 8
 class Varied:
     """The options that say what is varied, as they were given."""
 
-    axes: Mapping[str, Values] = field(default_factory=dict)
+    axes: Mapping[str, AxisValues] = field(default_factory=dict)
     links: Mapping[str, str] = field(default_factory=dict)
     samples: int | Samples | None = None
     latin: bool = False
@@ -49,7 +49,7 @@ class Varied:
     @classmethod
     def of_texts(
         cls,
-        axes: Mapping[str, Values],
+        axes: Mapping[str, AxisValues],
         x: str | None,
         y: str | None,
         more: Iterable[str],

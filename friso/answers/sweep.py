@@ -29,7 +29,7 @@ from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
-from friso.studies.axes import Values
+from friso.studies.axes import AxisValues
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.store import Store, check_store, in_memory
@@ -120,7 +120,7 @@ class SweepAnswer(Answer):
 @question
 def sweep(
     stage: StageLike,
-    axes: Mapping[str, Values] | None = None,
+    axes: Mapping[str, AxisValues] | None = None,
     samples: int | Samples | None = None,
     *,
     x: str | None = None,

@@ -101,7 +101,7 @@ def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
 
 
 @dataclass(frozen=True)
-class Judged:
+class GeometryScores:
     """Geometries: their drive stiffness [N/m] and first interfering frequency [Hz], shape (count,), and by what factor
     each requirement is broken, (count, requirements)."""
 
@@ -110,8 +110,10 @@ class Judged:
     excess: np.ndarray
 
 
-def evaluate_geometries(task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
+def evaluate_geometries(
+    task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]
+) -> GeometryScores:
     """Geometries by closed forms."""
     many = mechanisms(task.flat, sizes, bought)
     excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]
-    return Judged(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))
+    return GeometryScores(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))

@@ -12,7 +12,7 @@ from friso.errors import InputError
 from friso.quantities import quoted
 from friso.registry import Registry
 
-Flat = Mapping[str, Any]
+FlatStage = Mapping[str, Any]
 """A stage as flat keys."""
 
 
@@ -90,8 +90,8 @@ class ParameterFormat:
     axes: Callable[[str], tuple[AxisParameters, ...]]
     questions: Callable[[AxisParameters, UserAnswers], tuple[OpenQuestion, ...]]
     stage: Callable[[AxisParameters, UserAnswers], AsStage]
-    questions_back: Callable[[Flat, UserAnswers], tuple[OpenQuestion, ...]]
-    parameters: Callable[[Flat, UserAnswers], Parameters]
+    questions_back: Callable[[FlatStage, UserAnswers], tuple[OpenQuestion, ...]]
+    parameters: Callable[[FlatStage, UserAnswers], Parameters]
     text: Callable[[Mapping[str, float]], str]
     suffix: str
 

@@ -10,7 +10,7 @@ from types import ModuleType
 
 from friso.engine import driver, scalar_code, vector_code
 from friso.engine.cache import keep
-from friso.engine.kernel import Form, driver_kinds
+from friso.engine.kernel import KernelForm, driver_kinds
 from friso.engine.layout import FUNCTIONS
 from friso.engine.machine_code import object_code
 from friso.engine.module_source import write_module
@@ -56,7 +56,7 @@ def _code(module: ModuleType) -> bytes:
     return object_code(vector_code.vector_llvm(functions, module.LAYOUT["lanes"]))
 
 
-def _model(form: Form) -> Model:
+def _model(form: KernelForm) -> Model:
     if isinstance(form, Dragged):
         return dragged(form)
     if isinstance(form, Imposed):

@@ -44,7 +44,7 @@ class Inputs:
 
 
 @dataclass(frozen=True)
-class Followed:
+class DrivenRuns:
     """States at the samples, shape (runs, n, states), and what is held from each until the next, (runs, n, held)."""
 
     numbers: np.ndarray
@@ -55,7 +55,7 @@ class Followed:
 
 def run_driven(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
-) -> Iterator[Followed]:
+) -> Iterator[DrivenRuns]:
     """Runs of stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,), from the states
     `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on, and has its status.
     """
@@ -75,7 +75,7 @@ def run_driven(
         results = empty_results(len(numbers), 1, count + 1, len(kernel.full_state))
         run_batch(kernel, batch, settings, results, options.threads)
         states, held = np.split(results.samples, [len(kernel.states)], axis=2)
-        yield Followed(numbers, states[:, :-1], held[:, 1:], results.statuses)
+        yield DrivenRuns(numbers, states[:, :-1], held[:, 1:], results.statuses)
 
 
 def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
-Entry = tuple[int, int]
+MatrixEntry = tuple[int, int]
 
 MULTIPLY, DIVIDE = 4, 13
 """Latency of a fused multiply-add and of a division, in cycles, on current x86-64 processors."""
@@ -24,7 +24,7 @@ class Elimination:
     """Pivot order, entries of the lower factor in the order of use, rows of the upper one, and the factorising code."""
 
     order: tuple[int, ...]
-    lower: tuple[Entry, ...]
+    lower: tuple[MatrixEntry, ...]
     upper: dict[int, tuple[int, ...]]
     code: tuple[str, ...]
 
@@ -38,7 +38,7 @@ class Elimination:
         return forward + backward
 
 
-def eliminate(size: int, nonzero: set[Entry], diagonal: set[int], solves: int) -> Elimination:
+def eliminate(size: int, nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> Elimination:
     """Elimination of the matrix whose entries ``A_i_j`` are nonzero at `nonzero` and on the diagonal.
 
     Rows not in `diagonal` have nothing but ``diagonal`` on the diagonal, whose inverse is ``inverse``. The order is the
@@ -59,7 +59,7 @@ def eliminate(size: int, nonzero: set[Entry], diagonal: set[int], solves: int) -
     return _write(order, pattern, diagonal)
 
 
-def _markowitz(size: int, nonzero: set[Entry]) -> list[int]:
+def _markowitz(size: int, nonzero: set[MatrixEntry]) -> list[int]:
     """Diagonal pivots, the one that causes the fewest products first."""
     pattern, left, order = set(nonzero), set(range(size)), []
     while left:
@@ -72,7 +72,7 @@ def _markowitz(size: int, nonzero: set[Entry]) -> list[int]:
     return order
 
 
-def _cost(order: Sequence[int], nonzero: set[Entry], diagonal: set[int], solves: int) -> float:
+def _cost(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int], solves: int) -> float:
     """Cycles for a factorisation and `solves` solutions: the longest wait, and a share for every operation."""
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0
@@ -98,11 +98,11 @@ def _cost(order: Sequence[int], nonzero: set[Entry], diagonal: set[int], solves:
     return max(inverse.values()) + solves * max(backward.values()) + WORK * operations
 
 
-def _write(order: Sequence[int], nonzero: set[Entry], diagonal: set[int]) -> Elimination:
+def _write(order: Sequence[int], nonzero: set[MatrixEntry], diagonal: set[int]) -> Elimination:
     """The elimination in the given order."""
     pattern, untouched = set(nonzero), set(order) - diagonal
     code: list[str] = []
-    lower: list[Entry] = []
+    lower: list[MatrixEntry] = []
     upper: dict[int, tuple[int, ...]] = {}
     for step, k in enumerate(order):
         later = order[step + 1 :]

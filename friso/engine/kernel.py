@@ -15,7 +15,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, Compiled
-from friso.engine.kinds import Kind, argument_kind
+from friso.engine.kinds import ArgumentKind, argument_kind
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
 from friso.engine.machine_code import Loops, load_object
 from friso.equations.as_built import AsBuilt
@@ -28,7 +28,7 @@ from friso.stage import Section
 from friso.stage.plug_ins import plug_ins
 from friso.stage.tables import friction_law
 
-Form = Structure | Imposed | Driven | AsBuilt
+KernelForm = Structure | Imposed | Driven | AsBuilt
 """What a kernel may be made for: stages, friction under an imposed motion, stages that follow a log, and stages with
 their drive as built."""
 
@@ -169,7 +169,7 @@ class KernelRequest:
     """Which kernel: for what, with variational equations or without, by the named method, in so many lanes. The
     deviations of variational equations may be `along` keys of the stage file too."""
 
-    structure: Form
+    structure: KernelForm
     variational: bool = False
     method: str = "Rodas5P"
     lanes: int = LANES
@@ -204,7 +204,7 @@ _CIRCUMSTANCES = {
 
 
 def kernel(
-    structure: Form,
+    structure: KernelForm,
     variational: bool = False,
     method: str = "Rodas5P",
     lanes: int = LANES,
@@ -274,7 +274,7 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
     )
 
 
-def driver_kinds() -> list[Kind]:
+def driver_kinds() -> list[ArgumentKind]:
     """The kinds of the driver's arguments."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)

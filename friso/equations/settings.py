@@ -18,9 +18,9 @@ from friso.quantities import quoted
 from friso.stage.controllers import ControllerSection, controller_of
 from friso.stage.transmission import moving_mass
 
-Machine = Mapping[str, Any]
-Sizes = Callable[[Machine, float], dict[str, float]]
-Ranges = Callable[[Machine, float], dict[str, tuple[float, float]]]
+FlatMachine = Mapping[str, Any]
+Sizes = Callable[[FlatMachine, float], dict[str, float]]
+Ranges = Callable[[FlatMachine, float], dict[str, tuple[float, float]]]
 """From the flat keys of a stage and the tolerance for being in position [m] to values [SI] of names in [controller], or
 to their ends."""
 
@@ -51,11 +51,11 @@ class Setting:
     sizes: Sizes
     tuned_in: Ranges | None = None
 
-    def numbers(self, flat: Machine, within: float) -> dict[str, float]:
+    def numbers(self, flat: FlatMachine, within: float) -> dict[str, float]:
         """Its keys in a stage file, and their values [SI]."""
         return {ControllerSection.key(name): value for name, value in self.sizes(flat, within).items()}
 
-    def ranges(self, flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+    def ranges(self, flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
         """Its keys in a stage file, and the ends [SI] between which they are tuned; none where it is not."""
         if self.tuned_in is None:
             return {}
@@ -67,42 +67,42 @@ def _scaled(scale: float, ends: tuple[float, float]) -> tuple[float, float]:
     return scale * low, scale * high
 
 
-def _limits(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+def _limits(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     return {"integral_limit": _scaled(float(breakaway(flat)), LIMITS)}
 
 
-def _leak(flat: Machine, within: float) -> dict[str, float]:
+def _leak(flat: FlatMachine, within: float) -> dict[str, float]:
     proportional, integral = slow_gains(flat)
     return {"integral_leak": integral / proportional / (2 * pi) / 10}
 
 
-def _leaks(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+def _leaks(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     stated = controller_of(flat).bandwidth_key
     return {"integral_leak": _scaled(flat[stated] if stated else 1.0, LEAKS)}
 
 
-def _deadbands(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+def _deadbands(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     return {"integral_deadband": _scaled(within, DEADBANDS), "integral_deadband_exit": _scaled(within, EXITS)}
 
 
-def _standstill(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+def _standstill(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     return {"standstill_window": _scaled(within, WINDOWS), "standstill_factor": FACTORS}
 
 
-def _dithers(flat: Machine, within: float) -> dict[str, tuple[float, float]]:
+def _dithers(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     return {
         "dither_amplitude": _scaled(float(sliding(flat)), AMPLITUDES),
         "dither_frequency": _scaled(_own_frequency(flat), FREQUENCIES),
     }
 
 
-def _own_frequency(flat: Machine) -> float:
+def _own_frequency(flat: FlatMachine) -> float:
     """That [Hz] of the moving mass on the proportional stiffness of the loop."""
     proportional, _ = slow_gains(flat)
     return sqrt(proportional / moving_mass(flat)) / (2 * pi)
 
 
-def _dither(flat: Machine, within: float) -> dict[str, float]:
+def _dither(flat: FlatMachine, within: float) -> dict[str, float]:
     return {
         "dither_amplitude": 0.5 * float(sliding(flat)),
         "dither_frequency": min(10 * _own_frequency(flat), 1 / (20 * flat["drive.sample_time"])),

@@ -36,7 +36,7 @@ magnitude by which it may still change, or be off the real axis."""
 REAL = 1e-9
 """Share of the real part below which the imaginary one may be rounding."""
 
-Response = Callable[[np.ndarray], Complex]
+LoopResponse = Callable[[np.ndarray], Complex]
 
 
 @dataclass(frozen=True)
@@ -105,14 +105,14 @@ def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
-def _at_rest(at: Response, slow: float) -> list[complex]:
+def _at_rest(at: LoopResponse, slow: float) -> list[complex]:
     """The loop at rest, if it is finite there: real, and the same on the way there."""
     low, lower = at(np.array([2 * REST, REST]) * slow)
     flat = np.abs(low - lower) < REST * np.abs(lower) and np.abs(lower.imag) < REST * np.abs(lower.real)
     return [complex(lower.real)] if flat else []
 
 
-def of_loop(response: Response, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
+def of_loop(response: LoopResponse, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
     """The margins of a loop from its response, the poles of the closed loop with the real part of the rightmost,
     frequencies [rad/s] that show it, and its values where it is real at any gain: at rest, and at half the sampling
     frequency."""
@@ -155,7 +155,7 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
     return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
 
 
-def _gains(response: Response, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
+def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
     """Factors by which the gain takes the loop through -1: where L is real and negative."""
     clear = np.where(np.abs(gains.imag) > REAL * np.abs(gains.real), gains.imag, np.nan)  # not rounding
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
@@ -163,7 +163,7 @@ def _gains(response: Response, omega: np.ndarray, gains: Complex, ends: Complex)
     return -1 / at.real[at.real < 0]
 
 
-def _closest(response: Response, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
+def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:
     """Where L comes closest to -1 [rad/s], and how close."""
     inner = np.flatnonzero((distance[1:-1] <= distance[:-2]) & (distance[1:-1] <= distance[2:])) + 1
     least = int(distance.argmin())

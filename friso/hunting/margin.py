@@ -61,7 +61,7 @@ class BandwidthWindow:
 
 
 @dataclass(frozen=True)
-class Searched:
+class SearchedBandwidths:
     """What a search through the bandwidths showed: the `margin` (None: no such edge); the other `windows` in which
     something attracts; of a stage that something attracts the end below it of what does, `lower` (None: there is none);
     and whether the search `contradicts` that nothing attracts the stage itself, to which an orbit was followed."""
@@ -72,7 +72,7 @@ class Searched:
     contradicts: bool = False
 
 
-NOT_SOUGHT = Searched(None, ())
+NOT_SOUGHT = SearchedBandwidths(None, ())
 """What is told of a stage that cannot hunt at any bandwidth, or where the allowance does not suffice for a survey."""
 
 
@@ -82,7 +82,7 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     return search_bandwidths(stage, attracting).margin
 
 
-def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> Searched:
+def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None = None) -> SearchedBandwidths:
     """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `survey` is what
     attracts the stage itself, if that was surveyed. Where an allowance is used up, ends are where they are known to be
     by then, and not certain."""
@@ -102,12 +102,12 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     lower = grid.lower_end(index) if attracting else None
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
-        return Searched(None, grid.windows(index), lower, contradicts)
+        return SearchedBandwidths(None, grid.windows(index), lower, contradicts)
     at, end, certain = edge
     conclusive = certain and not contradicts
     inside = None if crossover is None else crossover * end.inside
     outermost = Margin(end.inside, inside, conclusive, end.outside, end.reserve)
-    return Searched(outermost, grid.windows(at), lower, contradicts)
+    return SearchedBandwidths(outermost, grid.windows(at), lower, contradicts)
 
 
 class _Grid:

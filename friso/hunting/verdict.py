@@ -32,7 +32,7 @@ from friso.hunting.criteria import BAND, COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
-from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, Searched, search_bandwidths
+from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measure_runs, measuring_options
 from friso.hunting.outward import AttractionEnd
 from friso.hunting.turning import HALF, WINDOW
@@ -279,7 +279,7 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
     return lost or (moved is not None and not moved.hunting and moved.count < MOVES)
 
 
-def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[Searched, tuple[str, ...]]:
+def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[str, ...]]:
     """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
     with allowance(work) as search:
         sought = search_bandwidths(stage, attraction.target is not None, attraction.surveyed)

@@ -144,7 +144,7 @@ def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) 
 
 
 @dataclass(frozen=True)
-class Solved:
+class LinearisedLeaves:
     """A configuration linearised in the plane: the change that leads to equilibrium at the same z, and its energy."""
 
     plane: Condensed
@@ -153,7 +153,9 @@ class Solved:
     energy: float
 
 
-def _condensed(mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
+def _condensed(
+    mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray
+) -> LinearisedLeaves:
     """The stiffness of the leaves and the forces on their nodes, condensed onto the stage."""
     offsets, turn = mechanism.offsets, place.stage[2]
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
@@ -166,11 +168,11 @@ def _condensed(mechanism: Mechanism, place: Configuration, stiffness: np.ndarray
     change = Configuration((plane.settle + plane.follow @ move).reshape(place.inner.shape), move)
     at_ends = np.einsum("li,lij,j", forces[:, -1, PLANE], ends, move)
     energy = abs(np.sum(forces[:, 1:-1, PLANE] * change.inner) + at_ends)
-    return Solved(plane, change, float(plane.force[1] + plane.stiffness[1] @ move), float(energy))
+    return LinearisedLeaves(plane, change, float(plane.force[1] + plane.stiffness[1] @ move), float(energy))
 
 
 def _held(
-    mechanism: Mechanism, place: Configuration, solved: Solved, stiffness: np.ndarray, forces: np.ndarray
+    mechanism: Mechanism, place: Configuration, solved: LinearisedLeaves, stiffness: np.ndarray, forces: np.ndarray
 ) -> HeldEquilibrium:
     """The equilibrium next to this place."""
     plane = solved.plane

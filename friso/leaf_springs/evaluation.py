@@ -127,5 +127,5 @@ def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
     return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 
 
-Model = Callable[[Mechanism, float], Evaluation]
+LeafModel = Callable[[Mechanism, float], Evaluation]
 """A model of mechanisms: evaluates one at a stroke [m]."""

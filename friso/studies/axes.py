@@ -14,7 +14,7 @@ from friso.errors import InputError
 from friso.quantities import Number, Quantity, any_sign, quoted
 from friso.stage import Stage, parse_set
 
-Values = str | Sequence[Any] | np.ndarray | tuple[Any, str]
+AxisValues = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
 
 MOST_POINTS = 1_000_000_000
@@ -60,7 +60,7 @@ class SweptRange:
         return SweptAxis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
 
 
-def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = False) -> SweptAxis | SweptRange:
+def read_axis(stage: Stage, name: str, values: AxisValues, free: bool, log: bool = False) -> SweptAxis | SweptRange:
     """An axis of a stage from a text, a list or an array with a unit; a range stays a `SweptRange`.
 
     `free`: links use the name, so it need not be a key. With `log` a range that does not say how
@@ -155,7 +155,7 @@ def _count(text: str, digits: str | None) -> int | None:
     return count
 
 
-def _axis_of_values(name: str, values: Values, reader: _Reader) -> SweptAxis:
+def _axis_of_values(name: str, values: AxisValues, reader: _Reader) -> SweptAxis:
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
         si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
     elif isinstance(values, str):
@@ -179,7 +179,7 @@ def _items(values: Any) -> list[Any]:
         raise InputError("", quoted(values), "a range, or a list of values", RANGE_EXAMPLE) from None
 
 
-def _words(stage: Stage, key: str, values: Values) -> SweptAxis:
+def _words(stage: Stage, key: str, values: AxisValues) -> SweptAxis:
     """An axis of words or booleans, each of which the stage takes."""
     options = (
         [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else _items(values)
@@ -199,7 +199,7 @@ def _words(stage: Stage, key: str, values: Values) -> SweptAxis:
 
 
 def read_axes(
-    stage: Stage, axes: Mapping[str, Values], free: frozenset[str], log: bool = False
+    stage: Stage, axes: Mapping[str, AxisValues], free: frozenset[str], log: bool = False
 ) -> tuple[SweptAxis | SweptRange, ...]:
     """All axes, as `read_axis` reads them. Raises InputError."""
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

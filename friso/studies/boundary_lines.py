@@ -11,7 +11,7 @@ import numpy as np
 from friso.hunting.boundary import Branch, Curve, Diagram, LocatedPoint, Plane, Space
 from friso.hunting.cycle.find import Cycles
 
-Shape = Literal["symmetric", "asymmetric", "whole"]
+CycleShape = Literal["symmetric", "asymmetric", "whole"]
 """A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
 
 ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
@@ -28,7 +28,7 @@ class Line:
     and how the line ends on either side.
     """
 
-    shape: Shape
+    shape: CycleShape
     at: np.ndarray
     error: np.ndarray
     kinds: tuple[str, ...]

@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.engine.overtaken import go_on
 from friso.studies.cells import Columns, run_cells
-from friso.studies.study import Block, Study
+from friso.studies.study import CellBlock, Study
 
 LARGEST_BLOCK = 2048
 """Cells of a block in memory: enough that all lanes are busy nearly to its end."""
@@ -48,7 +48,7 @@ class Crew:
     def __exit__(self, *reason: object) -> None:
         self.executor.shutdown(wait=True, cancel_futures=True)
 
-    def compute(self, jobs: Iterable[tuple[Study, Block]]) -> Iterator[tuple[Study, Block, Columns]]:
+    def compute(self, jobs: Iterable[tuple[Study, CellBlock]]) -> Iterator[tuple[Study, CellBlock, Columns]]:
         """The measures of blocks of studies, in the order in which they are done.
 
         No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends
@@ -56,7 +56,7 @@ class Crew:
         """
         self.cancel[0] = 0
         upcoming = iter(jobs)
-        flying: dict[Future[Columns], tuple[Study, Block]] = {}
+        flying: dict[Future[Columns], tuple[Study, CellBlock]] = {}
         try:
             while True:
                 go_on()
@@ -73,7 +73,7 @@ class Crew:
                     future.cancel()
                 wait(flying, timeout=PATIENCE)
 
-    def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, Block]]:
+    def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, CellBlock]]:
         """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""
         for study in studies:
             largest = CYCLES_BLOCK if study.cycles else LARGEST_BLOCK
@@ -93,7 +93,7 @@ class Crew:
             self.broken = isinstance(error, BrokenExecutor)
             raise RuntimeError(f"the workers lost a block: {error or type(error).__name__}") from error
 
-    def _submit(self, study: Study, block: Block) -> Future[Columns]:
+    def _submit(self, study: Study, block: CellBlock) -> Future[Columns]:
         arguments = (study.stage, study.links, study.block_columns(block), study.rtol, study.metrics)
         with self._blamed():
             return self.executor.submit(self.task, *arguments, **self.arguments)

@@ -12,7 +12,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies import links as linking
-from friso.studies.axes import SweptAxis, SweptRange, Values, read_axes
+from friso.studies.axes import AxisValues, SweptAxis, SweptRange, read_axes
 from friso.studies.cells import ALWAYS, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.samples import SAMPLE, Samples, sample_axes
 from friso.studies.study import Dimension, Study
@@ -27,12 +27,12 @@ class Request:
     how they are spaced are logarithmic."""
 
     stage: Stage
-    axes: Mapping[str, Values]
+    axes: Mapping[str, AxisValues]
     samples: Samples | None = None
     links: Mapping[str, str] = field(default_factory=dict)
     log: bool = False
 
-    def _read(self, axes: Mapping[str, Values]) -> tuple[SweptAxis | SweptRange, ...]:
+    def _read(self, axes: Mapping[str, AxisValues]) -> tuple[SweptAxis | SweptRange, ...]:
         return read_axes(self.stage, axes, linking.names(self.links), self.log)
 
     def size(self) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.quantities import quoted
 from friso.stage import Stage
-from friso.studies.axes import MOST_POINTS, SweptAxis, SweptRange, Values, read_axes
+from friso.studies.axes import MOST_POINTS, AxisValues, SweptAxis, SweptRange, read_axes
 
 SAMPLE = "sample"
 """Name of the dimension along which samples lie."""
@@ -25,7 +25,7 @@ class Samples:
     logarithm): `count` points by a method of `METHODS`, the same for the same `seed`. Where `ranges` holds lists or
     arrays of equal length instead, these are the points."""
 
-    ranges: Mapping[str, Values]
+    ranges: Mapping[str, AxisValues]
     count: int | None = None
     method: str = "sobol"
     seed: int = field(default=0)

@@ -27,7 +27,7 @@ from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.store_files import refuse_foreign
 from friso.studies.store_folder import exchange, lock_store, make, remove_leftovers, remove_partial_files
-from friso.studies.study import Block, Study, study_of
+from friso.studies.study import CellBlock, Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -122,7 +122,7 @@ class Store:
         """What was written of each block."""
         return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
 
-    def missing(self) -> Iterator[Block]:
+    def missing(self) -> Iterator[CellBlock]:
         """The blocks not yet done, and those that are damaged, which is logged."""
         ledger = self.ledger
         for block in self.study.blocks(self.blocks):
@@ -141,11 +141,11 @@ class Store:
         damaged = [number for number in done if not ledger.is_whole(number)]
         return StoreState(len(numbers), len(done), damaged, metadata.damaged_files(self.path))
 
-    def _number(self, block: Block) -> str:
+    def _number(self, block: CellBlock) -> str:
         """The name of the files of a block."""
         return ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
 
-    def write(self, block: Block, columns: Mapping[str, np.ndarray]) -> None:
+    def write(self, block: CellBlock, columns: Mapping[str, np.ndarray]) -> None:
         """Write the measures of a block and enter it. Raises OSError where the disk is full."""
         import zarr
 

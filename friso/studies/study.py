@@ -22,7 +22,7 @@ from friso.version import VERSION
 if TYPE_CHECKING:
     import xarray as xr
 
-Block = tuple[slice, ...]
+CellBlock = tuple[slice, ...]
 """A rectangle of cells, one slice per dimension."""
 
 
@@ -80,7 +80,7 @@ class Study:
             for axis in dimension.axes
         }
 
-    def block_columns(self, block: Block) -> dict[str, np.ndarray]:
+    def block_columns(self, block: CellBlock) -> dict[str, np.ndarray]:
         """The value of every axis at the cells of a block, in C order."""
         picked = [np.arange(len(dimension))[part] for dimension, part in zip(self.dimensions, block, strict=True)]
         places = [place.ravel() for place in np.meshgrid(*picked, indexing="ij")]
@@ -100,7 +100,7 @@ class Study:
                 break
         return tuple(shape)
 
-    def blocks(self, shape: Sequence[int]) -> Iterator[Block]:
+    def blocks(self, shape: Sequence[int]) -> Iterator[CellBlock]:
         """All blocks of a shape, those at the ends cut to fit."""
         starts = (range(0, size, step) for size, step in zip(self.shape, shape, strict=True))
         for corner in product(*starts):
@@ -178,7 +178,7 @@ class Study:
         return differences
 
 
-def cells_of(block: Block) -> int:
+def cells_of(block: CellBlock) -> int:
     """The number of cells of a block."""
     return math.prod(part.stop - part.start for part in block)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
-from friso.studies.axes import Values
+from friso.studies.axes import AxisValues
 from friso.studies.cells import METRICS, USUAL, WORDS, Columns, attributes_of
 from friso.studies.execute import Crew, local_crew, run_scattered
 from friso.studies.refine import Ask, finer, refine_cells
@@ -31,7 +31,7 @@ CELLS = "cells"
 
 def sweep(
     stage: Stage,
-    axes: Mapping[str, Values],
+    axes: Mapping[str, AxisValues],
     samples: Samples | None = None,
     links: Mapping[str, str] | None = None,
     metrics: Sequence[str] | None = None,

@@ -39,7 +39,7 @@ SENSOR = int.from_bytes(b"sensor")
 
 
 @dataclass(frozen=True)
-class Recorded:
+class RecordedRuns:
     """Numbers of the runs and their records, every `interval` [s].
 
     `logged` are the signals that the drive knows, `true` what really moves, by the names of the roles of a log: SI,
@@ -77,7 +77,7 @@ def run(
     interval: float,
     changes: Mapping[str, Any] | None = None,
     threads: int | None = None,
-) -> Iterator[Recorded]:
+) -> Iterator[RecordedRuns]:
     """Runs of a stage, each with noise of its own seed, logged every `interval` [s], a whole number of samples.
 
     `changes` are flat keys to SI numbers, or arrays of one for each run: of a sweep, or of machines drawn at random.
@@ -125,7 +125,7 @@ def _recorded(
     seeds: np.ndarray,
     numbers: np.ndarray,
     timing: tuple[float, int, int | None],
-) -> Recorded:
+) -> RecordedRuns:
     interval, count, threads = timing
     flat = {**flat, "drive.seed": seeds.astype(float)}
     low, high = task.span
@@ -145,7 +145,9 @@ def _recorded(
     )
     results = empty_results(len(seeds), 1, count, len(shape.full_state))
     run_batch(shape, batch, options_of(options), results, threads)
-    return Recorded(numbers, interval, *_signals(shape, results.samples, flat, task, seeds, interval), results.statuses)
+    return RecordedRuns(
+        numbers, interval, *_signals(shape, results.samples, flat, task, seeds, interval), results.statuses
+    )
 
 
 def _signals(
@@ -188,7 +190,7 @@ def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
     return rows[:, 1] + rows[:, 2] * since + rows[:, 3] * since**2 / 2
 
 
-def failures(recorded: Recorded) -> list[tuple[int, str]]:
+def failures(recorded: RecordedRuns) -> list[tuple[int, str]]:
     """Numbers of the runs that failed, and why."""
     failed = recorded.statuses != Status.DONE
     return [

@@ -14,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
-from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, Parameters, lacks, si
+from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
@@ -252,7 +252,7 @@ def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float
     return units[name]
 
 
-def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
+def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """The unit, and what an output of 1 makes: a force, or a velocity that a cascade's inner loop follows."""
     kind = axis_of(flat)
     asked = [OpenQuestion(UNIT, "unit of the machine", '"mm"' if kind == LINEAR else '"deg"')]
@@ -264,7 +264,7 @@ def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]
     return tuple(question for question in asked if question.key not in answers)
 
 
-def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
+def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """The parameters of the `pid` component. Raises InputError for a controller that it is not."""
     kind = axis_of(flat)
     units = LENGTHS if kind == LINEAR else ANGLES
@@ -299,7 +299,7 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     return Parameters(settings, HELD)
 
 
-def _of_cascade(flat: Flat, unit: float, scale: float) -> Parameters:
+def _of_cascade(flat: FlatStage, unit: float, scale: float) -> Parameters:
     """Those whose output is the velocity that a drive follows, of `scale` machine units per second where it is 1."""
     kv, time = flat["controller.kv"], flat.get("controller.position_integral_time")
     ahead = flat["controller.velocity_feedforward"] / scale

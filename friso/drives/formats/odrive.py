@@ -14,7 +14,7 @@ from typing import Any
 
 from friso.axis import LINEAR, AxisKind, axis_of
 from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
-from friso.drives.format import AsStage, AxisParameters, Flat, ParameterFormat, Parameters, lacks, si
+from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
 from friso.stage.controllers import FILTERS_KEY
@@ -227,7 +227,7 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     return tuple(left)
 
 
-def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
+def questions_back(flat: FlatStage, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
     """What a turn moves, where no transmission tells."""
     if TRAVEL in answers or travel_of(flat) is not None:
         return ()
@@ -236,7 +236,7 @@ def questions_back(flat: Flat, answers: UserAnswers) -> tuple[OpenQuestion, ...]
     )
 
 
-def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
+def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     """The parameters of an axis. Raises InputError for a controller that is no P over P or PI."""
     name = "controller."
     if flat["controller.kind"] != "cascade":
@@ -267,7 +267,7 @@ def parameters(flat: Flat, answers: UserAnswers) -> Parameters:
     return Parameters(settings, held)
 
 
-def _loop_of_velocity(flat: Flat) -> str:
+def _loop_of_velocity(flat: FlatStage) -> str:
     """The filter of the velocity that a phase-locked loop can stand for; empty where there is none."""
     places = [place for place in row_keys(flat, FILTERS_KEY) if flat[f"{place}.path"] == FEEDBACK]
     if len(places) != 1 or flat[f"{places[0]}.kind"] != "low_pass":

@@ -37,7 +37,7 @@ SHARP = 3.0
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiableFit:
     """The fit, profiles by name of the parameters that not every motion shows, where they were asked about, and which
     of these the record does show."""
 
@@ -53,7 +53,7 @@ def fit_identifiable(
     bandwidth: float,
     noise: float,
     progress: Progress = silent,
-) -> Identified:
+) -> IdentifiableFit:
     """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
 
     A closed loop that explains the record to its noise has the first and last word. Otherwise the stage that follows
@@ -84,12 +84,12 @@ def fit_identifiable(
 
 def _identifiable_on_log(
     follows: Problem, plain: OutputErrorFit, core: set[str], covered: Coverage, noise: float, progress: Progress
-) -> Identified:
+) -> IdentifiableFit:
     """What the stage that follows the log shows."""
     names = [parameter.name for parameter in follows.parameters]
     hopeful = {name for name in names if name not in core and _may_show(name, covered, follows)}
     if not hopeful:
-        return Identified(plain, {}, frozenset())
+        return IdentifiableFit(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
     full = with_force_settled(fit(follows, numbers, everywhere(follows, numbers, plain.inner)), noise)
     believed = _believed(full, core, covered, progress)
@@ -104,7 +104,7 @@ def _identifiable_on_log(
 
 def _believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
-) -> Identified:
+) -> IdentifiableFit:
     """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
     wherever its profiles are sharp."""
     names = [parameter.name for parameter in full.problem.parameters]
@@ -116,7 +116,7 @@ def _believed(
     shown = {
         name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
     }
-    return Identified(full, profiles, frozenset(_complete(shown, {*names} - core)))
+    return IdentifiableFit(full, profiles, frozenset(_complete(shown, {*names} - core)))
 
 
 def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:

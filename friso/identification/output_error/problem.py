@@ -11,7 +11,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
 from friso.engine.arrays import Status
-from friso.engine.driven import Followed, Inputs, run_driven
+from friso.engine.driven import DrivenRuns, Inputs, run_driven
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.controllers.pid_gains import KD, KP, proportional_derivative
 from friso.equations.driven import HELD_FORCE, Driven
@@ -158,14 +158,14 @@ class Problem:
             starts[:, bristles] = np.reshape(bent, (-1, 1))
         return starts
 
-    def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
+    def _record(self, flat: Mapping[str, Any], runs: DrivenRuns) -> Simulated:
         position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
         held = self.kernel.held
         force = runs.held[:, :, held.index(HELD_FORCE)] if HELD_FORCE in held else self._force(flat, runs)
         failed = runs.statuses != Status.DONE
         return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 
-    def _force(self, flat: Mapping[str, Any], runs: Followed) -> np.ndarray:
+    def _force(self, flat: Mapping[str, Any], runs: DrivenRuns) -> np.ndarray:
         """The force of a controller in continuous time, from the states at the samples."""
         count = runs.states.shape[1]
         if not self.closed:
@@ -179,7 +179,7 @@ class Problem:
         outputs = self.kernel.module.outputs(states, modes, 0.0, reference, values)
         return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
 
-    def _holding_force(self, runs: Followed) -> np.ndarray:
+    def _holding_force(self, runs: DrivenRuns) -> np.ndarray:
         """The force [N] of the controller that holds a stage to a log (`tracking`), shape (runs, n)."""
         rows = self.inputs.segments[0, : runs.states.shape[1]]
         off, slip = (

@@ -9,7 +9,7 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import STRIBECK, Identified, reason
+from friso.identification.output_error.identifiable import STRIBECK, IdentifiableFit, reason
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, keys_of
 from friso.identification.output_error.profile import Profile
 from friso.identification.readings.common import LINEARITY
@@ -26,7 +26,7 @@ MOST = 0.7
 intervals of a linearised fit do not hold (Stribeck velocity under a noise of a fifth of the force)."""
 
 
-def estimates_of(identified: Identified, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
+def estimates_of(identified: IdentifiableFit, covered: Coverage) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The keys of the stage file with their intervals, and the correlation of those shown."""
     fit = identified.fit
     parameters = fit.problem.parameters
@@ -61,7 +61,7 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 """The parameter behind a key that has another name."""
 
 
-def _reasons(identified: Identified, covered: Coverage) -> dict[str, str]:
+def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
     """Why parameters, or keys that hang on them, are not shown."""
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}

@@ -31,7 +31,7 @@ ABOVE_FRICTION = 1 / 7
 RIGID = 0.4
 """Share of the antiresonance's frequency up to which both masses move as one (to 1/(1 - 0.16) = 1.2)."""
 
-Range = tuple[float, float]
+FrequencyRange = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Bench:
     logs: tuple[Log, ...]
     driven: FrequencyResponse
     other: FrequencyResponse | None
-    band: Range
+    band: FrequencyRange
     lines: tuple[StraightLine, ...]
     modes: Modes | None
     two_masses: TwoMass | None
@@ -57,7 +57,7 @@ class Bench:
 
 def analyse(
     logs: Sequence[Log],
-    band: Range | None = None,
+    band: FrequencyRange | None = None,
     period: float | None = None,
     measured: MeasuredResponse | None = None,
 ) -> Bench:
@@ -153,7 +153,7 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
     return usable[0], usable[1] if len(usable) > 1 else None
 
 
-def _above(driven: FrequencyResponse, departs: Departure | None) -> Range:
+def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRange:
     """The band above the departure by friction."""
     low = departs.frequency.high if departs is not None and departs.frequency.determined else 0.0
     return max(float(driven.frequency[0]), low), _top(driven)
@@ -169,7 +169,7 @@ def _of_all(
     logs: Sequence[Log],
     driven: FrequencyResponse,
     other: FrequencyResponse | None,
-    band: Range,
+    band: FrequencyRange,
     period: float | None,
 ) -> TwoMass:
     """The two-mass model of all realisations, its intervals as wide as single ones scatter."""
@@ -178,7 +178,11 @@ def _of_all(
 
 
 def _single(
-    records: dict[str, list[ResponseRecord]], logs: Sequence[Log], which: int, band: Range, period: float | None
+    records: dict[str, list[ResponseRecord]],
+    logs: Sequence[Log],
+    which: int,
+    band: FrequencyRange,
+    period: float | None,
 ) -> TwoMass:
     """The two-mass model of one realisation."""
     responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
@@ -220,7 +224,7 @@ def _left_out(
     warnings: list[str],
     records: dict[str, list[ResponseRecord]],
     logs: Sequence[Log],
-    band: Range,
+    band: FrequencyRange,
     period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
     """For each log, how the model of one other log predicts it."""
@@ -234,7 +238,7 @@ def _left_out(
     return tuple(rows)
 
 
-def _errors(model: TwoMass, log: Log, band: Range, period: float | None, both: bool) -> tuple[float, ...]:
+def _errors(model: TwoMass, log: Log, band: FrequencyRange, period: float | None, both: bool) -> tuple[float, ...]:
     """Relative errors of the driven output and, if asked, of the other one."""
     outputs = [("position", True), *([("cart_position", False)] if both else [])]
     return tuple(

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 
 from friso.identification.estimate import Estimate
 
-Model = Callable[[np.ndarray], np.ndarray]
+ResponseModel = Callable[[np.ndarray], np.ndarray]
 """From parameters (p,) to complex responses (outputs, lines)."""
 
 
@@ -62,7 +62,7 @@ class ResponseFit:
 
 
 def refined(
-    model: Model,
+    model: ResponseModel,
     start: np.ndarray,
     response: np.ndarray,
     deviation: np.ndarray,

@@ -17,7 +17,7 @@ from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces
 from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS, last_outside
 from friso.hunting.turning import WINDOW
 from friso.stage import Stage
-from friso.virtual_rig.run import Recorded
+from friso.virtual_rig.run import RecordedRuns
 
 DENSITY, SLOWEST, FASTEST = 100, 0.1, 10.0
 """Frequencies per decade at which loops are looked at, besides those about resonances, and the lowest, as a share of
@@ -49,17 +49,17 @@ class MachineMeasures:
         return self.outcome == SWINGS
 
 
-Measures = TypeVar("Measures", "MachineMeasures", "Later")
+AnyMeasures = TypeVar("AnyMeasures", "MachineMeasures", "Later")
 
 
-def concatenate_chunks(parts: Sequence[Measures]) -> Measures:
+def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
     """Chunks of runs, one after the other."""
     names = [field.name for field in fields(parts[0])]
     return type(parts[0])(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
-def measure_chunk(recorded: Recorded, corner: float, within: float) -> MachineMeasures:
+def measure_chunk(recorded: RecordedRuns, corner: float, within: float) -> MachineMeasures:
     """The measures of a chunk of runs whose reference stands from `corner` [s] on; in position is `within` [m]. What
     the drive logs counts for the peaks, what really moves for the rest."""
     time, reference = recorded.time, recorded.logged["reference"]
@@ -87,7 +87,7 @@ class Later:
 
 
 @np.errstate(all="ignore")
-def staying_in_position(recorded: Recorded, within: float) -> Later:
+def staying_in_position(recorded: RecordedRuns, within: float) -> Later:
     """For the runs of a chunk, whether they stay in position, `within` [m]."""
     deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE

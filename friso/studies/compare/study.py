@@ -26,7 +26,7 @@ from friso.studies.compare.measures import (
 )
 from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import EstimatedValue, difference, median
-from friso.virtual_rig.run import Recorded, run
+from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, own_motion
 
 INTERVAL = 1e-3
@@ -241,7 +241,7 @@ class _Work:
             [staying_in_position(recorded, self.within) for recorded in self._recorded(option, task, count, LONGER)]
         )
 
-    def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[Recorded]:
+    def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[RecordedRuns]:
         """The runs of the first machines, chunk by chunk."""
         sample = self.machines.stage.flat()["drive.sample_time"]
         interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample

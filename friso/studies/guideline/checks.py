@@ -31,7 +31,7 @@ APART = 20.0
 
 
 @dataclass(frozen=True)
-class Checked:
+class SimulationCheck:
     """How many of the `samples` still swing at the end, from some of the distances and after some of the moves, at
     0.9 and at 1.15 times their edge; `runs` in all, and how many of them `failed`."""
 
@@ -44,14 +44,14 @@ class Checked:
     failed: int
 
 
-def simulate_samples(sweep: Sweep, most: int) -> Checked:
+def simulate_samples(sweep: Sweep, most: int) -> SimulationCheck:
     """The first `most` samples that have an edge, which are random ones, simulated."""
     usable = sweep.usable
     samples = usable.take(np.arange(min(most, len(usable.edge))))
     runs = [_still_swing(samples, share, *begin) for begin in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
     numbers = [int(swinging.any(axis=1).sum()) for swinging, _ in runs]
     completed = np.concatenate([done.ravel() for _, done in runs])
-    return Checked(len(samples.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
+    return SimulationCheck(len(samples.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
 
 
 _Begins = Callable[[Ensemble, np.ndarray, int], Begin]

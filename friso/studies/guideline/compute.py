@@ -16,7 +16,7 @@ from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
 from friso.progress import Progress, Tally, silent
 from friso.quantities import quoted
-from friso.studies.guideline.checks import Checked, simulate_samples
+from friso.studies.guideline.checks import SimulationCheck, simulate_samples
 from friso.studies.guideline.groups import Count, group_count, values_of
 from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fit_law
 from friso.studies.guideline.parasitic import ParasiticLimits, parasitic_limits
@@ -67,7 +67,7 @@ class Fit:
     on_fit: Errors
     on_test: Errors
     on_computed_edge: Errors
-    checked: Checked
+    checked: SimulationCheck
 
     @property
     def sweep(self) -> Sweep:

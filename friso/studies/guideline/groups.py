@@ -150,7 +150,7 @@ GROUPS: Mapping[str, Group] = {
 _TELLING = {"joint": "joint.stiffness", "parasitic": "parasitic.frequency"}
 """A key that stages have where the part described by a group exists."""
 
-Values = Mapping[str, Any]
+GroupValues = Mapping[str, Any]
 """Numbers, or arrays of one shape, by the name of their group."""
 
 
@@ -225,7 +225,7 @@ def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
     return {name: group.of(flat) for name, group in GROUPS.items() if group.part in parts}
 
 
-def flat_of(values: Values, scale: GroupScale = _UNIT) -> dict[str, Any]:
+def flat_of(values: GroupValues, scale: GroupScale = _UNIT) -> dict[str, Any]:
     """Flat keys to SI values of stages with these groups: rigid, or with a joint that is free if `joint` is among them.
 
     The inverse of `values_of`; `scale` decides on what the groups leave open.
@@ -251,7 +251,7 @@ def flat_of(values: Values, scale: GroupScale = _UNIT) -> dict[str, Any]:
     return flat | (_joint(values, flat, scale) if "joint" in values else {})
 
 
-def _joint(values: Values, flat: Mapping[str, Any], scale: GroupScale) -> dict[str, Any]:
+def _joint(values: GroupValues, flat: Mapping[str, Any], scale: GroupScale) -> dict[str, Any]:
     stiffness = values["joint"] * scale.stiffness
     limiter = values.get("limiter", LIMITER_OVER_BRISTLES) * scale.stiffness
     return {

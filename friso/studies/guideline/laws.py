@@ -41,7 +41,7 @@ SCALE = 0.1
 FOLDS, GAIN, MOST = 8, 0.02, 8
 """Parts of the cross-validation, share by which an exponent has to lower its loss, and exponents at most."""
 
-Values = Mapping[str, np.ndarray]
+SampleValues = Mapping[str, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Rate:
     base: Mapping[str, float]
     candidates: tuple[str, ...]
 
-    def fixed(self, values: Values) -> np.ndarray:
+    def fixed(self, values: SampleValues) -> np.ndarray:
         """The logarithm of the part that is not fitted, shape (count,)."""
         return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
 
@@ -92,12 +92,12 @@ class FittedLaw:
         """The exponents of a rate by group."""
         return {group: value for (number, group), value in self.exponents.items() if number == rate}
 
-    def log_rates(self, values: Values) -> np.ndarray:
+    def log_rates(self, values: SampleValues) -> np.ndarray:
         """Logarithms of the rates, shape (rates, count)."""
         parameters = np.array([*np.log(self.factors), *self.exponents.values()])
         return _log_rates(self.law, tuple(self.exponents), values, parameters)
 
-    def edge(self, values: Values, locked: np.ndarray | None = None) -> np.ndarray:
+    def edge(self, values: SampleValues, locked: np.ndarray | None = None) -> np.ndarray:
         """The edge of stages with these groups, in units of sqrt(sigma_0/m); `locked` is that with the joint locked."""
         rates = self.log_rates(values)
         return np.exp(self.law.combine(rates, np.log(locked) if locked is not None else np.zeros(rates.shape[1:]))[0])
@@ -148,7 +148,7 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
 
 
-def fit_law(law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
+def fit_law(law: EdgeLaw, values: SampleValues, edges: np.ndarray, locked: np.ndarray | None = None) -> FittedLaw:
     """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
@@ -176,7 +176,7 @@ def loss(off: np.ndarray) -> float:
 def _validated(
     law: EdgeLaw,
     chosen: tuple[Exponent, ...],
-    values: Values,
+    values: SampleValues,
     target: np.ndarray,
     offset: np.ndarray,
     folds: np.ndarray,
@@ -192,7 +192,7 @@ def _validated(
 
 
 def _log_coefficients(
-    law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray
+    law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues, target: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
     """Logarithms of the factors, then the exponents."""
     features = _features(law, chosen, values)
@@ -209,7 +209,7 @@ def _log_coefficients(
     return least_squares(off, start, slopes, loss="soft_l1", f_scale=SCALE).x  # type: ignore[arg-type]
 
 
-def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values) -> np.ndarray:
+def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues) -> np.ndarray:
     """Derivatives of the logarithms of the rates by the parameters, shape (rates, parameters, count)."""
     count, rates = len(next(iter(values.values()))), len(law.rates)
     features = np.zeros((rates, rates + len(chosen), count))
@@ -219,12 +219,12 @@ def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values) -> np.
     return features
 
 
-def _log_rates(law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values, parameters: np.ndarray) -> np.ndarray:
+def _log_rates(law: EdgeLaw, chosen: tuple[Exponent, ...], values: SampleValues, parameters: np.ndarray) -> np.ndarray:
     fixed = np.stack([np.broadcast_to(rate.fixed(values), values["gap"].shape) for rate in law.rates])
     return fixed + np.einsum("rpc,p->rc", _features(law, chosen, values), parameters)
 
 
-def _some(values: Values, which: np.ndarray) -> dict[str, np.ndarray]:
+def _some(values: SampleValues, which: np.ndarray) -> dict[str, np.ndarray]:
     return {name: value[which] for name, value in values.items()}
 
 

@@ -21,7 +21,7 @@ RIGID_GRID = np.geomspace(2.0, 60.0, 14)
 FREE_GRID = np.geomspace(1.0, 20.0, 28)
 """Crossovers tried for the rig [Hz]; the more with a free joint, some of whose cycles cannot be closed."""
 
-Changes = Mapping[str, Any]
+RigChanges = Mapping[str, Any]
 """Keys that differ from those of the rig, SI."""
 
 
@@ -30,7 +30,7 @@ class ThesisCase:
     """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
     its `kind`, one of `KINDS`, which says why there is none."""
 
-    changes: Changes
+    changes: RigChanges
     law: float
     computed: float
     kind: str = FLIP
@@ -83,7 +83,7 @@ def plain(part: str = "") -> dict[str, Any]:
     return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
 
 
-def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[ThesisCase]:
+def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
     """The rig with each of these changes, rigid or with its joint free."""
     mode = any("parasitic.frequency" in change for change in changes)
     base = thesis_rig().flat() if mode else plain("joint" if free else "")

@@ -14,7 +14,7 @@ from friso.identification.response.response import Channels, FrequencyResponse
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog, stopped
 from friso.studies.rig.sizes import friction, interval, pace
-from friso.virtual_rig.run import Recorded, as_built_keys, run
+from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import standing
 
 PERIOD, PERIODS = 8.0, 8
@@ -50,7 +50,7 @@ def excite(
     runs: int = 1,
     changes: Mapping[str, Any] | None = None,
     kind: Excitation = SLIDING,
-) -> Recorded:
+) -> RecordedRuns:
     """Runs at a standstill at a place [m] with the multisine of a seed; `changes` are arrays of shape (runs,)."""
     step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / slow) * slow

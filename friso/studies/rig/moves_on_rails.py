@@ -21,7 +21,7 @@ from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.sizes import interval, jointed, pace, quicker
-from friso.virtual_rig.run import Recorded, run
+from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import MoveTask, point_to_point
 
 RAILS = 20
@@ -162,7 +162,7 @@ class RailRuns:
         return share(self.counted[which], ~self.failed[which])
 
 
-def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> Recorded:
+def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> RecordedRuns:
     """A few runs, all samples of which are kept."""
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
@@ -192,7 +192,7 @@ def run_moves(
     return concatenate_runs(parts)
 
 
-def rail_runs(recorded: Recorded) -> RailRuns:
+def rail_runs(recorded: RecordedRuns) -> RailRuns:
     """What became of the runs of a chunk, by the position as the drive logs it."""
     time, failed = recorded.time, recorded.statuses != Status.DONE
     deviation = recorded.logged["position"] - recorded.logged["reference"]

@@ -14,7 +14,7 @@ from friso.identification.logs.log import Log
 from friso.identification.readings.common import record
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.virtual_rig.run import Recorded
+from friso.virtual_rig.run import RecordedRuns
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Outcome:
     notes: tuple[str, ...] = ()
 
 
-def rig_log(recorded: Recorded, row: int, name: str, kind: str | None, stage: Stage, seed: int) -> RigLog:
+def rig_log(recorded: RecordedRuns, row: int, name: str, kind: str | None, stage: Stage, seed: int) -> RigLog:
     """One run of a chunk as a log, up to where it failed."""
     status = int(recorded.statuses[row])
     count = recorded.logged["position"].shape[1]

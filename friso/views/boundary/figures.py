@@ -13,8 +13,8 @@ from friso.studies.boundary_lines import (
     INVALID,
     REPELS,
     UNKNOWN,
+    CycleShape,
     Line,
-    Shape,
     lines,
     lost_places,
     node_verdicts,
@@ -39,8 +39,12 @@ from friso.views.drawing.figure import (
 )
 from friso.views.map.words import QUIET, quantity
 
-NAMES: dict[Shape, str] = {"symmetric": "hunting cycle", "asymmetric": "asymmetric cycle", "whole": "hunting cycle"}
-COLOURS: dict[Shape, str] = {"symmetric": INK, "asymmetric": BLUE, "whole": INK}
+NAMES: dict[CycleShape, str] = {
+    "symmetric": "hunting cycle",
+    "asymmetric": "asymmetric cycle",
+    "whole": "hunting cycle",
+}
+COLOURS: dict[CycleShape, str] = {"symmetric": INK, "asymmetric": BLUE, "whole": INK}
 SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "patch"}
 DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {

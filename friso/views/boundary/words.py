@@ -15,8 +15,8 @@ from friso.studies.boundary_lines import (
     REPELS,
     UNKNOWN,
     Change,
+    CycleShape,
     Line,
-    Shape,
     corner_verdicts,
     end_verdicts,
     followed_changes,
@@ -34,7 +34,7 @@ VERDICTS = {
     UNKNOWN: "unknown (some simulations failed, or had not settled when they were stopped)",
     INVALID: "not a valid stage",
 }
-CYCLES: dict[Shape, str] = {
+CYCLES: dict[CycleShape, str] = {
     "symmetric": "the hunting cycle",
     "asymmetric": "an asymmetric cycle",
     "whole": "the hunting cycle",

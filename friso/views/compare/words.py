@@ -43,7 +43,7 @@ PAIRED = (
 
 UNSHAKEN = "no [floor]"
 
-Row = tuple[str, list[str]]
+PairedRow = tuple[str, list[str]]
 
 
 PROSE = {
@@ -105,7 +105,7 @@ def _bandwidth(option: Option, comparison: Comparison) -> str:
     return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}"
 
 
-def table_rows(comparison: Comparison) -> list[Row]:
+def table_rows(comparison: Comparison) -> list[PairedRow]:
     """A row for each option, its texts under `COLUMNS`; 95 % intervals in brackets."""
     return [
         (
@@ -124,7 +124,7 @@ def table_rows(comparison: Comparison) -> list[Row]:
     ]
 
 
-def paired_rows(comparison: Comparison) -> list[Row]:
+def paired_rows(comparison: Comparison) -> list[PairedRow]:
     """A row for each option but a, its texts under `PAIRED`."""
     rows = []
     for result in comparison.results[1:]:

@@ -14,7 +14,7 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.views.flexure.layout import ABOVE, CLAMP, FOOT, RIM, SCALES, STOP, WIDTH, PaperDrawing, block_size
 from friso.views.flexure.svg import (
     TEXT,
-    Point,
+    SheetPoint,
     across,
     area,
     arrow,
@@ -70,7 +70,7 @@ def _side_view(drawing: PaperDrawing) -> list[str]:
     return parts + _side_dimensions(drawing, start, end, row)
 
 
-def _bent(drawing: PaperDrawing, height: float, side: int) -> list[Point]:
+def _bent(drawing: PaperDrawing, height: float, side: int) -> list[SheetPoint]:
     """A leaf at the stroke, its ends parallel."""
     s = np.linspace(0, 1, 33)
     x, z = (
@@ -180,22 +180,22 @@ def _marks(drawing: PaperDrawing) -> list[str]:
     return parts
 
 
-def _together(places: dict[str, Point]) -> dict[Point, list[str]]:
+def _together(places: dict[str, SheetPoint]) -> dict[SheetPoint, list[str]]:
     """Letters by place, those that would cover each other at one."""
-    groups: dict[Point, list[str]] = {}
+    groups: dict[SheetPoint, list[str]] = {}
     for letter, place in places.items():
         near = next((group for group in groups if math.dist(group, place) < 2 * TEXT), place)
         groups.setdefault(near, []).append(letter)
     return groups
 
 
-def _centre_mark(at: Point) -> list[str]:
+def _centre_mark(at: SheetPoint) -> list[str]:
     x, y = at
     quarters = [f"M {x:.2f} {y:.2f} h {s * 1.7} a 1.7 1.7 0 0 1 {-s * 1.7} {s * 1.7} Z" for s in (1, -1)]
     return [circle(at, 1.7, "#ffffff"), f'<path d="{" ".join(quarters)}" fill="#222222"/>']
 
 
-def _push_mark(at: Point, sideways: bool) -> list[str]:
+def _push_mark(at: SheetPoint, sideways: bool) -> list[str]:
     """Arrows along the motion; in the view along it, the tip of one."""
     if not sideways:
         return [circle(at, 2.2), circle(at, 0.4, "#222222")]
@@ -245,7 +245,7 @@ def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
     return parts + _scale_bar(drawing, (split + 3, top + 17))
 
 
-def _scale_bar(drawing: PaperDrawing, at: Point) -> list[str]:
+def _scale_bar(drawing: PaperDrawing, at: SheetPoint) -> list[str]:
     """A bar of a round length, in halves; it stays true where the sheet is printed at another size."""
     length = max(
         nice

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 from friso.leaf_springs.mechanism import Mechanism
-from friso.views.flexure.svg import Point
+from friso.views.flexure.svg import SheetPoint
 
 WIDTH, ROOM = 210.0, 202.0
 """Width of the sheet (A4 upright), and the height that the two views may take together [mm]."""
@@ -126,10 +126,10 @@ class PaperDrawing:
     def height(self) -> float:
         return self.foot + 23 + FOOT
 
-    def side(self, x: float, z: float) -> Point:
+    def side(self, x: float, z: float) -> SheetPoint:
         """A place [m] in the view from the side."""
         return self.x0 + self.size(x), self.z0 - self.size(z)
 
-    def top(self, x: float, y: float) -> Point:
+    def top(self, x: float, y: float) -> SheetPoint:
         """A place [m] in the view from above."""
         return self.x0 + self.size(x), self.y0 - self.size(y)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
-Point = tuple[float, float]
+SheetPoint = tuple[float, float]
 
 TEXT = 3.0
 """Height of letters [mm]."""
@@ -50,31 +50,31 @@ def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {font} role="img">\n{body}\n</svg>\n'
 
 
-def path(points: Iterable[Point], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
+def path(points: Iterable[SheetPoint], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
     """A line through points; filled if it is closed."""
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in points)
     return f'<path d="M {corners}{" Z" if closed else ""}" fill={quoteattr(fill)} {LINES[kind]}/>'
 
 
-def box(corner: Point, other: Point, kind: str = "outline", fill: str = "none") -> str:
+def box(corner: SheetPoint, other: SheetPoint, kind: str = "outline", fill: str = "none") -> str:
     """A rectangle between opposite corners."""
     (x1, y1), (x2, y2) = corner, other
     return path([(x1, y1), (x2, y1), (x2, y2), (x1, y2)], kind, fill, closed=True)
 
 
-def area(corner: Point, other: Point, fill: str, opacity: float = 1.0) -> str:
+def area(corner: SheetPoint, other: SheetPoint, fill: str, opacity: float = 1.0) -> str:
     """A rectangle between opposite corners without a line around it."""
     (x1, y1), (x2, y2) = corner, other
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in ((x1, y1), (x2, y1), (x2, y2), (x1, y2)))
     return f'<path d="M {corners} Z" fill="{fill}" fill-opacity="{_n(opacity)}"/>'
 
 
-def circle(centre: Point, radius: float, fill: str = "none") -> str:
+def circle(centre: SheetPoint, radius: float, fill: str = "none") -> str:
     return f'<circle cx="{_n(centre[0])}" cy="{_n(centre[1])}" r="{_n(radius)}" fill="{fill}" {LINES["thin"]}/>'
 
 
 def words(
-    at: Point, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
+    at: SheetPoint, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
 ) -> str:
     """A text on its baseline; `upright` ones are read from the right."""
     x, y = _n(at[0]), _n(at[1])
@@ -84,7 +84,7 @@ def words(
     return f'<text x="{x}" y="{y}" {style}>{escape(text)}</text>'
 
 
-def words_over(at: Point, text: str, bold: bool = False) -> str:
+def words_over(at: SheetPoint, text: str, bold: bool = False) -> str:
     """A text over lines, which it keeps off."""
     plain = words(at, text, bold=bold)
     around = 'aria-hidden="true" stroke="#ffffff" stroke-width="0.8" stroke-linejoin="round"'
@@ -102,7 +102,7 @@ def clipped(text: str, width: float, size: float = TEXT) -> str:
     return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
 
 
-def arrow(tip: Point, towards: Point, fill: str = "#222222") -> str:
+def arrow(tip: SheetPoint, towards: SheetPoint, fill: str = "#222222") -> str:
     """An arrowhead at `tip`, pointing the way `towards`, of any length."""
     size = math.hypot(*towards)
     dx, dy = towards[0] / size * ARROW, towards[1] / size * ARROW
@@ -129,14 +129,14 @@ def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]
     return [*parts, words((x - 0.9, y1 - ARROW - 2), text, upright=True)]
 
 
-def leader(tip: Point, knee: Point, lines: list[str]) -> list[str]:
+def leader(tip: SheetPoint, knee: SheetPoint, lines: list[str]) -> list[str]:
     """A note with a line that ends in an arrow at `tip`: from the knee it goes on level, to the right."""
     end = (knee[0] + REACH, knee[1])
     parts = [path([tip, knee, end], "thin"), arrow(tip, (tip[0] - knee[0], tip[1] - knee[1]))]
     return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
 
 
-def _arrows(start: Point, end: Point, direction: Point) -> list[str]:
+def _arrows(start: SheetPoint, end: SheetPoint, direction: SheetPoint) -> list[str]:
     """A line with arrows at both ends; from outside, where there is no room between them."""
     back = (-direction[0], -direction[1])
     if math.dist(start, end) > 3 * ARROW:
@@ -149,7 +149,7 @@ def _arrows(start: Point, end: Point, direction: Point) -> list[str]:
     return [path(outer, "thin"), arrow(start, direction), arrow(end, back)]
 
 
-def _extension(edge: Point, at: Point) -> str:
+def _extension(edge: SheetPoint, at: SheetPoint) -> str:
     """From near the edge to a little beyond the dimension line."""
     size = math.dist(edge, at) or 1.0
     dx, dy = (at[0] - edge[0]) / size, (at[1] - edge[1]) / size

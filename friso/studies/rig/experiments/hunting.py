@@ -30,7 +30,7 @@ from friso.studies.rig.moves_on_rails import (
 )
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import pace
-from friso.virtual_rig.run import Recorded
+from friso.virtual_rig.run import RecordedRuns
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 """Over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others ours."""
@@ -166,7 +166,7 @@ def _startable(
     return Startable(quiet, swings, float(frequencies[row]), rail, displacement)
 
 
-def _trace(recorded: Recorded, row: int) -> Trace:
+def _trace(recorded: RecordedRuns, row: int) -> Trace:
     end = recorded.logged["reference"][row, -1]
     return Trace(recorded.time, recorded.logged["position"][row] - end)
 

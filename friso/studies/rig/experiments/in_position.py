@@ -18,7 +18,7 @@ from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.rig.moves_on_rails import crossover, crossover_key, move, with_joint
 from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import interval
-from friso.virtual_rig.run import Recorded, as_built_keys, run
+from friso.virtual_rig.run import RecordedRuns, as_built_keys, run
 from friso.virtual_rig.task import MoveTask, standing
 
 FASTER = 2.0
@@ -108,7 +108,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 def in_position(
     stage: Stage, seed: int, progress: Progress, noises: tuple[float, ...] = ()
-) -> tuple[InPosition, dict[str, tuple[Recorded, Stage]]]:
+) -> tuple[InPosition, dict[str, tuple[RecordedRuns, Stage]]]:
     """All standstills, with all disturbances also at other `noises` of the force, over that assumed; and by case the
     run with all disturbances and its stage."""
     fast = with_joint(stage, locked=False).replace({crossover_key(stage): f"{FASTER * crossover(stage):.6g} Hz"})
@@ -182,19 +182,19 @@ def _silenced(stage: Stage, source: str) -> dict[str, Any]:
 
 def _recorded(
     stage: Stage, task: MoveTask, seed: int, changes: Mapping[str, Any] | None = None, count: int = 1
-) -> Recorded:
+) -> RecordedRuns:
     (recorded,) = run(stage, task, [seed] * count, interval(stage, INTERVAL), changes)
     return recorded
 
 
-def _watched(recorded: Recorded, since: float) -> tuple[np.ndarray, np.ndarray]:
+def _watched(recorded: RecordedRuns, since: float) -> tuple[np.ndarray, np.ndarray]:
     """Time [s] and deviation of the true position from the reference [m] of the first run, once watched."""
     late = recorded.time >= since
     deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
     return recorded.time[late] - since, deviation[late]
 
 
-def _standstill(recorded: Recorded, since: float) -> Standstill:
+def _standstill(recorded: RecordedRuns, since: float) -> Standstill:
     late = recorded.time >= since
     reference = recorded.logged["reference"][:, late]
     true, read = (signals["position"][:, late] - reference for signals in (recorded.true, recorded.logged))

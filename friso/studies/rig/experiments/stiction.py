@@ -19,7 +19,7 @@ from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import freed, friction, interval, pace, travel
-from friso.virtual_rig.run import Recorded, run
+from friso.virtual_rig.run import RecordedRuns, run
 from friso.virtual_rig.task import legs
 
 RAILS = 10
@@ -96,7 +96,7 @@ def slow_legs(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]
     return tuple(logs)
 
 
-def _log(free: Stage, chunk: Recorded, row: int, number: int, seed: int) -> RigLog:
+def _log(free: Stage, chunk: RecordedRuns, row: int, number: int, seed: int) -> RigLog:
     """One rail's log, with the stage that has this rail."""
     on_rail = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
     return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", on_rail, seed + number)
