@@ -15,7 +15,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
 from friso.engine.building import built_entries
 from friso.engine.cache import CodeRequest, Compiled
-from friso.engine.kinds import ArgumentKind, argument_kind
+from friso.engine.kinds import CompiledKind, argument_kind
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
 from friso.engine.machine_code import Loops, load_object
 from friso.equations.as_built import AsBuilt
@@ -274,7 +274,7 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
     )
 
 
-def driver_kinds() -> list[ArgumentKind]:
+def driver_kinds() -> list[CompiledKind]:
     """The kinds of the driver's arguments."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)

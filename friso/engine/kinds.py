@@ -53,7 +53,7 @@ class ArrayKind:
 class RecordKind:
     """Named tuples with these fields."""
 
-    fields: tuple[tuple[str, ArgumentKind], ...]
+    fields: tuple[tuple[str, CompiledKind], ...]
 
     @property
     def form(self) -> str:
@@ -64,11 +64,11 @@ class RecordKind:
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 
-ArgumentKind = NumberKind | ArrayKind | RecordKind
+CompiledKind = NumberKind | ArrayKind | RecordKind
 INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
-def argument_kind(example: Any) -> ArgumentKind:
+def argument_kind(example: Any) -> CompiledKind:
     """The kind of an argument. Raises TypeError for what compiled loops are not given."""
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
@@ -83,7 +83,7 @@ def argument_kind(example: Any) -> ArgumentKind:
 class Packing:
     """How arguments of some kinds are handed over: one after another."""
 
-    def __init__(self, kinds: Sequence[ArgumentKind]) -> None:
+    def __init__(self, kinds: Sequence[CompiledKind]) -> None:
         self._kinds, self._struct = tuple(kinds), struct.Struct("".join(kind.form for kind in kinds))
 
     def packed(self, arguments: Sequence[Any]) -> bytes:

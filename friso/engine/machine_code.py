@@ -11,7 +11,7 @@ from typing import Any
 import llvmlite.binding as llvm
 from llvmlite import ir
 
-from friso.engine.kinds import ArgumentKind, Packing
+from friso.engine.kinds import CompiledKind, Packing
 from friso.engine.processor import processor
 
 
@@ -57,7 +57,7 @@ def _linker() -> llvm.LLJIT:
 class Loops:
     """Compiled loops (`friso.engine.scalar_code`), called without the interpreter's lock."""
 
-    def __init__(self, address: int, kinds: Sequence[ArgumentKind]) -> None:
+    def __init__(self, address: int, kinds: Sequence[CompiledKind]) -> None:
         self._call, self._packing = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(address), Packing(kinds)
 
     def __call__(self, *arguments: Any) -> None:

@@ -21,7 +21,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from friso.engine.kinds import FLOAT, INT, TRUTH, ArgumentKind, ArrayKind, NumberKind, RecordKind, argument_kind
+from friso.engine.kinds import FLOAT, INT, TRUTH, ArrayKind, CompiledKind, NumberKind, RecordKind, argument_kind
 from friso.engine.vector_code import FASTMATH, syntax
 
 _INT64, _DOUBLE, _BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
@@ -29,7 +29,7 @@ _NUMBERS = {INT: _INT64, FLOAT: _DOUBLE, TRUTH: _BIT}
 _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 
-def _types(kind: ArgumentKind) -> Sequence[ir.Type]:
+def _types(kind: CompiledKind) -> Sequence[ir.Type]:
     """What a value of a kind consists of: a number, an array's address and shape, or a named tuple's address."""
     if isinstance(kind, NumberKind):
         return [_NUMBERS[kind]]
@@ -38,7 +38,7 @@ def _types(kind: ArgumentKind) -> Sequence[ir.Type]:
     return [ir.PointerType(_ELEMENTS[kind.dtype])] + [_INT64] * kind.dimensions
 
 
-def scalar_llvm(function: Callable[..., None], kinds: Sequence[ArgumentKind]) -> ir.Module:
+def scalar_llvm(function: Callable[..., None], kinds: Sequence[CompiledKind]) -> ir.Module:
     """A function of arguments of these kinds as LLVM has it, called `run`. It takes the address at which the arguments
     lie one after another (`friso.engine.kinds.Packing`)."""
     module = ir.Module()
@@ -105,7 +105,7 @@ class _RecordValue:
             place += len(kind.form)
         raise TypeError(f"not in the language of plain loops: no field {name}")
 
-    def _field(self, builder: Any, place: int, kind: ArgumentKind) -> Any:
+    def _field(self, builder: Any, place: int, kind: CompiledKind) -> Any:
         if isinstance(kind, RecordKind):
             return _RecordValue(builder.gep(self.words, [ir.Constant(_INT64, place)]), kind)
         parts = []
@@ -117,7 +117,7 @@ class _RecordValue:
         return _value(parts, kind)
 
 
-def _value(parts: Sequence[ir.Value], kind: ArgumentKind) -> Any:
+def _value(parts: Sequence[ir.Value], kind: CompiledKind) -> Any:
     if isinstance(kind, ArrayKind):
         return _ArrayValue(parts[0], tuple(parts[1:]), kind)
     return _Value(parts[0], kind) if isinstance(kind, NumberKind) else _RecordValue(parts[0], kind)
@@ -144,7 +144,7 @@ class _Writer:
         return _Value(builder.trunc(word, _BIT) if kind == TRUTH else word, kind)
 
     def _write(
-        self, function: Callable[..., Any], kinds: tuple[ArgumentKind, ...]
+        self, function: Callable[..., Any], kinds: tuple[CompiledKind, ...]
     ) -> tuple[ir.Function, NumberKind | None]:
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])

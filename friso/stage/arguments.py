@@ -119,7 +119,7 @@ _KINDS: dict[str, ArgumentKind] = {
     "Sequence[int]": ArgumentKind(lambda value: _is_list(value, _is_whole), "whole numbers"),
     "Iterable[str | os.PathLike[str]]": _PATHS,
     "Mapping[str, str]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges"),
-    "Mapping[str, Values]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges or values"),
+    "Mapping[str, AxisValues]": ArgumentKind(_has_text_keys, "a dictionary of keys to ranges or values"),
     "Sequence[Mapping[str, Any]]": ArgumentKind(
         lambda value: _is_list(value, _has_text_keys), "a list of dictionaries"
     ),
