@@ -72,7 +72,7 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
     with_alpha, with_alpha_all = (
         _mean_rank_correlation((alpha[:, None] * ones).T, peaks.T, cells.T) for cells in (moving, valid)
     )
-    free_lines = float(np.mean([*~moving.any(axis=0), *~moving.any(axis=1)]))
+    free_lines = float(np.mean(~np.concatenate([moving.any(axis=0), moving.any(axis=1)])))
     square = free_square(moving, valid)
     rest = "the trend is one of the cells that keep moving alone: over all of them, as Fig. 12B shows them, it is not"
     return Finding(
