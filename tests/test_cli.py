@@ -82,7 +82,7 @@ def test_simulate_writes_what_python_returns(tmp_path: Path) -> None:
     done = run("simulate", STICK_SLIP, "--sample-time", "10 ms", "--out", tmp_path)
     assert done.returncode == 0
     assert sorted(path.suffix for path in tmp_path.glob("lugre*")) == [".csv", ".nc", ".png"]
-    with xr.open_dataset(tmp_path / "lugre_stick_slip_response.nc", engine="scipy") as written:
+    with xr.load_dataset(tmp_path / "lugre_stick_slip_response.nc", engine="scipy") as written:
         expected = friso.simulate(friso.load(STICK_SLIP), sample_time=0.01)
         assert (written.position.values == expected.position.values).all()
         assert written.attrs["status"] == "done"
@@ -143,7 +143,7 @@ def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     done = run("simulate", RIG, "--out", tmp_path, *wild)
     assert done.returncode == 1
     assert "unstable" in done.stdout
-    with xr.open_dataset(tmp_path / "thesis_rig_response.nc", engine="scipy") as written:
+    with xr.load_dataset(tmp_path / "thesis_rig_response.nc", engine="scipy") as written:
         assert 0 < written.position.notnull().sum() < written.time.size
     document = json.loads(run("check", RIG, "--json", *wild).stdout)
     assert document["cases"]["given"]["verdict"] == "failed"

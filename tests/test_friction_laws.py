@@ -23,7 +23,7 @@ from friso.hunting.cycle.hunting import small_cycles_possible
 from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
-GROUND = ("component", "conditions", "friction")
+GROUND = ("cases", "component", "conditions", "friction")
 RIGID = pytest.mark.xdist_group("rigid")
 STEADY = settings(max_examples=25, deadline=None, derandomize=True)
 
