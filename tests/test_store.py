@@ -168,9 +168,8 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change:
         pass
     before = sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
     stage = rig.replace(change.pop("stage", {}))
-    with refused() as error:
+    with refused():
         sweep(stage, change.pop("axes", AXES), store=path, **change)
-    assert "nothing was overwritten" in str(error.value)
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
 
 
