@@ -59,3 +59,25 @@ def test_a_stage_without_friction_is_judged_too() -> None:
     pushed = VARIANTS["rigid stage, PI"].as_written()
     smooth = Stage(**{name: table for name, table in pushed.items() if name != "friction"})
     assert unstable(smooth) == ("sticks", "slides")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"controller.integral_deadband": "2 um"},
+        {"controller.error_deadband": "2 um"},
+        {"controller.standstill_window": "5 um", "controller.standstill_factor": 0.5},
+        {"controller.stiction_push": "1 N", "controller.stiction_push_window": "1 um"},
+        {"friction.viscous_asymmetry": 0.8},
+        {"friction.viscous_asymmetry": -0.8},
+    ],
+)
+def test_what_acts_about_rest_alone_tells_nothing_of_lower_gains(changes: dict) -> None:
+    """Dead zones and gains at standstill hide the loop far from rest; what damps least is the weaker direction."""
+    chosen = VARIANTS["rigid, Stribeck 2, PI, limit"]
+    flat = chosen.flat()
+    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    gain = 0.6 * flat["friction.viscous"] * flat["controller.kp"] / mass
+    chosen = chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})
+    assert stable_at_lower_gains(chosen.flat())
+    assert not stable_at_lower_gains(chosen.replace(changes).flat())

@@ -90,6 +90,8 @@ def _standstill(flat: FlatMachine, within: float) -> dict[str, tuple[float, floa
 
 
 def _dithers(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
+    if _own_frequency(flat) <= 0:
+        return {}
     return {
         "dither_amplitude": _scaled(float(sliding(flat)), AMPLITUDES),
         "dither_frequency": _scaled(_own_frequency(flat), FREQUENCIES),
@@ -97,9 +99,9 @@ def _dithers(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]
 
 
 def _own_frequency(flat: FlatMachine) -> float:
-    """That [Hz] of the moving mass on the proportional stiffness of the loop."""
+    """That [Hz] of the moving mass on the proportional stiffness of the loop; 0 where it has none."""
     proportional, _ = slow_gains(flat)
-    return sqrt(proportional / moving_mass(flat)) / (2 * pi)
+    return sqrt(max(proportional, 0.0) / moving_mass(flat)) / (2 * pi)
 
 
 def _dither(flat: FlatMachine, within: float) -> dict[str, float]:

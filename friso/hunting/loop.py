@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +12,7 @@ from friso.equations.structure import structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
+from friso.stage.standstill import NO_SETTINGS
 from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
@@ -30,20 +31,25 @@ LOWER = np.geomspace(1e-6, 1.0, 37)
 """Shares of its gain at which the stability of a loop is looked at."""
 
 
+@np.errstate(all="ignore")
 def stable_at_lower_gains(flat: Mapping[str, Any]) -> bool:
-    """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones; False,
-    too, where the controller does not tell which keys its gain is.
+    """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones, by the
+    viscous friction of the direction in which that is less.
+
+    False, too, where that is not known: where the controller does not tell which keys its gain is, or acts otherwise
+    about the reference than far from it, which the linear loop at rest does not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup the largest motions go by
     the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
     b k_p > m k_i, which is Hurwitz's criterion for the same loop at any gain, and grow where it is less.
     """
-    controller = controller_of(flat)
+    controller, form = controller_of(flat), structure(dict(flat))
     gains = {controller.key(name): flat[controller.key(name)] * LOWER for name in controller.loop_gain}
-    if not gains:
+    settings = form.controller.settings if form.controller else NO_SETTINGS
+    if not gains or settings.deadband or settings.dead_zone or settings.gains or settings.push:
         return False
-    stages = Ensemble.held({**flat, **gains}, len(LOWER), form=structure(dict(flat)))
-    return not unstable_among(stages)["slides"].any()
+    stages = Ensemble.held({**flat, **gains}, len(LOWER), form=form)
+    return bool((_growths(stages, np.min)["slides"] <= GROWTH * stages.number("rate")).all())
 
 
 def unstable(stage: Stage) -> tuple[LoopState, ...]:
@@ -54,11 +60,17 @@ def unstable(stage: Stage) -> tuple[LoopState, ...]:
 
 @np.errstate(all="ignore")  # absurd gains leave infinities behind
 def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
-    """The loops of which stages are not stable in each of these states, shape (count,)."""
-    stuck = _rates(stages)
-    loops: dict[LoopState, np.ndarray] = {"sticks": stuck, "slides": _sliding(stages, stuck)}
+    """The loops of which stages are not stable in each of these states, shape (count,); a swing is damped by the mean
+    of the viscous friction in both directions."""
     limit = GROWTH * stages.number("rate")
-    return {state: _growth(matrices) > limit for state, matrices in loops.items()}
+    return {state: growth > limit for state, growth in _growths(stages, np.mean).items()}
+
+
+def _growths(stages: Ensemble, of_directions: Callable[..., np.ndarray]) -> dict[LoopState, np.ndarray]:
+    """The fastest growth rates [1/s] in each of these states, shape (count,); NaN where equations are not finite.
+    `of_directions` makes one viscous friction out of those of both directions."""
+    stuck = _rates(stages)
+    return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, of_directions))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
@@ -93,7 +105,7 @@ def _rates(stages: Ensemble) -> np.ndarray:
     return np.stack(columns, axis=2) / stages.scales[:, :, None]
 
 
-def _sliding(stages: Ensemble, stuck: np.ndarray) -> np.ndarray:
+def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
     """The same without friction but for its viscous share; without the states of the friction law."""
     kernel, flat = stages.kernel, stages.flat
     bodies = ("cart", "stage") if stages.structure.joint == "rigid" else ("cart",)
@@ -109,7 +121,8 @@ def _sliding(stages: Ensemble, stuck: np.ndarray) -> np.ndarray:
         for k, step in enumerate(_displaced_states(stages)):
             change = _force(stages, step, output) - _force(stages, -step, output)
             matrix[:, body, k] += change / (2 * STEP * own * unit)
-        matrix[:, body, body] -= _viscous(stages, FAST * unit, output) / own
+        both = [_viscous(stages, way * FAST * unit, output) for way in (1.0, -1.0)]
+        matrix[:, body, body] -= of_directions(both, axis=0) / own
     bristles = kernel.having(Role.BRISTLE)
     return np.delete(np.delete(matrix, bristles, 1), bristles, 2)
 

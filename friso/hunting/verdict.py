@@ -62,6 +62,8 @@ LEFT_OVER = "not every motion that swings on was followed to its end: this one m
 SWINGS_ON = "this motion still swings when it is given up, by less than half of what was found to attract"
 """The same where it has been seen not to have done so."""
 
+STILL_SWINGS = "this motion still swings a little at the end of the longest run, though nothing was found that attracts"
+
 UNFOLLOWED = (
     "this motion was not followed for long enough to see it come to rest: that takes more work than a check may"
 )
@@ -171,6 +173,8 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         )
     if attraction.possible and attraction.certain and rest.unknown[0]:
         attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
+    elif attraction.possible and attraction.certain and rest.restless[0] and rest.swing[0] > _resting(stage):
+        attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
     if attraction.possible and not observed:
@@ -376,6 +380,11 @@ class _Rest:
     def unknown(self) -> np.ndarray:
         """Which had to be followed for long, and were not to the end of that, shape (count,)."""
         return ~self.rests & ~np.isfinite(self.followed)
+
+    @property
+    def restless(self) -> np.ndarray:
+        """Which have not settled either by the end of the longer run, shape (count,)."""
+        return ~self.rests & np.isfinite(self.followed) & ~np.isfinite(self.after)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
         """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""

@@ -71,10 +71,11 @@ def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
 
 
 def _beginnings(remedy: Remedy) -> np.ndarray:
-    """The settings that work with some keys as they were, the fewest changed ones first, wholly and half as far (in the
-    logarithm), shape (points, variables)."""
+    """The settings that work, and then with some keys as they were, the fewest changed ones first, wholly and half as
+    far (in the logarithm), shape (points, variables)."""
     home, works = _ends(remedy).T
-    masks = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)[1:]
+    _, *some, every = sorted(product((0.0, 1.0), repeat=len(home)), key=sum)
+    masks = [every, *some]
     return np.array([home + part * np.array(mask) * (works - home) for mask in masks for part in (1.0, 0.5)])
 
 

@@ -165,7 +165,8 @@ class Search:
         size = max(5, min(self.budget.points * variables, MOST_POINTS))
         drawn = np.random.default_rng(SEED).random((size, variables))
         if start is not None:
-            drawn[: len(start)] = start[:size]
+            few = start[: size // 2]
+            drawn[: len(few)] = few
         _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations)
         points = self.points
         best = points.shares[int(points.cost(self.goal, None if wanted is None else wanted(points.shares)).argmin())]

@@ -44,7 +44,7 @@ class Stribeck(StribeckSection):
         level = stribeck_level(velocity, forward.sign, variant)
         force = level * tanh(velocity / key("friction.regularisation_velocity"))
         even = variant.exponent is None or variant.exponent % 2 == 0
-        smooth = even and not variant.asymmetric  # at rest
+        smooth = even and not (variant.asymmetric or variant.viscous_asymmetric)  # at rest
         static = friction_level("static", variant.conditions)
         component = Component(kinks=() if smooth else (forward,))
         return Friction(force + viscous_force(velocity, forward.sign, variant), static, component)

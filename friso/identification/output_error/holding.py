@@ -12,6 +12,11 @@ SURE = 0.999
 """Probability with which the worse of both has to be wrong."""
 
 
+NOISE_ALONE = 1.2
+"""What a fit may leave, in units of the noise, for the difference of both to be judged by that noise: errors of the
+model decide as well."""
+
+
 def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     """The better of two fits to a log, with its force held between the samples and not.
 
@@ -26,6 +31,8 @@ def with_force_settled(fit: OutputErrorFit, noise: float) -> OutputErrorFit:
     turned = tuple(replace(inputs, held=other.held) for inputs in sharper)
     swapped = polished(replace(problem, inputs=other, unsettled=(problem.inputs, *turned)), fit.free, fit.inner)
     better, worse = sorted((fit, swapped), key=lambda one: one.cost)
-    if not better.explains(noise) or worse.cost < better.cost * (1 + chi2.ppf(SURE, 1) / better.independent):
+    if better.left > NOISE_ALONE * noise * problem.passes or worse.cost < better.cost * (
+        1 + chi2.ppf(SURE, 1) / better.independent
+    ):
         return better
     return polished(replace(better.problem, unsettled=turned if better is swapped else sharper), fit.free, better.inner)
