@@ -9,8 +9,10 @@ import xarray as xr
 
 from friso.studies.thesis import STUDIES, Evidence, Finding, Response, thesis_rig
 from friso.studies.thesis.claims import registered
+from friso.studies.thesis.evidence import RESPONSES
 from friso.studies.thesis.judges import arguments
-from friso.studies.thesis.judges.arguments import HEAVY
+from friso.studies.thesis.judges.arguments import HEAVY, LIGHT
+from friso.studies.thesis.space import draw
 from friso.studies.thesis.ways import by_peak_count
 
 Y, N = True, False
@@ -74,11 +76,23 @@ def slips(acceleration: float, overshoot: float) -> Response:
 
 def test_what_a_mass_does_to_the_overshoot() -> None:
     def judged_by(light: Response, heavy: Response) -> tuple[bool, ...]:
-        return registered()["S41"].judge(Evidence({}, {"locked": light, HEAVY: heavy})).pattern
+        return registered()["S41"].judge(Evidence({}, {LIGHT: light, HEAVY: heavy})).pattern
 
     assert judged_by(slips(2.0, 1e-3), slips(1.0, 5e-4)) == (Y, Y)
     assert judged_by(slips(1.0, 1e-3), slips(2.0, 5e-4)) == (N, Y)
     assert judged_by(slips(2.0, 1e-3), slips(1.0, 2e-3)) == (Y, N)
+    assert judged_by(slips(2.0, -5e-4), slips(1.0, 2e-3)) == (N, N)  # turns before the reference: no overshoot
+
+
+def test_the_two_masses_are_compared_whatever_is_drawn() -> None:
+    rigs = [
+        thesis_rig().replace(draw(number).changes).replace(dict(RESPONSES[name])).flat()
+        for number in range(4)
+        for name in (LIGHT, HEAVY)
+    ]
+    masses = [rig["masses.cart"] + rig["masses.stage"] for rig in rigs]
+    assert masses == pytest.approx([1.7, 2.5] * 4)
+    assert [rig["parasitic.mass"] / rig["masses.stage"] for rig in rigs] == pytest.approx([0.5] * 8)
 
 
 def test_the_swing_over_the_crossover() -> None:

@@ -33,18 +33,19 @@ CLOSE = 0.1
 @judges("F17", figure="17", needs=(LINE, BUILT))
 def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
     """The mass line with friction at several places."""
-    line = judged_line(evidence.experiments.locked_line)
+    flat = evidence.rig.flat()
+    line = judged_line(evidence.experiments.locked_line, flat["masses.cart"] + flat["masses.stage"])
     return Finding((*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0]))))
 
 
-def judged_line(line: LockedLine) -> Finding:
-    """The finding from the simulated responses."""
+def judged_line(line: LockedLine, moved: float) -> Finding:
+    """The finding from the simulated responses of a rig that moves so much mass [kg]."""
     rates, magnitude, scatter = np.array(FREQUENCIES), line.magnitude, line.scatter
     mean = np.nanmean(magnitude, axis=0)
     about_one = (mean > 1 / ABOUT) & (mean < ABOUT)
     end = float(max(rates[: len(about_one) if about_one.all() else int(about_one.argmin())], default=0.0))
     inside = (rates >= _NOISY[0]) & (rates <= _NOISY[1])
-    mass = WEIGHED[0] / np.nanmedian(magnitude[:, inside], axis=1)
+    mass = moved / np.nanmedian(magnitude[:, inside], axis=1)
     worst, above = float(rates[np.nanargmax(scatter)]), float(np.nanmax(scatter[rates >= 1.5 * _NOISY[1]]))
     weighed, seen = WEIGHED[0], MEASURED[0]
     return Finding(
