@@ -28,6 +28,7 @@ from friso.equations.motion import size
 from friso.hunting.margin import margin
 from friso.shares import share
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
+from friso.studies.rig.moves_on_rails import distance
 from friso.studies.thesis import (
     STUDIES,
     Evidence,
@@ -40,7 +41,7 @@ from friso.studies.thesis import (
     reproduce,
     thesis_rig,
 )
-from friso.studies.thesis.as_built import rig_with_drive
+from friso.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso.studies.thesis.claims import _JUDGES, FindingTable, judges, registered
 from friso.studies.thesis.cycles import map_cycles, survey
 from friso.studies.thesis.evidence import RESPONSES
@@ -50,6 +51,7 @@ from friso.studies.thesis.gains import rig_gains
 from friso.studies.thesis.judges import design_rules
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.kept import Kept
+from friso.studies.thesis.laws import conclusions_by_law
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
 from friso.studies.thesis.plausible import PARTS
@@ -417,6 +419,9 @@ def test_the_weakest_way_decides() -> None:
     assert CYCLE not in together.parts[1].number
     assert f"not met by {SWING}" in together.parts[1].why
     assert f"by {CYCLE} met" in together.parts[2].number
+    assert together.parts[1].number.startswith(f"by {SWING} not met")  # what fails stands first
+    assert all(f"by {way} not met" in together.parts[2].number for way in (COUNT, SWING))
+    assert f"not met by {COUNT} and {SWING}" in together.parts[2].why
 
 
 def test_a_self_test_counts_for_nothing() -> None:
@@ -435,6 +440,12 @@ def test_a_contradiction_is_robust_or_arbitrary(small: Reproduction) -> None:
         judged = verdict(claims()[0], "5", {COUNT: finding(False)}, finding(False), tried)
         assert judged.contradiction == kind
         assert (f"contradiction is {kind}" in judged.dependence) == (kind != "open")
+    tried = replace(space, holds=many[0], count=0)
+    assert verdict(claims()[0], "5", {}, finding(False), tried, undrawn="the rail").contradiction == "open"
+    ways = {COUNT: finding(True), SWING: finding(True), CYCLE: finding(False)}
+    cycle = verdict(claims()[0], "5", ways, weakest(ways), tried, {"a grid": finding(True)})
+    assert (cycle.judgement, cycle.contradiction, cycle.turned) == ("differs", "open", ())
+    assert "an attracting cycle only" in cycle.dependence
     assert verdict(claims()[0], "5", {}, finding(True), space).contradiction == ""
     assert verdict(claims()[0], "5", {}, finding(False)).contradiction == "open"
 
@@ -502,6 +513,29 @@ def test_paths_longer_than_the_rig_do_not_decide_alone() -> None:
     assert "% of the paths fit" in part.number
 
 
+def test_a_path_at_constant_speed_is_longer() -> None:
+    """F11A: with as long at constant speed as accelerating, half as many paths fit."""
+    path = {"path": made("path", lambda a, t: 6 + 0 * a * t)}
+    rig = thesis_rig().replace({"motion.cruise_ratio": 1.0})
+    shares = [
+        registered()["F11A"].judge(Evidence(path, {}, rig=stage)).parts[1].number for stage in (thesis_rig(), rig)
+    ]
+    assert float(shares[0].split(" %")[0]) > float(shares[1].split(" %")[0])
+
+
+def test_the_rig_moves_as_prescribed_whatever_is_drawn() -> None:
+    """Fig. 24 to 27: 100 mm at 100 m/s^2."""
+    for number in range(4):
+        machine = _prescribed(thesis_rig().replace(draw(number).changes))
+        assert distance(machine) == pytest.approx(0.1)
+        assert machine.flat()["motion.acceleration"] == 100
+
+
+def test_the_conclusions_under_each_law_are_of_the_claims_asked_for() -> None:
+    asked = reproduce(only=["E1"], points=3, with_cycles=False, draws=0)
+    assert [item.claim.id for item in conclusions_by_law(asked).conclusions] == ["E1"]
+
+
 def test_one_peak_moves_everywhere() -> None:
     """F5 and the maps call the same a cycle: one peak counted."""
     assert registered()["F5"].judge(Evidence({}, {"locked": cell(1)})).parts[0].holds
@@ -535,7 +569,8 @@ def test_values_that_do_not_enter_are_not_ranked() -> None:
     control, path = {"alpha", "beta"}, {"acceleration", "distance", "cruise over acceleration time"}
     assert entering["E1"] == entering["F7"] == every - control - path
     assert entering["F8"] == every - path
-    assert entering["F27"] == every - {"joint damping"}
+    assert entering["F24"] == entering["F26"] == every - path
+    assert entering["F27"] == every - path - {"joint damping"}
     assert entering["F12B"] == every - control - {"joint damping"}
     assert entering["F11A"] == every - {"acceleration", "distance", "joint damping"}
     assert entering["F16B"] == every - {"stroke"}
@@ -637,7 +672,7 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         assert kept.count == len(before) == 5  # two maps at two tolerances, and a draw
         resumed = reproduce(**orders, kept=kept)
         assert all(file.stat().st_mtime_ns == time for file, time in before.items())
-        assert kept.count == len(before) + 1
+        assert kept.count == len(before) + 2  # the other draw, and friso's own choice
         whole = reproduce(**orders)
     assert reproduce_document(resumed) == reproduce_document(whole)
     assert resumed.maps.keys() == {"friction", "isolator-friction"}

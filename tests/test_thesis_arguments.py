@@ -13,7 +13,7 @@ from friso.studies.thesis.evidence import RESPONSES
 from friso.studies.thesis.judges import arguments
 from friso.studies.thesis.judges.arguments import HEAVY, LIGHT
 from friso.studies.thesis.space import draw
-from friso.studies.thesis.ways import by_peak_count
+from friso.studies.thesis.ways import by_attraction, by_peak_count
 
 Y, N = True, False
 Cells = Callable[[np.ndarray, np.ndarray], Any]
@@ -53,10 +53,12 @@ def test_the_mass_to_tune_for(margins: Any, pattern: Any, monkeypatch: pytest.Mo
 
 
 def test_200_newtons_are_8_g_with_the_mass_identified_and_100_m_s2_take_250() -> None:
-    parts = judged("S352").parts
-    assert [part.holds for part in parts] == [Y, N]
+    finding = judged("S352")
+    parts, table = finding.parts, finding.table
+    assert [part.holds for part in parts] == [Y]
     assert "8.2 g with 2.5 kg" in parts[0].number
-    assert "250 N" in parts[1].number
+    assert table is not None
+    assert table.rows[1][:2] == ("2.5 kg", "250 N")
 
 
 def slips(acceleration: float, overshoot: float) -> Response:
@@ -109,3 +111,14 @@ def test_counted_peaks_that_die_out_are_no_cycles() -> None:
 
     assert judged_by(lambda a, b: a > 0) == (Y,)
     assert judged_by(lambda a, b: a > 0.2) == (N,)
+
+
+def test_by_what_attracts_the_decided_cells_count() -> None:
+    """Whatever their runs do at their end, and without the cells of which it is not certain."""
+    runs = made("control", lambda a, b: 1 + 0 * a * b, lambda a, b: a > 1)
+    shape = runs["peaks"].shape
+    attracts = np.ones(shape, bool)
+    attracts[3:] = False
+    decided = attracts.copy()
+    assert judged("S5", {"control": by_attraction(runs, attracts, decided)}).pattern == (Y,)
+    assert judged("S5", {"control": by_attraction(runs, attracts, np.ones(shape, bool))}).pattern == (N,)

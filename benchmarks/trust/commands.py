@@ -53,7 +53,7 @@ WRITING: dict[str, list[str]] = {
     "rig": ["rig", "stiffness", DRIVE, *OUT],
     "compare": ["compare", DRIVE, "--machines", "20", *OUT],
     "tune": ["tune", RIG, "--only", "controller", *OUT],
-    "reproduce": ["reproduce", "--points", "3", *OUT],
+    "reproduce": ["reproduce", "--points", "3", "--draws", "0", *OUT],
     "guideline": ["guideline", "--samples", "64", *OUT],
 }
 """All commands that write."""

@@ -10,7 +10,7 @@ import typer
 from friso.cli.asking import Details, ask
 from friso.cli.command import WHY, Command
 from friso.cli.common import AsJson, Tolerance, say
-from friso.cli.output import DefaultFolder, Overwrite
+from friso.cli.output import OutFolder, Overwrite
 
 
 def reproduce(
@@ -26,13 +26,14 @@ def reproduce(
     ] = 48,
     rtol: Tolerance = "1e-6",
     laws: Annotated[bool, typer.Option("--laws", help="Judge the conclusions under every friction law too.")] = False,
-    out: DefaultFolder = Path("reproduction"),
+    out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,
     details: Details = False,
 ) -> None:
     """Every figure and claim of the thesis that computation decides, judged: reproduction.html, claims.json.
 
+    Written into the folder reproduction, or of single claims into one such as reproduction-F15B.
     What is done of an interrupted run stays, and the same command goes on from there.
     Example: friso reproduce --points 21 --draws 12 --out reproduction
     One claim: friso reproduce --only F15B
@@ -41,8 +42,9 @@ def reproduce(
     from friso.answers.reproduce import reproduce as question
     from friso.studies.thesis.kept import Kept
 
-    kept = Kept(out / UNFINISHED)
-    shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details, "lines": LINES}
+    folder = out or Path("-".join(("reproduction", *sorted({claim.upper() for claim in only or ()}))))
+    kept = Kept(folder / UNFINISHED)
+    shown = {"out": folder, "overwrite": overwrite, "as_json": as_json, "details": details, "lines": LINES}
     asked = {"points": points, "only": only, "draws": draws, "rtol": rtol, "laws": laws}
     try:
         ask("reproduce", question, names, **asked, folder=kept.folder, **shown)

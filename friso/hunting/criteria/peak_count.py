@@ -9,7 +9,7 @@ A maximum need not be much of one. A stage that breaks away halfway back springs
 the rule counts that as it counts the swing itself; with the noise of an encoder on it, a stage that stands 0.2 mm off
 its reference has two peaks a second. Distinct peaks are counted by the same rule, but of maxima alone from which the
 deviation falls by 1 um on both sides before it rises higher: our addition, for logs of a drive (`friso rig`, `friso
-compare`) and for the maps of the thesis (`friso reproduce`), whose trends are those of swings.
+compare`). `friso reproduce` judges the maps of the thesis by its own count, without it.
 """
 
 from __future__ import annotations

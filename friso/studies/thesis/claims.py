@@ -43,7 +43,8 @@ CONVENTIONS = (
     f"same” is within {percent(SAME)}, a “trend” is a rank correlation of at least {TREND:g}. Whether a cell of a map "
     "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
     "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
-    "as far as it does in all three ways. A “limit” lies between the last cell that keeps moving and the next, where "
+    "as far as it does in all three ways; one on the path alone (F11A) is judged in the first two, since what attracts "
+    "does not depend on the path. A “limit” lies between the last cell that keeps moving and the next, where "
     "the swing, interpolated in its logarithm, falls below what counts; none beyond it keeps moving."
 )
 """How the criteria read the words of the claims: one reading for all."""
@@ -172,25 +173,27 @@ Judge = Callable[[Evidence], Finding]
 @dataclass(frozen=True)
 class Registered:
     """A judge, the figure (or equation) that shows its evidence, and the names of the maps, responses, parts of the
-    linear analysis and experiments that it needs."""
+    linear analysis and experiments that it needs; and on what it hangs that no draw changes (`undrawn`)."""
 
     judge: Judge
     figure: str
     needs: frozenset[str]
+    undrawn: str = ""
 
 
 _JUDGES: dict[str, Registered] = {}
 
 
-def judges(claim: str, figure: str, needs: tuple[str, ...] = ()) -> Callable[[Judge], Judge]:
-    """Register the decorated function as judge of a claim. Raises ValueError for an unknown or taken claim."""
+def judges(claim: str, figure: str, needs: tuple[str, ...] = (), undrawn: str = "") -> Callable[[Judge], Judge]:
+    """Register the decorated function as judge of a claim; `undrawn` are assumed values that decide on it and are in no
+    draw. Raises ValueError for an unknown or taken claim."""
     if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")
     if claim in _JUDGES:
         raise ValueError(f"judge of {claim!r}: the claim has one already, {_JUDGES[claim].judge.__qualname__}")
 
     def register(judge: Judge) -> Judge:
-        _JUDGES[claim] = Registered(judge, figure, frozenset(needs))
+        _JUDGES[claim] = Registered(judge, figure, frozenset(needs), undrawn)
         return judge
 
     return register

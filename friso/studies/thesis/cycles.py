@@ -138,7 +138,7 @@ def _comparison(surveyed: Surveyed) -> PeaksAgainstCycles:
 
 def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
     """The curves over a map; none where the axes belong to the motion, which plays no part."""
-    if any(span.key.startswith("motion.") for span in study.spans):
+    if study.of_motion:
         return ()
     source = study_of(runs)
     ranges = tuple(_range(runs[span.key].values, span.key, span.log) for span in study.spans)

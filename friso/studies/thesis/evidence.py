@@ -20,6 +20,7 @@ from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, 
 if TYPE_CHECKING:
     import xarray as xr
 
+
 def _masses(whole: float) -> dict[str, object]:
     """The masses that make a whole [kg], in the proportions weighed, and the controller tuned for it."""
     shares = {"masses.cart": 1.2, "masses.stage": 0.5, "parasitic.mass": 0.25, TUNED_MASS: 1.7}
@@ -33,8 +34,8 @@ RESPONSES: Mapping[str, Mapping[str, object]] = {
     LIGHT: {**LOCKED, **_masses(1.7)},
     HEAVY: {**LOCKED, **_masses(2.5)},
 }
-"""What runs in time change in the rig: those of Fig. 5 and 13, and two that differ in their masses alone, whatever those
-of the rig are."""
+"""What runs in time change in the rig: those of Fig. 5 and 13, and two that differ in their masses alone, whatever
+those of the rig are."""
 
 
 def maps_of(

@@ -126,9 +126,9 @@ EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
         SLIPS: PartNeeded(("motion.",)),
         SPEEDY: PartNeeded(("motion.",)),
         BUILT: PartNeeded(()),
-        MOVES: PartNeeded(()),
-        GRID: PartNeeded(()),
-        ON_RAILS: PartNeeded((), locked=True),
+        MOVES: PartNeeded(("motion.",)),
+        GRID: PartNeeded(("motion.",)),
+        ON_RAILS: PartNeeded(("motion.",), locked=True),
         STANDSTILL: PartNeeded(("motion.",)),
     }
 )

@@ -13,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.cache import code_digest
+from friso.engine.cache import code_digest, machine
 from friso.studies.cells import WORDS
 from friso.studies.store_files import put, stored, stored_arrays
 from friso.studies.study import Study, equations_version
 from friso.studies.sweep import dataset
 from friso.studies.thesis.claims import Finding, Part
+from friso.studies.thesis.studies import thesis_rig
 from friso.whole_file import whole_file
 
 if TYPE_CHECKING:
@@ -92,7 +93,9 @@ class Kept:
         if self.folder is None:
             return None
         self.folder.mkdir(parents=True, exist_ok=True)
-        digest = hashlib.sha256(repr((equations_version(), _sources(), about)).encode()).hexdigest()
+        digest = hashlib.sha256(
+            repr((equations_version(), _sources(), machine(), thesis_rig().to_toml(), about)).encode()
+        ).hexdigest()
         return self.folder / f"{digest[:24]}.{suffix}"
 
 

@@ -66,16 +66,16 @@ class ConclusionsByLaw:
 
 
 def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:
-    """The conclusions of the thesis under each law, on the studies and the grid of a reproduction; those whose studies
-    it left out are left out."""
+    """The conclusions of the thesis under each law, on the studies and the grid of a reproduction: of the claims that
+    it judged."""
     studies, rig = [STUDIES[name] for name in reproduction.maps], thesis_rig()
     own = rig.flat()["friction.model"]
+    judged = {item.claim.id for item in reproduction.verdicts if item.finding}
+    of_runs = {name: RESPONSES[name] for name in reproduction.responses}
     entries = {
         claim.id: entry
         for claim in claims()
-        if claim.id in CONCLUSIONS
-        and (entry := registered().get(claim.id))
-        and not {need for need in entry.needs if need in STUDIES} - reproduction.maps.keys()
+        if claim.id in CONCLUSIONS and (entry := registered().get(claim.id)) and claim.id in judged
     }
     evidences = {own: _evidence(reproduction.maps, reproduction.responses, rig)}
     (_, *kept), left_out = kept_laws(rig, ELEMENTS)
@@ -84,7 +84,7 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
         progress(number, len(converted), conversion.law)
         changes = {"friction": conversion.stage.as_written()["friction"]}
         maps = maps_of(studies, reproduction.points, reproduction.rtol, changes=changes)
-        responses = {name: run_response(of_run, changes, reproduction.rtol) for name, of_run in RESPONSES.items()}
+        responses = {name: run_response(of_run, changes, reproduction.rtol) for name, of_run in of_runs.items()}
         evidences[conversion.law] = _evidence(maps, responses, rig.replace(changes))
     progress(len(converted), len(converted), "laws")
     findings = {

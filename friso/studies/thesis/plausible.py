@@ -16,7 +16,7 @@ from friso.studies.thesis.evidence import RESPONSES, evidence
 from friso.studies.thesis.experiments import EXPERIMENTS
 from friso.studies.thesis.kept import NOT_KEPT, Findings, Kept
 from friso.studies.thesis.linear import NEEDS
-from friso.studies.thesis.space import OPEN, SEED, Draw, draw, enters
+from friso.studies.thesis.space import OPEN, SEED, Draw, baseline, draw, enters
 from friso.studies.thesis.studies import STUDIES
 from friso.studies.thesis.ways import COUNT, READ, SWING, by_way, weakest
 
@@ -82,8 +82,9 @@ class PrintedNumber:
 
 @dataclass(frozen=True)
 class BestFit:
-    """The draw whose numbers are nearest to those printed: the root mean square of the logarithms of their ratios
-    (`misfit`; of the baseline: `at_baseline`), and these numbers."""
+    """The draw whose numbers are nearest to those printed, friso's own choice (numbered -1) being one of them: the root
+    mean square of the logarithms of their ratios (`misfit`; at friso's choice: `at_baseline`), all on maps of `POINTS`
+    values per axis, and these numbers."""
 
     draw: Draw
     misfit: float
@@ -103,26 +104,32 @@ class Plausible:
 def plausible(
     entries: Mapping[str, Registered],
     draws: int,
-    own: Mapping[str, Finding],
     kept: Kept = NOT_KEPT,
     tally: Tally | None = None,
 ) -> Plausible:
-    """The claims over so many joint draws; `own` are the findings at friso's choice, by the claim."""
+    """The claims over so many joint draws; friso's own choice is computed as one more, for the best fit."""
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
     drawn = tuple(draw(number) for number in range(draws))
+    own: dict[str, Finding] = {}
     by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
-    for one in drawn:
-        groups = [(cheap, MAP_WORK)] + ([(costly, COSTLY_WORK)] if one.number % EVERY == EVERY - 1 else [])
+    for one in (*drawn, baseline()) if drawn else ():
+        groups = [(cheap, MAP_WORK)] + (
+            [(costly, COSTLY_WORK)] if one in drawn and one.number % EVERY == EVERY - 1 else []
+        )
         for group, work in groups:
             if not group:
                 continue
             about = ("draw", sorted(group), POINTS, DRAW_RTOL, SEED, one.number)
             findings = kept.findings(about, partial(_judged, group, one))
             for name in group:
-                by_claim_tried[name].append((one, _by_way(findings, name)))
+                ways = _by_way(findings, name)
+                if one in drawn:
+                    by_claim_tried[name].append((one, ways))
+                elif COUNT in ways:
+                    own[name] = ways[COUNT]
             if tally:
-                tally.add(work, f"draw {one.number + 1} of {draws}")
+                tally.add(work, f"draw {one.number + 1} of {draws}" if one in drawn else "friso's own choice")
     by_claim = {name: _in_space(entries[name], tried) for name, tried in by_claim_tried.items() if tried}
     return Plausible(drawn, by_claim, _fit({name: by_claim_tried[name] for name in cheap}, own))
 
@@ -131,7 +138,7 @@ def work_of(entries: Mapping[str, Registered], draws: int) -> int:
     """Steps that the draws take."""
     cheap = any(entry.needs and not entry.needs & PARTS.keys() for entry in entries.values())
     costly = any(entry.needs & PARTS.keys() for entry in entries.values())
-    return cheap * draws * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
+    return cheap * (draws + bool(draws)) * MAP_WORK + costly * (draws // EVERY) * COSTLY_WORK
 
 
 def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
@@ -144,14 +151,22 @@ def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
     """The findings in a draw, by claim and way; none of what cannot be computed there."""
     needs = {need for entry in entries.values() for need in entry.needs}
-    base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
     findings: Findings = {}
+    try:
+        base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
+    except _SHOWS_NOTHING:
+        return findings
     for name, entry in entries.items():
         try:
             findings |= {f"{name} {way}": finding for way, finding in ways_of(entry, base).items()}
-        except (ValueError, ArithmeticError, LookupError, RuntimeError, AssertionError):
-            continue  # a rig of which an experiment shows nothing: the claim is undecided there
+        except _SHOWS_NOTHING:
+            continue  # the claim is undecided there
     return findings
+
+
+_SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
+"""What is raised of a rig of which an experiment shows nothing, such as a loop that stops; errors of the program are
+not taken for it."""
 
 
 def _by_way(findings: Findings, name: str) -> dict[str, Finding]:
@@ -206,21 +221,24 @@ def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) ->
 def _fit(
     by_claim_tried: Mapping[str, Sequence[tuple[Draw, Mapping[str, Finding]]]], own: Mapping[str, Finding]
 ) -> BestFit | None:
-    """The draw that fits the printed numbers best, by the thesis's own count."""
-    by_draw: dict[int, list[PrintedNumber]] = {}
-    drawn: dict[int, Draw] = {}
+    """The draw, or friso's `own` choice, that fits the printed numbers best, by the thesis's own count; one of which
+    not all of them are known is none."""
+    first = baseline()
+    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]
+    by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
+    drawn: dict[int, Draw] = {first.number: first}
     for name, tried in by_claim_tried.items():
         for one, ways in tried:
             drawn[one.number] = one
             if COUNT in ways:
                 by_draw.setdefault(one.number, []).extend(numbers_of(name, ways[COUNT]))
-    misfits = {number: _misfit(numbers) for number, numbers in by_draw.items()}
+    most = max(len(numbers) for numbers in by_draw.values())
+    misfits = {number: _misfit(numbers) for number, numbers in by_draw.items() if len(numbers) == most}
     usable = {number: value for number, value in misfits.items() if np.isfinite(value)}
     if not usable:
         return None
     best = min(usable, key=lambda number: usable[number])
-    at_baseline = _misfit([item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])])
-    return BestFit(drawn[best], usable[best], at_baseline, tuple(by_draw[best]))
+    return BestFit(drawn[best], usable[best], misfits.get(first.number, np.inf), tuple(by_draw[best]))
 
 
 def numbers_of(claim: str, finding: Finding) -> list[PrintedNumber]:

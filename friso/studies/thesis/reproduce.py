@@ -21,7 +21,7 @@ from friso.studies.thesis.linear import NEEDS, Linear
 from friso.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
-from friso.studies.thesis.ways import COUNT, CYCLE, by_peak_count, by_way, weakest
+from friso.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -131,8 +131,7 @@ def reproduce(
         behind[name] = map_cycles(study, maps[name], surveyed[name], kept)
         tally.add(SURVEY_WORK, f"what attracts, map {study.panel}")
     ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
-    own = {name: findings[COUNT] for name, findings in ways.items()}
-    space = plausible(entries, draws, own, kept, tally)
+    space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
     verdicts = tuple(_verdict(claim, entries, ways, space, others, chosen) for claim in claims())
     curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
@@ -165,13 +164,15 @@ def _verdict(
         weakest(findings),
         space.claims.get(claim.id),
         {name: by_claim[claim.id] for name, by_claim in others.items() if claim.id in by_claim},
+        entries[claim.id].undrawn,
     )
 
 
 def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
-    """The findings of a judge in all the ways in which its evidence can be read."""
+    """The findings of a judge in all the ways in which its evidence can be read; a claim on paths alone is left out of
+    what attracts, which does not depend on the path."""
     findings, maps = ways_of(entry, base), entry.needs & STUDIES.keys()
-    if maps and maps <= surveyed.keys():
+    if maps <= surveyed.keys() and not all(STUDIES[name].of_motion for name in maps):
         attracted = {name: surveyed[name].attracted for name in maps}
         lasting = by_way(replace(base, maps={}), by_peak_count)
         findings[CYCLE] = entry.judge(replace(lasting, maps=attracted))

@@ -54,6 +54,11 @@ class ThesisStudy:
         """The keys that the study itself decides on."""
         return frozenset(span.key for span in self.spans) | frozenset(self.links) | frozenset(self.changes)
 
+    @property
+    def of_motion(self) -> bool:
+        """Whether its axes are those of the motion alone, on which what attracts does not depend."""
+        return all(span.key.startswith("motion.") for span in self.spans)
+
     def axes(self, points: int) -> dict[str, str]:
         """The axes as `friso.sweep` takes them, `points` values each."""
         return {span.key: span.text(points) for span in self.spans}

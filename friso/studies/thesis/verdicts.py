@@ -11,6 +11,7 @@ from friso.shares import Share
 from friso.studies.thesis.claims import Claim, Finding, Judgement
 from friso.studies.thesis.plausible import ClaimInSpace
 from friso.studies.thesis.space import OPEN
+from friso.studies.thesis.ways import CYCLE, weakest
 
 ROBUST = 0.25
 """Share of the space in which a claim may hold after all, up to which its contradiction is called robust: 13 draws
@@ -25,6 +26,7 @@ class Verdict:
 
     `ways` are the findings by the way in which hunting is judged, of which the finding is the weakest; `space` the
     claim over joint draws of the values that the thesis leaves open, None where none enters or no draw was made;
+    `undrawn` what else is assumed that decides on it, and is in no draw;
     `turned` is what a coarser grid, or the thesis's tolerance, does to the judgement.
     """
 
@@ -36,17 +38,32 @@ class Verdict:
     ways: Mapping[str, Finding] = field(default_factory=lambda: NO_WAYS)
     space: ClaimInSpace | None = None
     turned: tuple[str, ...] = ()
+    undrawn: str = ""
+
+    @property
+    def by_runs(self) -> Finding | None:
+        """The finding in the ways that the draws and the other methods know too, without what attracts."""
+        return _by_runs(self.ways) or self.finding
+
+    @property
+    def by_cycle_only(self) -> bool:
+        """Whether it does not hold, but for what attracts would."""
+        runs = self.by_runs
+        return self.judgement != "holds" and runs is not None and runs.judgement == "holds"
 
     @property
     def contradiction(self) -> str:
         """Of a claim that does not hold: "arbitrary" where it does in some draw, "robust" where it does in none and its
-        share is at most `ROBUST` by its interval, else "open": too few draws tell; empty of one that holds."""
+        share is at most `ROBUST` by its interval, else "open": too few draws tell, or it fails by an attracting cycle
+        alone, which is not looked for in draws, or it hangs on values that are not drawn; empty of one that holds."""
         if self.finding is None or self.judgement == "holds":
             return ""
-        if self.space is None:
+        if self.space is None or self.by_cycle_only:
             return "open"
         if self.space.count:
             return "arbitrary"
+        if self.undrawn:
+            return "open"
         return "robust" if self.space.holds.high <= ROBUST else "open"
 
     @property
@@ -63,6 +80,10 @@ class Verdict:
             )
             sentence += f"{_HANGS[bool(self.space.hangs_on)]}{_listed(self.space)}."
             sentence += _KINDS.get(self.contradiction, "")
+        if self.by_cycle_only:
+            sentence += " It does not hold by an attracting cycle only, which was not tried in draws."
+        if self.undrawn:
+            sentence += f" It hangs also on what is assumed and not drawn: {self.undrawn}."
         return " ".join((sentence, *(f"Method: {text}." for text in self.turned)))
 
 
@@ -101,13 +122,14 @@ def verdict(
     together: Finding,
     space: ClaimInSpace | None = None,
     others: Mapping[str, Finding] = NO_WAYS,
+    undrawn: str = "",
 ) -> Verdict:
     """The verdict from the findings of all `ways` and the one that they allow `together`; `others` are findings by
-    another method, by its name, which are mentioned where other parts hold."""
+    another method, by its name, in the ways that need the runs alone, which are mentioned where other parts hold than
+    in these ways here."""
+    runs = _by_runs(ways) or together
     turned = tuple(
-        f"with {name} {_change(together, finding)}"
-        for name, finding in others.items()
-        if finding.pattern != together.pattern
+        f"with {name} {_change(runs, finding)}" for name, finding in others.items() if finding.pattern != runs.pattern
     )
     reasons = (
         () if together.judgement == "holds" else dict.fromkeys(p.why for p in together.judged if not p.holds and p.why)
@@ -115,11 +137,17 @@ def verdict(
     reason = "; ".join(reasons)
     if not reason and together.judgement != "holds":
         reason = "no reason was found"
-    return Verdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned)
+    return Verdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned, undrawn)
+
+
+def _by_runs(ways: Mapping[str, Finding]) -> Finding | None:
+    """The weakest finding of the ways that need the runs alone; None without any."""
+    runs = {way: finding for way, finding in ways.items() if way != CYCLE}
+    return weakest(runs) if runs else None
 
 
 def _change(first: Finding, second: Finding) -> str:
     """How a finding is judged otherwise, with the numbers of the parts that turned."""
     pairs = zip(first.judged, second.judged, strict=True)
     numbers = "; ".join(after.number for before, after in pairs if before.holds != after.holds)
-    return f"the claim is judged: {second.judgement} ({numbers})"
+    return f"the claim is judged by the runs: {second.judgement} ({numbers})"

@@ -23,12 +23,14 @@ whatever the move."""
 
 
 def by_peak_count(runs: xr.Dataset) -> xr.Dataset:
-    """The runs with what judges read, by the thesis's count: whether at least one peak is counted, how many, and the
-    swing at the end over the height from which peaks count."""
+    """The runs with what judges read, by the thesis's count: whether at least one peak is counted, how many, the
+    swing at the end over the height from which peaks count, and whether the stage hunts for good (`lasts`): here,
+    whether the run swings at its end."""
     return runs.assign(
         keeps_moving=(runs["peaks"] > 0).assign_attrs(criterion=PEAK_CRITERION),
         count=runs["peaks"],
         size=runs["peak_to_peak"] / COUNTED_ABOVE,
+        lasts=runs["outcome"] == SWINGS,
     )
 
 
@@ -41,16 +43,20 @@ def by_swing_at_end(runs: xr.Dataset) -> xr.Dataset:
         keeps_moving=swings,
         count=runs["peaks"].where(swings | ~ended, 0.0),
         size=runs["peak_to_peak"] / (2 * BAND),
+        lasts=runs["outcome"] == SWINGS,
     )
 
 
 def by_attraction(runs: xr.Dataset, attracts: np.ndarray, decided: np.ndarray) -> xr.Dataset:
     """The same by what attracts the stage of each cell, flags of the runs' shape; cells where that is not certain are
-    left out. How often a cycle goes round in a run is known only where the move ended in it."""
+    left out; what attracts also `lasts`. How often a cycle goes round in a run is known only where the move ended
+    in it."""
     moving = runs["keeps_moving"].copy(data=attracts & decided).assign_attrs(criterion="a cycle attracts the stage")
     outcome = runs["outcome"].where(runs["keeps_moving"].copy(data=decided) | (runs["outcome"] == "invalid"), FAILED)
     count = runs["peaks"].where(moving & (runs["peaks"] > 0)).where(moving, 0.0)
-    return runs.assign(keeps_moving=moving, count=count, outcome=outcome).drop_vars("size", errors="ignore")
+    return runs.assign(keeps_moving=moving, count=count, outcome=outcome, lasts=moving).drop_vars(
+        "size", errors="ignore"
+    )
 
 
 def by_way(evidence: Evidence, read: Callable[[xr.Dataset], xr.Dataset]) -> Evidence:
@@ -66,25 +72,24 @@ READ: Mapping[str, Callable[[xr.Dataset], xr.Dataset]] = MappingProxyType(
 
 
 def weakest(findings: Mapping[str, Finding]) -> Finding:
-    """The finding that all ways allow, the thesis's first: a part holds where it does in each of them; where not, the
-    numbers of those in which it fails stand beside."""
-    first, *others = findings.values()
-    names = [*findings][1:]
+    """The finding that all ways allow, the thesis's first: a part holds where it does in each of them; where the ways
+    differ, the numbers of all stand beside, of those in which it fails first."""
+    first = next(iter(findings.values()))
     parts = []
-    for number, part in enumerate(first.parts):
-        rest = {name: other.parts[number] for name, other in zip(names, others, strict=True)}
-        failing = {name: other for name, other in rest.items() if other.holds != part.holds}
-        parts.append(_together(part, failing))
+    for number in range(len(first.parts)):
+        parts.append(_together({name: finding.parts[number] for name, finding in findings.items()}))
     return Finding(tuple(parts), first.table)
 
 
-def _together(part: Part, different: Mapping[str, Part]) -> Part:
-    if not different:
-        return part
-    verb = "met" if not part.holds else "not met"
-    listed = "; ".join(f"by {name} {verb}: {other.number}" for name, other in different.items())
-    number = f"by {COUNT} {'met' if part.holds else 'not met'}: {part.number}; {listed}"
-    names = " and ".join(name for name, other in {COUNT: part, **different}.items() if not other.holds)
-    reason = next((other.why for other in (part, *different.values()) if not other.holds and other.why), "")
-    why = f"metric: it is not met by {names}" + (f"; {reason}" if reason else "")
-    return replace(part, holds=False, number=number, why=why)
+def _together(parts: Mapping[str, Part]) -> Part:
+    first = next(iter(parts.values()))
+    failing = {name: part for name, part in parts.items() if not part.holds}
+    if len(failing) in (0, len(parts)):
+        return first
+    ordered = {**failing, **parts}
+    number = "; ".join(
+        f"by {name} {'met' if part.holds else 'not met'}: {part.number}" for name, part in ordered.items()
+    )
+    reason = next((part.why for part in failing.values() if part.why), "")
+    why = f"metric: it is not met by {' and '.join(failing)}" + (f"; {reason}" if reason else "")
+    return replace(first, holds=False, number=number, why=why)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from friso.quantities import percent
+from friso.studies.thesis.plausible import POINTS
 from friso.studies.thesis.space import OPEN
 from friso.studies.thesis.verdicts import Verdict
 
@@ -93,17 +95,24 @@ def open_rows() -> list[Sequence[str]]:
 
 
 def fit_sentence(plausible: Plausible) -> str:
-    """Which draw fits the printed numbers best."""
+    """Which draw, or friso's own choice, fits the printed numbers best, and which numbers these are."""
     fit = plausible.fit
     if fit is None:
         return ""
     units = {value.name: value.unit for value in OPEN}
     values = ", ".join(f"{name} {value:.3g} {units[name]}".rstrip() for name, value in fit.draw.values.items())
-    return (
-        f"Of {len(plausible.draws)} joint draws, number {fit.draw.number} fits the printed numbers best: they are off "
-        f"by a factor of {_factor(fit.misfit)} on average (RMS of the logarithm), at friso's own choice by "
-        f"{_factor(fit.at_baseline)}. Its values: {values}."
+    count, claims = len(fit.numbers), ", ".join(dict.fromkeys(item.claim for item in fit.numbers))
+    compared = f"{count} printed number{'s' if count > 1 else ''} ({claims}), all on maps of {POINTS} x {POINTS}"
+    off = f"off by a factor of {math.exp(fit.misfit):.2f} (RMS of the logarithm)"
+    tried = f"Of friso's own choice and {len(plausible.draws)} joint draws"
+    if fit.draw.number < 0:
+        return f"{tried}, friso's own choice fits best: {off}, by {compared}."
+    own = (
+        f"friso's own choice by {math.exp(fit.at_baseline):.2f}"
+        if math.isfinite(fit.at_baseline)
+        else "at friso's own choice not all of them are found"
     )
+    return f"{tried}, draw {fit.draw.number} fits best: {off}, by {compared}; {own}. Its values: {values}."
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
@@ -114,9 +123,3 @@ def fit_rows(plausible: Plausible) -> list[Sequence[str]]:
         (item.claim, item.criterion, f"{item.printed:g}", f"{item.read:.3g}", f"{item.read / item.printed:.2f}")
         for item in plausible.fit.numbers
     ]
-
-
-def _factor(misfit: float) -> str:
-    import math
-
-    return f"{math.exp(misfit):.2f}" if math.isfinite(misfit) else "more than can be said (one is not found at all)"

@@ -30,7 +30,7 @@ _UNIFORM = "uniform friction along the rail, no noise"
 """Assumptions about the simulated rig."""
 
 
-@judges("F19", figure="19", needs=(STEPPED,))
+@judges("F19", figure="19", needs=(STEPPED,), undrawn="the joint's stiffness, which is entered")
 def stiffness_from_position_steps(evidence: Evidence) -> Finding:
     """The steps of the rig with its cart fixed."""
     return judged_steps(evidence.experiments.joint_steps)
@@ -67,7 +67,7 @@ def judged_steps(steps: JointSteps) -> Finding:
     )
 
 
-@judges("F20", figure="20", needs=(SLIPS,))
+@judges("F20", figure="20", needs=(SLIPS,), undrawn="the static friction, which is entered")
 def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
     """Slow motion with the joint free, at several speeds."""
     return judged_slips(evidence.experiments.slow_motion)

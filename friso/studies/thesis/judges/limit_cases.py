@@ -17,7 +17,9 @@ _FREE, _TOUCHED = ("stuck", "sliding"), ("stuck-touched", "sliding-touched")
 def four_limit_cases(evidence: Evidence) -> Finding:
     """Resonances, antiresonances and mass lines of the plant."""
     plants = evidence.analysis.plants
-    return Finding((*_joint_modes(plants), *_high_modes(plants), _mass_lines(plants, _masses(evidence))), _table(plants))
+    return Finding(
+        (*_joint_modes(plants), *_high_modes(plants), _mass_lines(plants, _masses(evidence))), _table(plants)
+    )
 
 
 def _table(plants: Mapping[str, LimitCase]) -> FindingTable:

@@ -9,7 +9,7 @@ from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
 from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, FindingTable, Part, about, judges, number_text
 from friso.studies.thesis.experiments import BUILT
-from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig
+from friso.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
 from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
 from friso.studies.thesis.linear.loops import SAMPLED
 from friso.studies.thesis.linear.trials import IDENTIFIED, LITTLE
@@ -76,7 +76,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
     return " and ".join(f"from {low * 1e3:.2g} to {high * 1e3:.2g} mm/s" for low, high in ranges)
 
 
-@judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT))
+@judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     """The crossings of the locked rig, sliding, at the thesis's settings."""
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
@@ -141,7 +141,7 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
     )
 
 
-@judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT))
+@judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
     """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
     analysis = evidence.analysis

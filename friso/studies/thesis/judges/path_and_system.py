@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.motion import CRUISE
 from friso.quantities import percent
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import (
@@ -33,10 +34,11 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
     acceleration, time, moving, valid = verdict_table(
         evidence.maps["path"], "motion.acceleration", "motion.acceleration_time"
     )
+    cruise = evidence.rig.flat().get(CRUISE, 0.0)
     moved = (acceleration > 0)[:, None] & (time > 0)[None, :] & valid
     lines = [*moving[acceleration > 0][:, time > 0], *moving[acceleration > 0][:, time > 0].T]
     free_lines = float(np.mean([not line.any() for line in lines]))
-    fits = moved & (acceleration[:, None] * time[None, :] ** 2 <= TRAVEL)
+    fits = moved & (acceleration[:, None] * time[None, :] ** 2 * (1 + cruise) <= TRAVEL)
     square, short_square = free_square(moving, moved), free_square(moving, fits)
     speed = acceleration[:, None] * time[None, :]
     resting = moved & ~moving

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from friso.quantities import percent
+from friso.shares import share_interval
 from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
@@ -14,6 +15,7 @@ from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
 from friso.studies.thesis.claims import ORDER, Evidence, Finding, FindingTable, Part, about, judges, number_text
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
+from friso.studies.thesis.judges.rig_loops import RAIL
 
 _ASSUMED = (
     f"Assumed: friction that varies by {percent(AS_BUILT['rail.static_deviation'])} over "
@@ -39,7 +41,13 @@ def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
     return int((runs.counted[which] & done).sum()), int(done.sum())
 
 
-@judges("F24", figure="24", needs=(MOVES,))
+def _rails(counted: tuple[int, int]) -> str:
+    """On how many rails, with the interval of their share."""
+    low, high = share_interval(*counted)
+    return f"{counted[0]} of {counted[1]} rails (95 % interval {percent(low)} to {percent(high)})"
+
+
+@judges("F24", figure="24", needs=(MOVES,), undrawn=RAIL)
 def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
     """The move at 8 Hz."""
     return judged_move(evidence.experiments.moves)
@@ -53,15 +61,15 @@ def judged_move(moves: MovesOnRails) -> Finding:
             Part(
                 "with the joint locked peaks are counted, on at least half of the rails",
                 2 * locked[0] >= locked[1] > 0,
-                f"{locked[0]} of {locked[1]} rails. {_ASSUMED}",
+                f"{_rails(locked)}. {_ASSUMED}",
                 why="where friction differs between the two places at which the stage sticks, its swings die out",
             ),
-            Part("with the joint free on none", free[0] == 0 < free[1], f"{free[0]} of {free[1]} rails"),
+            Part("with the joint free on none", free[0] == 0 < free[1], _rails(free)),
         )
     )
 
 
-@judges("F25", figure="25", needs=(MOVES,))
+@judges("F25", figure="25", needs=(MOVES,), undrawn=RAIL)
 def locked_needs_crossover(evidence: Evidence) -> Finding:
     """The move at the crossovers of Fig. 25, and releases at the middle one."""
     return judged_crossovers(evidence.experiments.moves)
@@ -78,13 +86,13 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
             Part(
                 f"peaks are counted on no rail at {moves.crossovers[2]:g} Hz, on some at {moves.crossovers[0]:g} Hz",
                 high[0] == 0 < low[0],
-                f"{low[0]} of {low[1]} rails at {moves.crossovers[0]:g} Hz, {high[0]} of {high[1]} at "
+                f"{_rails(low)} at {moves.crossovers[0]:g} Hz, {_rails(high)} at "
                 f"{moves.crossovers[2]:g} Hz. {_ASSUMED}",
             ),
             Part(
                 f"at {moves.crossovers[1]:g} Hz peaks are counted after the same move on some rails, not on all",
                 0 < middle[0] < middle[1],
-                f"{middle[0]} of {middle[1]} rails",
+                _rails(middle),
             ),
             Part(
                 f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
@@ -92,14 +100,13 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
                 f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the "
                 "move to either "
                 "side",
-                why="here the place on the rail decides, not the start; friso rig hunting finds such rails at other "
-                "crossovers",
+                why="none of the starts tried on these rails keeps swinging",
             ),
         )
     )
 
 
-@judges("F26", figure="26", needs=(GRID,))
+@judges("F26", figure="26", needs=(GRID,), undrawn=RAIL)
 def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
     """The share of rails over stroke and crossover."""
     return judged_grid(evidence.experiments.grid)
@@ -127,7 +134,7 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
     )
 
 
-@judges("F27", figure="27", needs=(ON_RAILS,))
+@judges("F27", figure="27", needs=(ON_RAILS,), undrawn=RAIL)
 def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
     """The cycle of an even rail against those of rails that vary."""
     return judged_cycles(evidence.experiments.cycles)
@@ -252,12 +259,10 @@ def _over_noise(standstill: InPosition) -> str:
     """At which noises of the force the deviations are as measured."""
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
-    where = f"with {', '.join(met)} times the noise it is met" if met else "it is met with none of these"
-    return (
-        f"the disturbances are assumed; of {tried} times the noise of the force {where}"
-        if tried
-        else "the disturbances are assumed"
-    )
+    if not tried:
+        return "the disturbances are assumed"
+    where = f"with {' and '.join(met)} times the noise it is met" if met else "it is met with none"
+    return f"the disturbances are assumed: {where} ({tried} times the assumed noise of the force were tried)"
 
 
 def _noises(standstill: InPosition) -> FindingTable | None:

@@ -25,6 +25,10 @@ ASSUMED = (
 )
 
 
+RAIL = "how friction varies along the rail, which rails these are, the drive's delay"
+"""What is assumed of the rig as built, and not drawn."""
+
+
 def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]) -> tuple[Part, ...]:
     """The parts that the rig as built adds; none where it was not run."""
     return parts(evidence.identified.rig_loops) if evidence.identified is not None else ()
