@@ -113,9 +113,10 @@ class CyclesOnRails:
 
 def _prescribed(stage: Stage) -> Stage:
     """The rig with its drive, moved as Sec. 4.3.2 prescribes, by 100 mm at 100 m/s^2, whatever the path of the
-    simulations is; `move` rounds the 90 mm of this path to them."""
-    own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": "30 ms"}
-    return rig_with_drive(stage.replace(own | ({CRUISE: 0.0} if CRUISE in stage.flat() else {})))
+    simulations is; `move` takes the acceleration of this path, and rounds its 90 mm to them."""
+    time = 0.03 / np.sqrt(1 + stage.flat().get(CRUISE, 0.0))
+    own = {"motion.acceleration": "100 m/s^2", "motion.acceleration_time": f"{float(time)!r} s"}
+    return rig_with_drive(stage.replace(own))
 
 
 def rig_with_drive(stage: Stage) -> Stage:

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from friso.engine.simulate import simulate
-from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.studies.request import Request
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Evidence, Response
@@ -15,24 +14,18 @@ from friso.studies.thesis.judges.arguments import HEAVY, LIGHT
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.linear import NEEDS, analysed
-from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, thesis_rig
+from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, masses, thesis_rig
 
 if TYPE_CHECKING:
     import xarray as xr
-
-
-def _masses(whole: float) -> dict[str, object]:
-    """The masses that make a whole [kg], in the proportions weighed, and the controller tuned for it."""
-    shares = {"masses.cart": 1.2, "masses.stage": 0.5, "parasitic.mass": 0.25, TUNED_MASS: 1.7}
-    return {key: f"{whole * share / 1.7!r} kg" for key, share in shares.items()}
 
 
 RESPONSES: Mapping[str, Mapping[str, object]] = {
     "locked": LOCKED,
     WIDE: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "0.5 N"},
     NARROW: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "1.5 N"},
-    LIGHT: {**LOCKED, **_masses(1.7)},
-    HEAVY: {**LOCKED, **_masses(2.5)},
+    LIGHT: {**LOCKED, **masses(1.7)},
+    HEAVY: {**LOCKED, **masses(2.5)},
 }
 """What runs in time change in the rig: those of Fig. 5 and 13, and two that differ in their masses alone, whatever
 those of the rig are."""

@@ -74,6 +74,12 @@ def thesis_rig() -> Stage:
     return loads(files("friso.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8"))
 
 
+def masses(whole: float) -> dict[str, object]:
+    """The masses that make a whole [kg], in the proportions weighed, and the controller tuned for it."""
+    shares = {"masses.cart": 1.2, "masses.stage": 0.5, "parasitic.mass": 0.25, TUNED_MASS: 1.7}
+    return {key: f"{whole * share / 1.7!r} kg" for key, share in shares.items()}
+
+
 LOCKED: Mapping[str, Any] = MappingProxyType({"joint.locked": True})
 SOFT: Mapping[str, Any] = MappingProxyType({"joint.stiffness": "1e3 N/m"})
 

@@ -13,7 +13,7 @@ from friso.stage import Stage, loads
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges, number_text
 from friso.studies.thesis.judges.control_and_friction import smallest_gap
 from friso.studies.thesis.maps import begins, ends, sizes, verdict_table
-from friso.studies.thesis.studies import thesis_rig
+from friso.studies.thesis.studies import LOCKED, masses, thesis_rig
 
 _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
 """Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
@@ -125,14 +125,12 @@ def _gap(evidence: Evidence) -> Part:
 
 @cache
 def _locked_edge() -> str:
-    """Up to where the cycle of the locked rig attracts, as `friso check` finds it."""
-    edge = margin(thesis_rig().replace({"joint.locked": True}), attracting=True)
+    """Up to where the cycle of the locked rig attracts with the mass of the rule, as `friso check` finds it."""
+    edge = margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
+    rig = f"with the friction of Table 2 and {_MOVING_MASS:g} kg"
     if edge is None or edge.crossover is None:
-        return "with the friction of Table 2 no edge of hunting was found"
-    return (
-        f"with the friction of Table 2 a cycle attracts up to {edge.crossover:.2g} Hz; what the peak count "
-        "calls hunting above that are long transients"
-    )
+        return f"{rig} no edge of hunting was found"
+    return f"{rig} a cycle attracts up to {edge.crossover:.2g} Hz; peaks counted above that are those of transients"
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
