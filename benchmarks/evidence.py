@@ -256,7 +256,12 @@ def main() -> None:
         print("The equations have changed:", *changed, sep="\n  ")
         equations = Equations(equations.revision + 1, date.today(), reference_numbers())
         FILE.write_text(written(entries, equations), encoding="utf-8")
-    for name in [*QUICK] if arguments.names == ["quick"] else arguments.names:
+    names = [*QUICK] if arguments.names == ["quick"] else arguments.names
+    if by_hand := sorted({*names} - {*QUICK, *LONG}):
+        parser.error(
+            f"{', '.join(by_hand)}: expected {', '.join([*QUICK, *LONG])}; {', '.join(BY_HAND)} are kept by hand"
+        )
+    for name in names:
         before, entries[name] = entries[name], renewed(entries[name], {**QUICK, **LONG}[name]())
         FILE.write_text(written(entries, equations), encoding="utf-8")
         changed = [
