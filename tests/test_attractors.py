@@ -367,3 +367,13 @@ def test_a_stage_that_begins_to_hunt_after_hundreds_of_seconds() -> None:
         survey = attractors(held(lazy), thorough=True)
     assert not work.exhausted
     assert [motion.amplitude for motion in survey.motions] == pytest.approx([2.90279e-3], rel=1e-4)  # SciPy's as well
+
+
+def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
+    flat = VARIANTS["rigid"].replace({"controller.crossover": "14 Hz"}).flat()
+    survey = attractors(Ensemble.held(flat, 1))
+    assert not survey.attracts[0]
+    moving = Motions(np.ones(1, bool), np.zeros(1), np.full(1, 1e-4), np.full(1, np.nan))
+    assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["transient"]
+    with allowance(1):
+        assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["failed"]

@@ -173,7 +173,7 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         )
     if attraction.possible and attraction.certain and rest.unknown[0]:
         attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
-    elif attraction.possible and attraction.certain and rest.restless[0] and rest.swing[0] > _resting(stage):
+    elif attraction.possible and attraction.certain and rest.restless[0] and rest.swing[0] > _resting(stage.flat())[0]:
         attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
@@ -232,7 +232,7 @@ def _own_motion(stage: Stage, target: Target, work: float) -> tuple[np.ndarray, 
     followed for longer, if that takes no more than so much work: it may be dying out."""
     flat, first = stage.flat(), ends_in(stage.flat(), 1, target)
     ends, completed, swing = (column[0] for column in first)
-    if ends or not completed or swing <= _resting(stage):
+    if ends or not completed or swing <= _resting(flat)[0]:
         return first
     longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
     try:
@@ -243,9 +243,9 @@ def _own_motion(stage: Stage, target: Target, work: float) -> tuple[np.ndarray, 
     return last if last[1][0] else first
 
 
-def _resting(stage: Stage) -> float:
-    """The swing, peak to peak [m], up to which a stage is at rest."""
-    return 2 * RESOLVED * float(Ensemble.held(stage.flat(), 1).length[0])
+def _resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
+    """The swings, peak to peak [m], up to which stages of one structure are at rest, shape (count,)."""
+    return 2 * RESOLVED * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def _starts(
@@ -269,7 +269,7 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
     """Why a motion need not come to rest that does not end in what was found to attract, and at last swings by so much
     [m], peak to peak; `within` is the time from which on it stays near its reference [s] (NaN: not within its run).
     "" if it does."""
-    if swing > _resting(stage):
+    if swing > _resting(stage.flat())[0]:
         return SWINGS_ON
     surveyed = attraction.surveyed
     every = surveyed is None or bool(surveyed.complete[0])
@@ -350,6 +350,9 @@ def judge_runs(
     if free.size:
         rest = _rest(_part(flat, free), motions.take(free), free.size, run_options, possible=survey is not None)
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
+        if survey is not None:
+            swinging = rest.restless & ~rest.steady & (rest.swing > _resting(_part(flat, free), free.size))
+            decided[free] = ~(rest.unknown | swinging)
     return verdicts(decided, attracts, in_cycle, rests)
 
 
@@ -358,8 +361,7 @@ def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions
     followed for long, and of which that is decided: they do, or they have come to rest."""
     count = len(motions.completed)
     rest = _rest(flat, motions, count, run_options, possible=True)
-    length = Ensemble.held(flat, count, form=shared_structure(flat)).length
-    stands = np.isfinite(rest.followed) & (rest.swing <= 2 * RESOLVED * length)
+    stands = np.isfinite(rest.followed) & (rest.swing <= _resting(flat, count))
     return rest.steady, rest.steady | np.isfinite(rest.after) | stands
 
 

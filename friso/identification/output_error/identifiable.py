@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from friso.identification.output_error.coverage import NEAR, Coverage
-from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
+from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, bends
 from friso.identification.output_error.problem import Problem
@@ -93,6 +93,8 @@ def _identifiable_on_log(
     numbers = _numbers(names, core | hopeful)
     full = with_force_settled(fit(follows, numbers, everywhere(follows, numbers, plain.inner)), noise)
     believed = _believed(full, core, covered, progress)
+    if full.problem.inputs.held != plain.problem.inputs.held:
+        plain = polished(full.problem, plain.free, plain.inner)
     if _pays(full, plain) or believed.shown == hopeful:
         return believed
     if not believed.shown:
