@@ -45,7 +45,7 @@ def main() -> None:
     command = [
         sys.executable,
         "-m",
-        "friso.cli",
+        "friso",
         "app",
         str(friso.example("thesis_rig")),
         "--no-browser",

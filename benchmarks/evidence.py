@@ -42,7 +42,7 @@ NAN = float("nan")
 
 def friso(*arguments: str) -> dict[str, Any]:
     """The JSON document of a command, run in the repository's folder."""
-    command = [sys.executable, "-m", "friso.cli", *arguments, "--json"]
+    command = [sys.executable, "-m", "friso", *arguments, "--json"]
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout)
 

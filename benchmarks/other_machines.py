@@ -126,7 +126,7 @@ def main() -> int:
             shutil.rmtree(folder, ignore_errors=True)
             folder.mkdir()
             shutil.copyfile(options.stage, folder / "stage.toml")
-        friso = ["python3", "-m", "friso.cli"]
+        friso = ["python3", "-m", "friso"]
         # with processes and a /proc of its own, whose mount ends with it
         there = ["unshare", "--fork", "--pid", f"--root={root}", "--mount-proc", "--wd=/work", "env", "-i"]
         there += ["PATH=/usr/bin:/bin", "HOME=/work", f"PYTHONPATH=/{FOLDER}", *friso]

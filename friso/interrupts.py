@@ -115,10 +115,10 @@ def _imports(frame: FrameType | None) -> bool:
     return False
 
 
-_IS_COMMAND = ("-m", "friso.cli") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or (
+_IS_COMMAND = ("-m", "friso") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or (
     os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
 )
-"""Whether this process was started as friso, or as python -m friso.cli."""
+"""Whether this process was started as friso, or as python -m friso."""
 
 if _IS_COMMAND:
     _install()

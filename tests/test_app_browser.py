@@ -60,7 +60,7 @@ def browsed() -> Iterator[Browsed]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    command = [sys.executable, "-m", "friso.cli", "app", str(RIG), "--no-browser", "--port", str(port)]
+    command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser", "--port", str(port)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, driver.sync_playwright() as play:
         assert server.stdout is not None
         address = re.search(r"http://\S+", server.stdout.readline())

@@ -103,7 +103,7 @@ def test_init_writes_a_stage_that_checks_and_overwrites_nothing(tmp_path: Path) 
 
 def test_version() -> None:
     """In a process of its own, as a user runs it."""
-    done = subprocess.run([sys.executable, "-m", "friso.cli", "--version"], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-m", "friso", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout == f"friso {friso.__version__}\n"
 
 

@@ -483,7 +483,7 @@ def test_an_unknown_material_names_the_nearest(tmp_path: Path, refused: Refused)
 
 
 def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path) -> None:
-    run = [sys.executable, "-m", "friso.cli", "flexure", str(RIG), "--out", "out"]
+    run = [sys.executable, "-m", "friso", "flexure", str(RIG), "--out", "out"]
     done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=300, env={**os.environ})
     assert (done.returncode, done.stdout) == (2, "")
     assert "Traceback" not in done.stderr

@@ -52,7 +52,7 @@ on_windows = pytest.mark.parametrize("host", ["win32", pytest.param("darwin", ma
 
 
 def started(
-    host: str, folder: Path, *arguments: object, command: tuple[str, ...] = ("-m", "friso.cli"), **variables: str
+    host: str, folder: Path, *arguments: object, command: tuple[str, ...] = ("-m", "friso"), **variables: str
 ) -> subprocess.Popen[str]:
     """`friso ARGUMENTS`, or another command of Python's, in a folder, on the host."""
     paths = os.pathsep.join([str(PRELOAD), *(path for path in sys.path if path)])

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import Wording
+from variants import VARIANTS
 
 from friso.identification.causes import causes
 from friso.identification.combine import combined
@@ -23,6 +24,7 @@ from friso.identification.model_error import (
     with_causes,
     with_halves,
     with_model_error,
+    with_possible_values,
 )
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error.changes import changes_beside, inverse_reaching
@@ -194,6 +196,19 @@ def test_slow_friction_of_a_fit_that_lacks_something_is_less_certain() -> None:
     assert all_with_model_error([stribeck], inverse, flat, good) == (stribeck,)
     (wide,) = all_with_model_error([stribeck], inverse, flat, replace(good, left=1.0))
     assert wide.half_width == pytest.approx(2 * stribeck.half_width)
+
+
+def test_intervals_hold_only_values_that_keys_may_have() -> None:
+    flat = VARIANTS["rigid"].flat()
+    stiffness = Estimate("friction.bristle_stiffness", "N/m", 1e5, -1e4, 3e5, "")
+    viscous = Estimate("friction.viscous", "N*s/m", 2.0, -1.0, 5.0, "")
+    mass = Estimate("masses.stage", "kg", 2.0, 1.0, 3.0, "")
+    correlation = np.array([[1.0, 0.2, 0.3], [0.2, 1.0, 0.4], [0.3, 0.4, 1.0]])
+    (bounded, cut, same), left = with_possible_values([stiffness, viscous, mass], correlation, flat)
+    assert (bounded.determined, bounded.low, bounded.high) == (False, 0.0, 3e5)
+    assert (cut.value, cut.low, cut.high) == (2.0, 0.0, 5.0)
+    assert same == mass
+    assert left.tolist() == [[1.0, 0.4], [0.4, 1.0]]
 
 
 def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_rest() -> None:

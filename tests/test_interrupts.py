@@ -20,7 +20,7 @@ from friso import interrupts
 from friso.engine import building
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
-COMMAND = [sys.executable, "-X", "importtime", "-m", "friso.cli", "bode", str(RIG)]
+COMMAND = [sys.executable, "-X", "importtime", "-m", "friso", "bode", str(RIG)]
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -26,7 +26,7 @@ pytestmark = pytest.mark.xdist_group("rig")
 
 def friso(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
     """Run the command line in a folder."""
-    command = [sys.executable, "-m", "friso.cli", *map(str, arguments)]
+    command = [sys.executable, "-m", "friso", *map(str, arguments)]
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
 
 
@@ -108,7 +108,7 @@ def test_a_store_takes_nothing_that_makes_another_study(
 
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""
-    command = [sys.executable, "-m", "friso.cli", "map", str(RIG), "--x", "controller.crossover=4 Hz..12 Hz:300"]
+    command = [sys.executable, "-m", "friso", "map", str(RIG), "--x", "controller.crossover=4 Hz..12 Hz:300"]
     command += ["--y", "joint.stroke=0.1 mm..1 mm:40", "--rtol", "1e-7", "--out", "a.zarr", "--verify", "0"]
     terminal, other = pty.openpty()
     with subprocess.Popen(

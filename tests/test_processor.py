@@ -103,7 +103,7 @@ def test_lanes_fill_a_register() -> None:
 
 @pytest.mark.skipif("x86_64" not in processor().triple, reason="names processors of this family")
 def test_a_lesser_processor_comes_to_the_same_result(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "friso.cli", "simulate", str(EXAMPLES / "thesis_rig.toml"), "--json"]
+    command = [sys.executable, "-m", "friso", "simulate", str(EXAMPLES / "thesis_rig.toml"), "--json"]
     answers = []
     for name in ("", "x86-64"):
         environ = {**os.environ, PROCESSOR_VARIABLE: name}

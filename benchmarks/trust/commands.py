@@ -22,7 +22,7 @@ from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC
 from friso.answers.drafts import DRAFTS
 from friso.answers.output_folder import MARKER, UNFINISHED, marked, write
 
-FRISO = [sys.executable, "-m", "friso.cli"]
+FRISO = [sys.executable, "-m", "friso"]
 SMALL = ["--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24", "--rtol", "1e-8"]
 MAP = ["map", RIG, *SMALL, "--out", "a.zarr"]
 OUT = ["--out", "out"]

@@ -12,6 +12,8 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.parameters import is_free
 from friso.identification.quality import Quality
+from friso.quantities import any_sign
+from friso.stage import numeric_keys
 
 
 def _of_inverse(flat: Mapping[str, Any]) -> dict[str, tuple[str, float]]:
@@ -109,6 +111,26 @@ def with_halves(estimates: Sequence[Estimate], flat: Mapping[str, Any], quality:
     return tuple(answers)
 
 
+def with_possible_values(
+    estimates: Sequence[Estimate], correlation: np.ndarray, flat: Mapping[str, Any]
+) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """The estimates with intervals of values that their keys may have, and the correlation of the shown ones: what
+    cannot be zero, but by its interval might, is bounded from above alone."""
+    bounds = {key: declared.bound for key, declared in numeric_keys(flat).items()}
+    answers, kept = [], []
+    for estimate in estimates:
+        bound, answer = bounds.get(estimate.name, any_sign), estimate
+        if estimate.determined and not bound.holds(estimate.low):
+            answer = replace(estimate, low=0.0) if bound.holds(0.0) else _at_most(estimate)
+        kept += [answer.determined] if estimate.determined else []
+        answers.append(answer)
+    return tuple(answers), correlation[np.ix_(kept, kept)]
+
+
+def _at_most(estimate: Estimate) -> Estimate:
+    return Estimate.unknown(estimate.name, estimate.unit, estimate.method, NOT_ABOVE_ZERO, 0.0, estimate.high)
+
+
 def not_described(estimates: Sequence[Estimate]) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """Nothing of what a fit to a record says that no model describes."""
     answers = (Estimate.unknown(one.name, one.unit, one.method, NOT_DESCRIBED) for one in estimates)
@@ -134,6 +156,9 @@ def of_inverse_model(
     certain = [answer for answer in answers if answer.determined]
     return tuple(answers), np.eye(len(certain))
 
+
+NOT_ABOVE_ZERO = "its interval reaches down to zero"
+"""Why there is no value of what cannot be zero."""
 
 NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
 """Why nothing at all is taken from a fit."""

@@ -21,6 +21,7 @@ from friso.identification.model_error import (
     of_inverse_model,
     with_causes,
     with_halves,
+    with_possible_values,
 )
 from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
 from friso.identification.output_error.coverage import Coverage, coverage
@@ -114,6 +115,7 @@ def identify_moves(
         estimates = all_with_model_error(estimates, inverse, flat, quality)
     estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
     estimates = with_halves(estimates, flat, quality)
+    estimates, correlation = with_possible_values(estimates, correlation, flat)
     simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,

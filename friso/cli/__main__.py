@@ -1,3 +1,0 @@
-from friso.cli.app import main
-
-main()
