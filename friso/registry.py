@@ -11,10 +11,10 @@ from typing import Any, Generic, TypeVar
 
 from friso.errors import InputError
 
-Declared = TypeVar("Declared")
+Item = TypeVar("Item")
 
 
-class Registry(Generic[Declared]):
+class Registry(Generic[Item]):
     """What the modules of a `package` declare under the name `attribute`, by the name of the module with dashes:
     `break_away.py` declares "break-away".
 
@@ -25,7 +25,7 @@ class Registry(Generic[Declared]):
 
     def __init__(self, package: str, attribute: str) -> None:
         self.package, self.attribute = package, attribute
-        self.added: dict[str, tuple[Declared, str]] = {}
+        self.added: dict[str, tuple[Item, str]] = {}
 
     def __iter__(self) -> Iterator[str]:
         """The names, in alphabetical order."""
@@ -35,7 +35,7 @@ class Registry(Generic[Declared]):
     def __contains__(self, name: object) -> bool:
         return name in tuple(self)
 
-    def __getitem__(self, name: str) -> Declared:
+    def __getitem__(self, name: str) -> Item:
         """What is declared under a name. Raises KeyError for an unknown one."""
         if name in self.added:
             return self.added[name][0]

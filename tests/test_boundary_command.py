@@ -16,11 +16,11 @@ from snapshots import Snapshots
 
 from friso.answers.output_folder import MARKER
 from friso.hunting.boundary import (
+    Bifurcation,
     Branch,
     Curve,
     Diagram,
     KeyRange,
-    Kind,
     LocatedPoint,
     Plane,
     Point,
@@ -206,7 +206,7 @@ def point(place: float, multiplier: float, distance: float = 0.0) -> Point:
     return Point(place, distance, 0.0, cycles([multiplier]))
 
 
-def located(kind: Kind, place: float, multiplier: float, distance: float = 0.0) -> LocatedPoint:
+def located(kind: Bifurcation, place: float, multiplier: float, distance: float = 0.0) -> LocatedPoint:
     return LocatedPoint(kind, point(place, multiplier, distance), np.array([1.0, 0.0, 0.0]), 1e-6)
 
 

@@ -32,7 +32,7 @@ from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machi
 from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median
-from friso.studies.compare.study import Comparison, Result, compare
+from friso.studies.compare.study import Comparison, OptionResult, compare
 from friso.views.compare.document import compare_document
 from friso.views.compare.figures import figures
 from friso.views.compare.page import page
@@ -413,7 +413,7 @@ def made_up(every: CompareOptions, machines: Machines) -> Comparison:
     settling["a"][15:] = np.inf
     rms = {"a": np.full(count, 2e-9), "c": np.full(count, 1e-9)}
     results = tuple(
-        Result(
+        OptionResult(
             every.options["abc".index(letter)],
             measures.MachineMeasures(
                 np.full(count, "rests"), np.zeros(count, int), settling[letter], rms[letter], np.ones(count)

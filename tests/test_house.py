@@ -60,14 +60,29 @@ def sources() -> dict[str, str]:
     return {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
 
 
-def classes() -> dict[str, list[str]]:
-    """Public classes at the top of modules, by name: the modules that have one of that name."""
+def types() -> dict[str, list[str]]:
+    """Public classes and other types at the top of modules, by name: the modules that have one of that name. Options of
+    commands, and types that stand for any, are left out."""
     modules = defaultdict(list)
     for name, text in sources().items():
         for node in ast.parse(text).body:
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                modules[node.name].append(name)
+            if type_name := _type_name(node):
+                modules[type_name].append(name)
     return modules
+
+
+def _type_name(node: ast.stmt) -> str | None:
+    if isinstance(node, ast.ClassDef):
+        name, value = node.name, None
+    elif isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name):
+        name, value = node.targets[0].id, node.value
+    elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+        name, value = node.target.id, node.value
+    else:
+        return None
+    stands_for_any = isinstance(value, ast.Call) and ast.unparse(value.func) in ("TypeVar", "ParamSpec")
+    named = re.match("[A-Z].*[a-z]", name) and not name.endswith(("Option", "Argument"))
+    return name if named and not stands_for_any else None
 
 
 def texts(source: str) -> Iterator[str]:
@@ -92,8 +107,8 @@ def test_keys_are_imported_where_the_rules_of_tuning_are_the_subject() -> None:
     assert [name for name in importing if not name.startswith((*KNOW_CONTROLLERS, *ABOUT_TUNING))] == []
 
 
-def test_a_class_name_stands_for_one_thing() -> None:
-    assert {name: where for name, where in classes().items() if len(where) > 1} == {}
+def test_the_name_of_a_type_stands_for_one_thing() -> None:
+    assert {name: where for name, where in types().items() if len(where) > 1} == {}
 
 
 @pytest.mark.parametrize("folder", ["friso", "tests", "benchmarks"])

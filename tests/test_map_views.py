@@ -25,13 +25,13 @@ from snapshots import Snapshots
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.colours import painted, ramp, scale
 from friso.views.drawing.drawable import cell_edges, colour_key, drawable
-from friso.views.drawing.figure import Cloud, Figure, Kind, Map
+from friso.views.drawing.figure import Category, Cloud, Figure, Map
 from friso.views.map.cells import axes_of, look, pick
 from friso.views.map.data import MOST, NONE
 from friso.views.map.figures import SLICES, map_figure, map_panel
 from friso.views.map.findings import headline, statement, verification
 from friso.views.map.page import map_html
-from friso.views.map.words import FAILED, INFERRED, INVALID, KINDS, NOT_RUN, QUIET, quantity
+from friso.views.map.words import CATEGORIES, FAILED, INFERRED, INVALID, NOT_RUN, QUIET, quantity
 
 CROSSOVER, STROKE, DAMPING, LOCKED = (
     "controller.crossover",
@@ -92,9 +92,11 @@ def only_map(figure: Figure) -> Map:
     return figure.panels[0].maps[0]
 
 
-def kinds_shown(field: Map | Cloud) -> list[list[Kind | None]]:
+def categories_shown(field: Map | Cloud) -> list[list[Category | None]]:
     assert field.codes is not None
-    return [[None if np.isnan(code) else field.kinds[int(code)] for code in row] for row in np.atleast_2d(field.codes)]
+    return [
+        [None if np.isnan(code) else field.categories[int(code)] for code in row] for row in np.atleast_2d(field.codes)
+    ]
 
 
 # ---------------------------------------------------------------- words
@@ -139,39 +141,43 @@ def test_runs_that_were_not_made_are_not_counted(snapshots: Snapshots):
 
 def test_cells_without_number_are_told_apart_and_never_zero():
     field = only_map(map_figure(troubled(), "peaks"))
-    column = [row[0] for row in kinds_shown(field)]
+    column = [row[0] for row in categories_shown(field)]
     assert column == [INVALID, FAILED, NOT_RUN, INFERRED["swings"], INFERRED["rests"]]
     assert np.isnan(field.z[:, 0]).all()
     assert np.array_equal(field.z[:, 1:], troubled().peaks.values[1:].T)
-    assert all(kind is None for row in kinds_shown(field) for kind in row[1:])
+    assert all(category is None for row in categories_shown(field) for category in row[1:])
     everything = [
         QUIET,
         *ramp(11),
-        *(kind.colour for kind in {*field.kinds, *KINDS["outcome"].values()} if kind.label != "rests"),
+        *(
+            category.colour
+            for category in {*field.categories, *CATEGORIES["outcome"].values()}
+            if category.label != "rests"
+        ),
     ]
     assert len(set(everything)) == len(everything)
 
 
 def test_a_number_that_a_run_does_not_have_is_named():
     never = only_map(map_figure(troubled(), "settling_time_10um"))
-    kind = kinds_shown(never)[1][1]
-    assert kind is not None
-    assert "10 µm" in kind.label
-    assert kind.colour == never.kinds[-1].colour
-    assert kinds_shown(only_map(map_figure(plain(), "period")))[0][0].label == "no period"
+    category = categories_shown(never)[1][1]
+    assert category is not None
+    assert "10 µm" in category.label
+    assert category.colour == never.categories[-1].colour
+    assert categories_shown(only_map(map_figure(plain(), "period")))[0][0].label == "no period"
 
 
 def test_outcomes_have_their_own_colours_in_the_order_of_severity():
     runs = troubled()
     runs["outcome"][3, 0] = "strange"
     field = only_map(map_figure(runs, "outcome"))
-    names = [kind.label for kind in field.kinds]
+    names = [category.label for category in field.categories]
     assert names == ["swings", "rests", "failed", "invalid", "not run", "strange"]
-    shown = [[kind.label for kind in row] for row in kinds_shown(field)]
+    shown = [[category.label for category in row] for row in categories_shown(field)]
     expected = np.where(runs.outcome.values == "", "not run", runs.outcome.values).T
     assert shown == expected.tolist()
-    kinds, _ = colour_key(map_figure(runs, "outcome"))
-    assert [kind.label for kind in kinds] == names
+    categories, _ = colour_key(map_figure(runs, "outcome"))
+    assert [category.label for category in categories] == names
     assert not field.has_numbers
 
 
@@ -203,8 +209,8 @@ def test_cells_without_a_measure_of_what_attracts_say_why(snapshots: Snapshots):
     words[0, :3] = "nothing", "unknown", "swing"
     runs["attractor"] = (runs["peaks"].dims, words)
     runs["multiplier"] = (runs["peaks"].dims, np.where(words == "cycle", -0.5, np.nan))
-    shown = kinds_shown(only_map(map_figure(runs, "multiplier")))
-    labels = {kind.label for row in shown for kind in row if kind}
+    shown = categories_shown(only_map(map_figure(runs, "multiplier")))
+    labels = {category.label for row in shown for category in row if category}
     assert len(labels) == 3
     first, unsure = statement(runs, "multiplier").split(". ")[:2]
     assert numbers(first)[0] == round(100 * 18 / 19)
@@ -215,10 +221,10 @@ def test_cells_without_a_measure_of_what_attracts_say_why(snapshots: Snapshots):
 def test_variables_may_be_missing():
     runs = plain()[["peak_to_peak"]]
     runs["peak_to_peak"][1, 1] = np.nan
-    assert kinds_shown(only_map(map_figure(runs, "peak_to_peak")))[1][1].label == "no value"
+    assert categories_shown(only_map(map_figure(runs, "peak_to_peak")))[1][1].label == "no value"
     assert 20 in numbers(statement(runs, "peaks"))
     by_status = troubled().drop_vars("outcome")
-    assert kinds_shown(only_map(map_figure(by_status, "peaks")))[1][0] is FAILED
+    assert categories_shown(only_map(map_figure(by_status, "peaks")))[1][0] is FAILED
     with pytest.raises(ValueError, match=r"metric: got 'peaks', expected one of peak_to_peak"):
         map_figure(runs, "peaks")
 
@@ -367,7 +373,7 @@ def test_samples_are_points_over_the_first_two_keys():
     assert (panel.x.label, panel.y.label) == ("Mass [kg]", "Joint stroke [mm]")
     cloud = panel.clouds[0]
     assert cloud.x.tolist() == sampled().mass.values.tolist()
-    assert kinds_shown(cloud)[0][3] == INVALID
+    assert categories_shown(cloud)[0][3] == INVALID
     assert figure.caption == "Sampled as well: X."
     assert len(panel.markers) == 1
     assert [axis.key for axis in axes_of(sampled())] == ["mass", STROKE, "x"]
@@ -458,7 +464,7 @@ def test_the_page_colours_cells_as_the_figure_does():
         item = {item["name"]: item for item in page_data(map_html(runs, name, RERUN))["variables"]}[name]
         codes = unpacked(item["codes"], "u1").astype(float)
         assert np.array_equal(np.where(codes == NONE, np.nan, codes), shown.codes.values.ravel(), equal_nan=True)
-        assert item["kinds"] == [{"label": kind.label, "colour": kind.colour} for kind in shown.kinds]
+        assert item["kinds"] == [{"label": category.label, "colour": category.colour} for category in shown.categories]
         drawn = scale(only_map(drawable(map_figure(runs, name))))
         assert (item["low"], item["high"]) == pytest.approx((drawn.low, drawn.high))
         assert [colour for _, colour in item["stops"]] == [colour for _, colour in drawn.stops]

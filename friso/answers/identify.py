@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
-Keeper = Callable[[dict[Path, Mapping]], object]
+MappingKeeper = Callable[[dict[Path, Mapping]], object]
 """What keeps for the next time what was said of logs."""
 
 
@@ -115,7 +115,7 @@ def identify(
     period: str | float | None = None,
     laws: bool = False,
     folder: Path = Path(),
-    keep: Keeper = lambda _: None,
+    keep: MappingKeeper = lambda _: None,
     progress: Progress = silent,
 ) -> IdentifyAnswer:
     """A stage with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.

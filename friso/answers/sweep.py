@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from friso.views.drawing.figure import Figure
     from friso.views.files import Content, Files
 
-Keeper = Callable[[Mapping[Path, "Content"]], object]
+FileKeeper = Callable[[Mapping[Path, "Content"]], object]
 """What is done with files by their paths."""
 
 LARGE = 10_000_000
@@ -140,7 +140,7 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     yes: bool = False,
-    keep: Keeper = write,
+    keep: FileKeeper = write,
     progress: Progress = silent,
 ) -> SweepAnswer:
     """Run every combination of the values of some keys: what `friso map` does.

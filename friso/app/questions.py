@@ -33,7 +33,7 @@ AnswerPart = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Asked:
+class PageRequest:
     """What a page asks about: the machine shown, the one that is `pinned` beside it or None, the options, and whether
     figures are for a `narrow` page; and the files that were dropped on it."""
 
@@ -44,7 +44,7 @@ class Asked:
     uploads: Uploads
 
     @classmethod
-    def of(cls, data: Mapping[str, Any], uploads: Uploads) -> Asked:
+    def of(cls, data: Mapping[str, Any], uploads: Uploads) -> PageRequest:
         """What a request holds. Raises InputError."""
         options = data.get("options") or {}
         if not isinstance(options, Mapping):
@@ -62,7 +62,7 @@ class Asked:
 
 
 def parts_of(
-    asked: Asked, answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any
+    asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any
 ) -> AnswerPart:
     """An answer as a page shows it, each figure with what is shown `beside`."""
     with speaking_of(answer.axis_kind):
@@ -78,13 +78,13 @@ def parts_of(
         }
 
 
-def machine(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The keys of the machine."""
     asked.chosen()
     yield {"kind": "answer", **machines.machine_on_page(asked.machine)}
 
 
-def run(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What the run does."""
     asked.chosen()
     pinned = None if asked.pinned is None else _run(asked.pinned)
@@ -92,7 +92,7 @@ def run(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, friso.simulate(asked.machine.stage), ghosts_of(pinned), **_lines("simulate", asked))
 
 
-def verdict(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The verdict by the cycles that attract, in a word for each case: a map of a single cell, or one over the joint
     locked and free."""
     stage = asked.machine.stage
@@ -102,7 +102,7 @@ def verdict(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)]}
 
 
-def check(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Does it hunt: every case, with its margin."""
     options = asked.chosen("draws")
     pinned = None if asked.pinned is None else _check(asked.pinned)
@@ -113,7 +113,7 @@ def check(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, answer, ghosts_of(pinned), **more)
 
 
-def bode(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The loop in the limit cases."""
     asked.chosen()
     pinned = None if asked.pinned is None else friso.bode(asked.pinned.stage)
@@ -122,7 +122,7 @@ def bode(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, answer, ghosts_of(pinned), **_lines("bode", asked))
 
 
-def flexure(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The leaf springs."""
     asked.chosen()
     pinned = asked.pinned and asked.pinned.stage
@@ -137,7 +137,7 @@ COARSE_TO_FINE = (6, 21, 41)
 """Points along each axis of a map, one picture after the other."""
 
 
-def map_study(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """A map over two keys, coarse to fine; where the machine stands in it, and the pinned one."""
     options = asked.chosen("x", "y", "metric")
     axes = {name: options.get(name, "") for name in ("x", "y")}
@@ -154,14 +154,14 @@ def map_study(asked: Asked, work: Work) -> Iterator[AnswerPart]:
         yield part if count == COARSE_TO_FINE[-1] else {**part, "kind": "partly"}
 
 
-def boundary(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Where hunting ends, over one key or in the plane of two."""
     options = asked.chosen("x", "y")
     answer = friso.boundary(asked.machine.stage, **options, progress=work.progress)
     yield parts_of(asked, answer, **_lines("boundary", asked, options))
 
 
-def tune(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: the ways, and the stage of each that works."""
     options = asked.chosen("within", "settle", "force_limit", "bandwidth_limit", "only", "keep")
     answer = friso.tune(asked.machine.stage, **options, progress=work.progress)
@@ -169,7 +169,7 @@ def tune(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, answer, ways=ways, **_lines("tune", asked, options))
 
 
-def design(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: an isolator with its leaf springs."""
     asked.chosen()
     answer = friso.design(asked.machine.stage, progress=work.progress)
@@ -177,7 +177,7 @@ def design(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, answer, ways=ways, **_lines("design", asked))
 
 
-def logs(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What dropped files hold, and which channels there are to choose from."""
     files, assigned = _dropped(asked)
     answer = friso.logs(files, **assigned, progress=work.progress)
@@ -185,7 +185,7 @@ def logs(asked: Asked, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, answer, channels=channels, roles=[*MAPPABLE])
 
 
-def identify(asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The machine that dropped logs show, with its uncertainties; with `assumed`, the one shown is what is known."""
     files, assigned = _dropped(asked)
     stage = asked.machine.stage if asked.options.get("assumed") is True else None
@@ -203,7 +203,7 @@ CORRELATED = (
 )
 
 
-def _dropped(asked: Asked) -> tuple[list[Path], dict[str, Any]]:
+def _dropped(asked: PageRequest) -> tuple[list[Path], dict[str, Any]]:
     """The files of a question about logs, and what is said of their channels. Raises InputError."""
     names, options = asked.options.get("files"), {}
     if not isinstance(names, list) or not names:
@@ -218,7 +218,7 @@ def _dropped(asked: Asked) -> tuple[list[Path], dict[str, Any]]:
     return [asked.uploads.path(name) for name in names], options
 
 
-QUESTIONS: Mapping[str, Callable[[Asked, Work], Iterator[AnswerPart]]] = {
+QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "machine": machine,
     "run": run,
     "verdict": verdict,
@@ -247,7 +247,7 @@ REPORTS: Mapping[str, Callable[..., Answer]] = {
 """The answers whose files are handed out: all that the command writes, and its document, in one archive."""
 
 
-def report(function: Callable[..., Answer], asked: Asked, work: Work) -> Iterator[AnswerPart]:
+def report(function: Callable[..., Answer], asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The files of an answer."""
     options = asked.chosen("x", "y", "metric")
     if function is friso.sweep:
@@ -259,7 +259,9 @@ def report(function: Callable[..., Answer], asked: Asked, work: Work) -> Iterato
     yield {"kind": "files", "name": f"{stem}_{answer.command}.zip", "base64": base64.b64encode(held).decode("ascii")}
 
 
-def _lines(command: str, asked: Asked, options: Mapping[str, Any] | None = None, function: str = "") -> AnswerPart:
+def _lines(
+    command: str, asked: PageRequest, options: Mapping[str, Any] | None = None, function: str = ""
+) -> AnswerPart:
     chosen = options or {}
     line = python_line(function or command, asked.machine, chosen)
     of = "the stage file saved here" if asked.machine.is_of_page else f"{asked.machine.name} as it was opened"

@@ -16,7 +16,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import QUESTIONS, QUICK, REPORTS, Asked, report
+from friso.app.questions import QUESTIONS, QUICK, REPORTS, PageRequest, report
 from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
@@ -41,7 +41,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
             return _refused(f"there is no question {name[:40]!r}", 404)
         try:
             data = await _json(request)
-            asked = Asked.of(data, uploads)
+            asked = PageRequest.of(data, uploads)
         except InputError as error:
             return _refused(str(error), 422)
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]

@@ -9,7 +9,7 @@ import typer
 
 AXIS = 'KEY="FIRST..LAST:POINTS"'
 
-Source = Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to resume.")]
+SourceArgument = Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to resume.")]
 X = Annotated[str | None, typer.Option("--x", metavar=AXIS, help='Horizontal axis; also a list: KEY="4 Hz, 8 Hz".')]
 Y = Annotated[str | None, typer.Option("--y", metavar=AXIS, help="Vertical axis.")]
 Axes = Annotated[list[str] | None, typer.Option("--axis", metavar=AXIS, help="A further axis; may be repeated.")]
@@ -17,7 +17,7 @@ Links = Annotated[
     list[str] | None,
     typer.Option("--link", metavar="KEY=EXPRESSION", help='A key tied to others: masses.cart="0.7 * mass".'),
 ]
-Samples = Annotated[
+SamplesOption = Annotated[
     int | None,
     typer.Option(
         "--samples", metavar="NUMBER", help="Number of Sobol points over the ranges FIRST..LAST, instead of a grid."
@@ -59,4 +59,4 @@ ReplaceStore = Annotated[
     typer.Option("--overwrite", help="Replace the store of another study, and figures and exports of the same name."),
 ]
 CheckStore = Annotated[bool, typer.Option("--check", help="Run nothing; report whether a STORE is intact.")]
-Confirmed = Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")]
+ConfirmedOption = Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")]

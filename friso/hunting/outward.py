@@ -14,7 +14,7 @@ from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
-from friso.hunting.boundary.locate import TIGHTER, Kind, changes, last_inside
+from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import families, hunting_cycles
 from friso.hunting.cycle.held import held_beside
@@ -310,7 +310,7 @@ def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> float:
     return float(rough)
 
 
-def _kind(first: Point, second: Point) -> Kind:
+def _kind(first: Point, second: Point) -> Bifurcation:
     """How the orbit ceases to attract from one point to the next, beyond which it repels."""
     kinds = changes(first, second)
     return kinds[0] if kinds else "torus"

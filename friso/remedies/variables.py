@@ -12,7 +12,7 @@ from friso.equations.bandwidth import sped_up
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
 
-Change = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
+KeyChanges = Callable[[Mapping[str, Any], np.ndarray], dict[str, Any]]
 """From the flat keys so far and the values of a variable to the keys that change."""
 
 BANDWIDTH = "bandwidth"
@@ -47,7 +47,7 @@ class Variable:
     name: str
     low: float
     high: float
-    change: Change
+    change: KeyChanges
     present: float = float("nan")
 
     def at(self, share: np.ndarray) -> np.ndarray:

@@ -133,7 +133,8 @@ _KINDS: dict[str, ArgumentKind] = {
     "Sequence[float]": ArgumentKind(_are_numbers, "numbers"),
     "np.ndarray": ArgumentKind(_are_numbers, "numbers"),
     "Progress": _FUNCTION,
-    "Keeper": _FUNCTION,
+    "MappingKeeper": _FUNCTION,
+    "FileKeeper": _FUNCTION,
 }
 """The kinds of arguments, by the annotations of public functions."""
 

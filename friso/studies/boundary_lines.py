@@ -130,7 +130,7 @@ def end_verdicts(result: Diagram) -> tuple[str, str]:
     return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
 
 
-class Change(NamedTuple):
+class StabilityChange(NamedTuple):
     """A change from stages that something attracts to such that nothing does, or back: whether hunting `begins` there
     as the key rises, and the values [SI] between which it does; one value twice where a cycle that was followed ceases
     to attract there, or begins to."""
@@ -140,7 +140,7 @@ class Change(NamedTuple):
     high: float
 
 
-def stability_changes(result: Diagram) -> list[Change]:
+def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Where hunting begins and ends over the range, in order."""
     values = _values(result.space, result.places[:, None])[:, 0]
     decided = [(value, word) for value, word in zip(values.tolist(), place_verdicts(result), strict=True)]
@@ -151,7 +151,7 @@ def stability_changes(result: Diagram) -> list[Change]:
         if before != after:
             inside = [value for value, begins in turns if begins == after and low <= value <= high]
             at = (min(inside) if after else max(inside)) if inside else None
-            changes.append(Change(after, low if at is None else at, high if at is None else at))
+            changes.append(StabilityChange(after, low if at is None else at, high if at is None else at))
     return changes
 
 

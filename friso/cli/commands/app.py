@@ -9,7 +9,7 @@ import typer
 
 from friso.cli.command import HUNTS, Command
 
-Begin = Annotated[Path | None, typer.Argument(metavar="STAGE.toml", help="The stage file to begin with.")]
+BeginArgument = Annotated[Path | None, typer.Argument(metavar="STAGE.toml", help="The stage file to begin with.")]
 Host = Annotated[str, typer.Option("--host", metavar="NAME", help="Address to listen at; others need --insecure.")]
 Port = Annotated[
     int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="Port to listen at; default: 8741 or later.")
@@ -22,7 +22,7 @@ Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether t
 
 
 def app(
-    stage_file: Begin = None,
+    stage_file: BeginArgument = None,
     host: Host = "127.0.0.1",
     port: Port = None,
     insecure: Insecure = False,

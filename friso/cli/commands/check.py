@@ -11,7 +11,7 @@ from friso.cli.command import HUNTS, Command
 from friso.cli.common import AsJson, Overrides, StageFile, Tolerance
 from friso.cli.output import OutFolder, Overwrite
 
-Count = Annotated[
+DrawsOption = Annotated[
     int | None,
     typer.Option(
         "--draws",
@@ -19,7 +19,7 @@ Count = Annotated[
         help='Draw N stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt.',
     ),
 ]
-Seed = Annotated[
+SeedOption = Annotated[
     int, typer.Option("--seed", metavar="K", help="Seed of the draws: the same seed gives the same stages.")
 ]
 
@@ -33,8 +33,8 @@ def check(
     stage_file: StageFile,
     overrides: Overrides = None,
     rtol: Tolerance = "1e-9",
-    draws: Count = None,
-    seed: Seed = 0,
+    draws: DrawsOption = None,
+    seed: SeedOption = 0,
     laws: AcrossLaws = False,
     out: OutFolder = None,
     overwrite: Overwrite = False,

@@ -11,13 +11,13 @@ from friso.cli.command import STOPS, Command
 from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
 
-Machines = Annotated[
+MachinesOption = Annotated[
     int, typer.Option("--machines", metavar="N", help="Number of machines drawn around the stage, 20 or more.")
 ]
-Seed = Annotated[
+SeedOption = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
 ]
-Within = Annotated[
+WithinOption = Annotated[
     str | None,
     typer.Option("--within", metavar="LENGTH", help="Deviation that counts as in position; 1 um if not given."),
 ]
@@ -35,9 +35,9 @@ Also = Annotated[
 def compare(
     stage_file: StageFile,
     overrides: Overrides = None,
-    machines: Machines = 2000,
-    seed: Seed = 1,
-    within: Within = None,
+    machines: MachinesOption = 2000,
+    seed: SeedOption = 1,
+    within: WithinOption = None,
     also: Also = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,

@@ -12,7 +12,7 @@ from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
 
 Law = Annotated[str, typer.Option("--friction", metavar="LAW", help="The friction law to convert to.")]
-Elements = Annotated[
+ElementsOption = Annotated[
     int, typer.Option("--elements", metavar="N", help="Elements of a law that has several, side by side, 1 to 12.")
 ]
 
@@ -20,7 +20,7 @@ Elements = Annotated[
 def convert(
     stage_file: StageFile,
     law: Law,
-    elements: Elements = 6,
+    elements: ElementsOption = 6,
     overrides: Overrides = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,

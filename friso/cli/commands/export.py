@@ -12,7 +12,7 @@ from friso.cli.common import AsJson, StageFile
 from friso.cli.output import OutFolder, Overwrite
 
 What = Annotated[str, typer.Argument(metavar="gains", help="The gains of the controller.")]
-Values = Annotated[
+ValuesOption = Annotated[
     list[str] | None,
     typer.Option(
         "--set", metavar="KEY=VALUE", help='Override a key, or say what no stage file does: travel_per_turn="10 mm".'
@@ -24,7 +24,7 @@ To = Annotated[str | None, typer.Option("--to", metavar="FORMAT", help="Also the
 def export(
     what: What,
     stage_file: StageFile,
-    values: Values = None,
+    values: ValuesOption = None,
     to: To = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,

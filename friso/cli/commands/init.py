@@ -12,7 +12,7 @@ from friso.cli.command import MACHINE, Command
 from friso.cli.common import Overrides
 from friso.cli.output import Overwrite
 
-Source = Annotated[
+SourceArgument = Annotated[
     Path | None,
     typer.Option(
         "--from",
@@ -20,7 +20,7 @@ Source = Annotated[
         help="Parameter file of a drive, such as a LinuxCNC INI; friso export --help lists them.",
     ),
 ]
-Axis = Annotated[
+AxisNameOption = Annotated[
     str | None, typer.Option("--axis", metavar="NAME", help="Which axis of that file, where it has several.")
 ]
 
@@ -33,8 +33,8 @@ def init(
         Path | None,
         typer.Option("--spec", metavar="STAGE.toml", help="Write a specification for friso design of this stage."),
     ] = None,
-    source: Source = None,
-    axis: Axis = None,
+    source: SourceArgument = None,
+    axis: AxisNameOption = None,
     overrides: Overrides = None,
     overwrite: Overwrite = False,
 ) -> None:

@@ -12,7 +12,7 @@ from friso.cli.common import AsJson, Overrides
 from friso.cli.map_options import (
     Axes,
     CheckStore,
-    Confirmed,
+    ConfirmedOption,
     Exports,
     Latin,
     Links,
@@ -21,9 +21,9 @@ from friso.cli.map_options import (
     Metric,
     Refine,
     ReplaceStore,
-    Samples,
+    SamplesOption,
     Scheduler,
-    Source,
+    SourceArgument,
     StoreFolder,
     Verify,
     Workers,
@@ -35,12 +35,12 @@ from friso.cli.progress import ProgressBar
 
 
 def map_cells(
-    source: Source,
+    source: SourceArgument,
     x: X = None,
     y: Y = None,
     axis: Axes = None,
     link: Links = None,
-    samples: Samples = None,
+    samples: SamplesOption = None,
     latin: Latin = False,
     log: Logarithmic = False,
     overrides: Overrides = None,
@@ -54,7 +54,7 @@ def map_cells(
     out: StoreFolder = None,
     overwrite: ReplaceStore = False,
     check: CheckStore = False,
-    yes: Confirmed = False,
+    yes: ConfirmedOption = False,
     as_json: AsJson = False,
 ) -> None:
     """Where does it hunt: two (or more) keys swept; a Zarr store, a figure, and a page whose cells can be clicked.

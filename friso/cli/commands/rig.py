@@ -11,17 +11,17 @@ from friso.cli.command import MACHINE, Choices, Command
 from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
 
-Experiment = Annotated[str, typer.Argument(metavar="EXPERIMENT", help="See the list below.")]
-Seed = Annotated[
+ExperimentArgument = Annotated[str, typer.Argument(metavar="EXPERIMENT", help="See the list below.")]
+SeedOption = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the noise; the rail has its own, rail.seed.")
 ]
 
 
 def rig(
-    experiment: Experiment,
+    experiment: ExperimentArgument,
     stage_file: StageFile,
     overrides: Overrides = None,
-    seed: Seed = 1,
+    seed: SeedOption = 1,
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,

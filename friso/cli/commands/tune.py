@@ -12,7 +12,7 @@ from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
 from friso.remedies import Changeable
 
-Within = Annotated[
+WithinOption = Annotated[
     str | None,
     typer.Option("--within", metavar="LENGTH", help="Deviation that counts as in position; 1 um if not given."),
 ]
@@ -20,7 +20,7 @@ Settle = Annotated[
     str | None,
     typer.Option("--settle", metavar="TIME", help="Time after the move in which 95 % of the machines are in position."),
 ]
-ForceLimit = Annotated[
+ForceLimitOption = Annotated[
     str | None, typer.Option("--force-limit", metavar="FORCE", help="Largest force of the actuator during the moves.")
 ]
 BandwidthLimit = Annotated[
@@ -29,9 +29,9 @@ BandwidthLimit = Annotated[
         "--bandwidth-limit", metavar="FREQUENCY", help="Bandwidth that modes not in the stage file allow at most."
     ),
 ]
-Only = Annotated[Changeable | None, typer.Option("--only", help="What alone may be changed.")]
-Keep = Annotated[Changeable | None, typer.Option("--keep", help="What may not be changed.")]
-Seed = Annotated[
+OnlyOption = Annotated[Changeable | None, typer.Option("--only", help="What alone may be changed.")]
+KeepOption = Annotated[Changeable | None, typer.Option("--keep", help="What may not be changed.")]
+SeedOption = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
 ]
 
@@ -39,13 +39,13 @@ Seed = Annotated[
 def tune(
     stage_file: StageFile,
     overrides: Overrides = None,
-    within: Within = None,
+    within: WithinOption = None,
     settle: Settle = None,
-    force_limit: ForceLimit = None,
+    force_limit: ForceLimitOption = None,
     bandwidth_limit: BandwidthLimit = None,
-    only: Only = None,
-    keep: Keep = None,
-    seed: Seed = 1,
+    only: OnlyOption = None,
+    keep: KeepOption = None,
+    seed: SeedOption = 1,
     out: OutFolder = None,
     overwrite: Overwrite = False,
     as_json: AsJson = False,

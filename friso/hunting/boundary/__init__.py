@@ -3,17 +3,17 @@
 from friso.hunting.boundary.branch import END_OF_RANGE, Branch, Point
 from friso.hunting.boundary.curve import Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
-from friso.hunting.boundary.locate import Kind, LocatedPoint
+from friso.hunting.boundary.locate import Bifurcation, LocatedPoint
 from friso.hunting.boundary.plane import Plane, plane
 from friso.hunting.boundary.space import KeyRange, Space
 
 __all__ = [
     "END_OF_RANGE",
+    "Bifurcation",
     "Branch",
     "Curve",
     "Diagram",
     "KeyRange",
-    "Kind",
     "LocatedPoint",
     "Plane",
     "Point",

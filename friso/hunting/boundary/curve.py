@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
-from friso.hunting.boundary.locate import Kind, LocatedPoint, corrected
+from friso.hunting.boundary.locate import Bifurcation, LocatedPoint, corrected
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
 
@@ -59,7 +59,7 @@ class Curve:
     """Spots in order along the curve, of cycles of half a period (sign -1) or a whole one, and how it ends on either
     side ("closed" twice if it is)."""
 
-    kind: Kind
+    kind: Bifurcation
     sign: float
     spots: tuple[Spot, ...]
     ends: tuple[str, str]
@@ -73,9 +73,9 @@ class Curve:
 class CurveTracer:
     """Follows the points of one kind through the box of two keys."""
 
-    def __init__(self, space: Space, kind: Kind, sign: float, rtol: float = RTOL) -> None:
+    def __init__(self, space: Space, kind: Bifurcation, sign: float, rtol: float = RTOL) -> None:
         self.space, self.sign, self.rtol = space, sign, rtol
-        self.kind: Kind = kind
+        self.kind: Bifurcation = kind
 
     def on_line(
         self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, size: np.ndarray | None = None

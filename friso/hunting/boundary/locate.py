@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 
-Kind = Literal["flip", "fold", "torus"]
+Bifurcation = Literal["flip", "fold", "torus"]
 
 PRECISE, TRIES = 1e-7, 30
 """Step along the branch that ends a search, and steps at most."""
@@ -28,24 +28,24 @@ class LocatedPoint:
     """A point at which a branch stops attracting (or begins to), with the direction of the branch there, and by how
     much its place may be off: what the search has left, and the change at a hundredth of the tolerance."""
 
-    kind: Kind
+    kind: Bifurcation
     point: Point
     direction: np.ndarray
     error: float
 
 
-def distance_to(kind: Kind, point: Point) -> float:
+def distance_to(kind: Bifurcation, point: Point) -> float:
     """How far the multiplier is from where the kind of point has it; it changes sign there."""
     if kind == "torus":
         return abs(point.multiplier) - 1
     return point.multiplier + (1 if kind == "flip" else -1)
 
 
-def changes(first: Point, second: Point) -> tuple[Kind, ...]:
+def changes(first: Point, second: Point) -> tuple[Bifurcation, ...]:
     """What happens to the multiplier between two neighbours on a branch."""
     if _complex(first) or _complex(second):
         return ("torus",) if (abs(first.multiplier) - 1) * (abs(second.multiplier) - 1) < 0 else ()
-    kinds: tuple[Kind, ...] = ("flip", "fold")
+    kinds: tuple[Bifurcation, ...] = ("flip", "fold")
     return tuple(kind for kind in kinds if distance_to(kind, first) * distance_to(kind, second) < 0)
 
 
@@ -55,7 +55,7 @@ def _complex(point: Point) -> bool:
     return bool(abs(leading.imag) > 1e-3 and np.isclose(abs(leading), point.multiplier))
 
 
-def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedPoint | None:
+def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
     """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
     direction = _towards(first, second)
     points = _enclosed(tracer, first, second, kind, PRECISE)
@@ -65,7 +65,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedP
     return _special_point(tracer, kind, points[nearest], direction, _slope(kind, points))
 
 
-def last_inside(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> Point | None:
+def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float) -> Point | None:
     """Of the points between two neighbours on a branch that still attract, the one nearest to where it happens, to so
     much along the branch; None if one of them cannot be reached."""
     points = _enclosed(tracer, first, second, kind, precise)
@@ -79,7 +79,9 @@ def _towards(first: Point, second: Point) -> np.ndarray:
     return direction / np.linalg.norm(direction)
 
 
-def _enclosed(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> dict[float, Point] | None:
+def _enclosed(
+    tracer: Tracer, first: Point, second: Point, kind: Bifurcation, precise: float
+) -> dict[float, Point] | None:
     """The points between two neighbours that the search for where it happens has met, by their places along the branch;
     None if one of them cannot be reached."""
     direction, length = _towards(first, second), float(np.linalg.norm(second.vector - first.vector))
@@ -106,13 +108,15 @@ class Unreached(Exception):
     """No cycle is found where one is looked for."""
 
 
-def _slope(kind: Kind, points: dict[float, Point]) -> float:
+def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
     """Change of the distance along the branch, from the two points nearest to where it is zero."""
     (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
 
-def _special_point(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
+def _special_point(
+    tracer: Tracer, kind: Bifurcation, point: Point, direction: np.ndarray, slope: float
+) -> LocatedPoint:
     """The point with its error; infinite where it cannot be computed at the tighter tolerance."""
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
@@ -122,7 +126,7 @@ def _special_point(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarr
 
 
 def corrected(
-    tracer: Tracer, near: Point, origin: np.ndarray, direction: np.ndarray, kind: Kind, reach: float
+    tracer: Tracer, near: Point, origin: np.ndarray, direction: np.ndarray, kind: Bifurcation, reach: float
 ) -> LocatedPoint | None:
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
     time), not farther from it than `reach`, from a cycle near it; None if there is none."""

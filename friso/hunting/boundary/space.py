@@ -17,7 +17,7 @@ from friso.stage import Stage, violations
 GENERIC = 0.4721359549995794
 """A place at which no key has a special value (it is irrational)."""
 
-Flat = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
+FlatAt = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 """Flat keys of stages (SI) from arrays of values by name."""
 
 
@@ -49,7 +49,7 @@ class Space:
     """Stages with one key varied, or several, over their ranges."""
 
     ranges: tuple[KeyRange, ...]
-    flat: Flat
+    flat: FlatAt
 
     @classmethod
     def of(cls, stage: Stage, ranges: Sequence[KeyRange]) -> Space:

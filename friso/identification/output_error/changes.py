@@ -26,7 +26,7 @@ WORTH_TELLING = 0.1
 
 
 @dataclass(frozen=True)
-class Changes:
+class RecordDrift:
     """How far the fitted numbers would move, shape (free,), if constant force and friction were free to change along
     the record; the change of either over it [N], and how far it comes from its mean over the record, its reach [N]."""
 
@@ -49,7 +49,7 @@ class Changes:
         ]
 
 
-def drift_of_friction(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | None:
+def drift_of_friction(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift | None:
     """What changes during a record, of the smooth `velocity` [m/s], shape (n,); None where nothing clearly does.
 
     Constant force and friction may follow a line each over either half of the record. They are fitted together with
@@ -69,7 +69,7 @@ def drift_of_friction(fit: OutputErrorFit, velocity: np.ndarray) -> Changes | No
     return _fitted(slopes, rest, effects, bends, problem.counted)
 
 
-def changes_beside(inverse: InverseModel) -> Changes | None:
+def changes_beside(inverse: InverseModel) -> RecordDrift | None:
     """The same for an inverse model of one friction for both directions."""
     share = (inverse.time - inverse.time[0]) / np.ptp(inverse.time)
     counted = np.ones(len(share))
@@ -81,7 +81,7 @@ def changes_beside(inverse: InverseModel) -> Changes | None:
 
 def _fitted(
     slopes: np.ndarray, rest: np.ndarray, effects: list[np.ndarray], bends: list[np.ndarray], counted: np.ndarray
-) -> Changes | None:
+) -> RecordDrift | None:
     """Least squares of a residual, shape (n,), on its derivatives to fitted numbers, shape (n, numbers), and to changes
     of friction and of constant force by the same `bends`, each of shape (n,)."""
     every = np.column_stack([slopes, *effects])
@@ -96,10 +96,10 @@ def _fitted(
     moved, levels = np.split(solution, [slopes.shape[1]])
     friction, constant = (part @ np.stack(bends) for part in np.split(levels, 2))
     reaches = (float(np.abs(line).max()) for line in (friction, constant))
-    return Changes(moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
+    return RecordDrift(moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
 
 
-def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
+def reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
     """The fit with deviations that reach as far as what changes would move it, and over the change itself."""
     free = [fit.problem.parameters[i] for i in fit.free]
     further = np.abs(changes.moved)
@@ -114,7 +114,7 @@ def reaching(fit: OutputErrorFit, changes: Changes) -> OutputErrorFit:
     return replace(fit, covariance=fit.covariance * np.outer(wider, wider))
 
 
-def inverse_reaching(inverse: InverseModel, changes: Changes) -> InverseModel:
+def inverse_reaching(inverse: InverseModel, changes: RecordDrift) -> InverseModel:
     """The inverse model with intervals that reach as far."""
     over = {"coulomb": changes.friction_reach, "offset": changes.constant_reach}
     answers = []

@@ -43,7 +43,7 @@ LATEST = 0.5
 
 
 @dataclass(frozen=True)
-class Result:
+class OptionResult:
     """An option with the measures of each machine's run, those of longer runs of the first machines (`later`), and the
     linear loop of each."""
 
@@ -134,7 +134,7 @@ class Comparison:
 
     machines: Machines
     options: CompareOptions
-    results: tuple[Result, ...]
+    results: tuple[OptionResult, ...]
     within: float
     seed: int
     notes: tuple[str, ...]
@@ -148,7 +148,7 @@ class Comparison:
         """Whether a floor shakes the machines: without, their standstill shows whether they rest, and not how still."""
         return self.stage.floor is not None
 
-    def paired(self, result: Result) -> Paired:
+    def paired(self, result: OptionResult) -> Paired:
         """An option against a, on the machines whose runs were completed with both."""
         runs, base = result.measures, self.results[0].measures
         both = runs.done & base.done
@@ -188,11 +188,11 @@ def compare(
     progress(0, 1, "how fast the controller may be")
     tried = options(machines, within, settings)
     work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(tried.options))
-    results: list[Result] = []
+    results: list[OptionResult] = []
     for option in tried.options:
         measures, later = work.runs(option, len(results)), work.longer(option)
         loops = {result.letter: result.loops for result in results}
-        results.append(Result(option, measures, later, loops.get(option.loop) or _loops(machines, option)))
+        results.append(OptionResult(option, measures, later, loops.get(option.loop) or _loops(machines, option)))
     left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in tried.left_out.items()]
     notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
     return Comparison(machines, tried, tuple(results), within, seed, notes)
@@ -268,7 +268,7 @@ def _missing(stage: Stage) -> list[str]:
     return notes
 
 
-def _troubles(results: list[Result], count: int) -> list[str]:
+def _troubles(results: list[OptionResult], count: int) -> list[str]:
     """Unstable loops and runs that failed, option by option."""
     failed = "the intervals of probabilities allow for either outcome of these, medians leave them out"
     notes = []

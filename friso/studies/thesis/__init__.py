@@ -3,19 +3,19 @@
 from friso.studies.thesis.claims import CONVENTIONS, Claim, Evidence, Finding, Part, Response, claims, judges
 from friso.studies.thesis.reproduce import Reproduction, reproduce
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
-from friso.studies.thesis.verdicts import Verdict
+from friso.studies.thesis.verdicts import ClaimVerdict
 
 __all__ = [
     "CONVENTIONS",
     "STUDIES",
     "Claim",
+    "ClaimVerdict",
     "Evidence",
     "Finding",
     "Part",
     "Reproduction",
     "Response",
     "ThesisStudy",
-    "Verdict",
     "claims",
     "judges",
     "reproduce",

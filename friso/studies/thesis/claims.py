@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from friso.studies.thesis.experiments import Experiments
     from friso.studies.thesis.linear import Linear
 
-Judgement = Literal["holds", "holds in part", "differs", "not yet covered"]
+ClaimJudgement = Literal["holds", "holds in part", "differs", "not yet covered"]
 
 ABOUT = 1.5
 """Factor within which a number is "about" another."""
@@ -123,7 +123,7 @@ class Finding:
         return tuple(part.holds for part in self.judged)
 
     @property
-    def judgement(self) -> Judgement:
+    def judgement(self) -> ClaimJudgement:
         """ "holds" if all of these are met, "differs" if none is, else "holds in part"."""
         met = sum(self.pattern)
         return "holds" if met == len(self.pattern) else "holds in part" if met else "differs"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from friso.hunting.boundary import KeyRange, Kind, Space, plane
+from friso.hunting.boundary import Bifurcation, KeyRange, Space, plane
 from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
 from friso.studies.thesis.kept import NOT_KEPT, Kept
@@ -34,7 +34,7 @@ class Edge:
     """A curve on which a cycle stops attracting: its kind, whether it is of the symmetric cycle, and its points [SI]
     along the two axes of the map, shape (points,) each."""
 
-    kind: Kind
+    kind: Bifurcation
     symmetric: bool
     x: np.ndarray
     y: np.ndarray
@@ -93,7 +93,9 @@ def _as_arrays(edges: tuple[Edge, ...]) -> dict[str, np.ndarray]:
 def _from_arrays(arrays: Mapping[str, np.ndarray]) -> tuple[Edge, ...]:
     count = len(arrays) // 4
     whole = ({key: arrays[f"{n}.{key}"] for key in ("kind", "symmetric", "x", "y")} for n in range(count))
-    return tuple(Edge(cast("Kind", str(edge["kind"])), bool(edge["symmetric"]), edge["x"], edge["y"]) for edge in whole)
+    return tuple(
+        Edge(cast("Bifurcation", str(edge["kind"])), bool(edge["symmetric"]), edge["x"], edge["y"]) for edge in whole
+    )
 
 
 def survey(runs: xr.Dataset, kept: Kept = NOT_KEPT) -> Surveyed:

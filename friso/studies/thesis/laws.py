@@ -14,7 +14,7 @@ from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.studies.laws.conversion import ELEMENTS, LawConversion, MeasuredKind, compared, measure_friction
 from friso.studies.laws.verdicts import kept_laws
-from friso.studies.thesis.claims import Claim, Evidence, Finding, Judgement, Response, claims, registered
+from friso.studies.thesis.claims import Claim, ClaimJudgement, Evidence, Finding, Response, claims, registered
 from friso.studies.thesis.evidence import RESPONSES, maps_of, run_response
 from friso.studies.thesis.linear import analysed
 from friso.studies.thesis.reproduce import Reproduction
@@ -35,7 +35,7 @@ class ConclusionByLaw:
     claim: Claim
     findings: Mapping[str, Finding]
 
-    def judgement(self, law: str) -> Judgement:
+    def judgement(self, law: str) -> ClaimJudgement:
         """How it is judged under a law."""
         return self.findings[law].judgement
 

@@ -20,7 +20,7 @@ from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.linear import NEEDS, Linear
 from friso.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
-from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
+from friso.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 from friso.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ class Reproduction:
     experimented: frozenset[str]
     tolerances: Mapping[float, xr.Dataset]
     changed: tuple[float, float]
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[ClaimVerdict, ...]
     plausible: Plausible
     cycles: Mapping[str, CyclesOnMap]
     points: int
@@ -150,7 +150,7 @@ def _verdict(
     space: Plausible,
     others: Mapping[str, Mapping[str, Finding]],
     chosen: Mapping[str, ThesisStudy],
-) -> Verdict:
+) -> ClaimVerdict:
     if claim.id not in entries:
         entry = registered().get(claim.id)
         missing = sorted({need for need in entry.needs if need in STUDIES} - chosen.keys()) if entry else []

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from friso.quantities import percent
 from friso.shares import Share
-from friso.studies.thesis.claims import Claim, Finding, Judgement
+from friso.studies.thesis.claims import Claim, ClaimJudgement, Finding
 from friso.studies.thesis.plausible import ClaimInSpace
 from friso.studies.thesis.space import OPEN
 from friso.studies.thesis.ways import CYCLE, weakest
@@ -21,7 +21,7 @@ NO_WAYS: Mapping[str, Finding] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ClaimVerdict:
     """What stands beside a claim; `finding` is None for one that is not covered.
 
     `ways` are the findings by the way in which hunting is judged, of which the finding is the weakest; `space` the
@@ -31,7 +31,7 @@ class Verdict:
     """
 
     claim: Claim
-    judgement: Judgement
+    judgement: ClaimJudgement
     figure: str
     finding: Finding | None
     reason: str
@@ -110,9 +110,9 @@ def _listed(space: ClaimInSpace) -> str:
     return ", ".join(words)
 
 
-def not_covered(claim: Claim, reason: str) -> Verdict:
+def not_covered(claim: Claim, reason: str) -> ClaimVerdict:
     """A claim with no judge, or without what its judge needs."""
-    return Verdict(claim, "not yet covered", "", None, reason)
+    return ClaimVerdict(claim, "not yet covered", "", None, reason)
 
 
 def verdict(
@@ -123,7 +123,7 @@ def verdict(
     space: ClaimInSpace | None = None,
     others: Mapping[str, Finding] = NO_WAYS,
     undrawn: str = "",
-) -> Verdict:
+) -> ClaimVerdict:
     """The verdict from the findings of all `ways` and the one that they allow `together`; `others` are findings by
     another method, by its name, in the ways that need the runs alone, which are mentioned where other parts hold than
     in these ways here."""
@@ -137,7 +137,7 @@ def verdict(
     reason = "; ".join(reasons)
     if not reason and together.judgement != "holds":
         reason = "no reason was found"
-    return Verdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned, undrawn)
+    return ClaimVerdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned, undrawn)
 
 
 def _by_runs(ways: Mapping[str, Finding]) -> Finding | None:

@@ -27,10 +27,10 @@ from friso.views.drawing.figure import (
     LIGHT,
     VERMILLION,
     Axis,
+    Category,
     Cloud,
     Dash,
     Figure,
-    Kind,
     Limit,
     Markers,
     Panel,
@@ -48,10 +48,10 @@ COLOURS: dict[CycleShape, str] = {"symmetric": INK, "asymmetric": BLUE, "whole":
 SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "patch"}
 DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {
-    ATTRACTS: Kind("hunting is possible", VERMILLION),
-    REPELS: Kind("no hunting was found", QUIET),
-    UNKNOWN: Kind("unknown", "#ffffff"),
-    INVALID: Kind("invalid stage", LIGHT),
+    ATTRACTS: Category("hunting is possible", VERMILLION),
+    REPELS: Category("no hunting was found", QUIET),
+    UNKNOWN: Category("unknown", "#ffffff"),
+    INVALID: Category("invalid stage", LIGHT),
 }
 
 LOST = "a change, no curve begun"
@@ -136,7 +136,7 @@ def _plane(traced: Plane) -> Figure:
     across, up, verdicts = zip(*node_verdicts(traced), strict=True)
     codes = np.array([list(NODES).index(verdict) for verdict in verdicts], dtype=float)
     numbers = np.full(codes.shape, np.nan)
-    nodes = Cloud(np.array(across), np.array(up), numbers, "", "", kinds=tuple(NODES.values()), codes=codes)
+    nodes = Cloud(np.array(across), np.array(up), numbers, "", "", categories=tuple(NODES.values()), codes=codes)
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)

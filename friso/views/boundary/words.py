@@ -14,9 +14,9 @@ from friso.studies.boundary_lines import (
     INVALID,
     REPELS,
     UNKNOWN,
-    Change,
     CycleShape,
     Line,
+    StabilityChange,
     corner_verdicts,
     end_verdicts,
     followed_changes,
@@ -156,13 +156,13 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
     return " ".join([answer, *(also if others else [])])
 
 
-def _if_unstable(traced: Diagram, change: Change) -> str:
+def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
     """That a change lies where the loop is unstable anyway; "" where it is not."""
     beside = np.argmin(np.abs([traced.value(place) - change.low for place in traced.places]))
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
 
-def _between(change: Change, key: ShownKey) -> str:
+def _between(change: StabilityChange, key: ShownKey) -> str:
     if change.low == change.high:
         return f"at {key.key} = {key.text(change.low)}"
     return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"

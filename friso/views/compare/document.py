@@ -9,7 +9,7 @@ from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria.peak_count import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
-from friso.studies.compare.study import Comparison, Result
+from friso.studies.compare.study import Comparison, OptionResult
 from friso.views.compare.words import sentences
 from friso.views.documents import plain_json
 
@@ -43,7 +43,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
     )
 
 
-def _option(comparison: Comparison, result: Result) -> dict[str, Any]:
+def _option(comparison: Comparison, result: OptionResult) -> dict[str, Any]:
     pair = comparison.paired(result)
     crossover = bandwidth(result.option.stage.flat())
     return {

@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.equations.motion import last_corner
 from friso.shares import Share
-from friso.studies.compare.study import LONGER, Comparison, Result
+from friso.studies.compare.study import LONGER, Comparison, OptionResult
 from friso.views.compare.words import label
 from friso.views.drawing.figure import (
     BLUE,
@@ -135,7 +135,7 @@ def _standstill(comparison: Comparison) -> Panel:
     return Panel(title, _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))
 
 
-def _most(result: Result) -> tuple[float, float]:
+def _most(result: OptionResult) -> tuple[float, float]:
     finite = result.measures.in_position[np.isfinite(result.measures.in_position)]
     if not finite.size:
         return np.nan, np.nan

@@ -18,7 +18,7 @@ from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
-from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Result
+from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
 from friso.views.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval, with_unit
 
 COLUMNS = (
@@ -58,11 +58,11 @@ PROSE = {
 }
 
 
-def label(result: Result) -> str:
+def label(result: OptionResult) -> str:
     return f"{result.letter} {result.option.name}"
 
 
-def in_prose(result: Result) -> str:
+def in_prose(result: OptionResult) -> str:
     """An option within a sentence."""
     return f"{PROSE[result.letter]} ({result.letter})"
 
@@ -157,7 +157,7 @@ def _ratio(median: EstimatedValue) -> str:
     return f"{median.value:.3g} ({median.low:.3g} to {median.high:.3g})"
 
 
-def _margin(result: Result, comparison: Comparison) -> str:
+def _margin(result: OptionResult, comparison: Comparison) -> str:
     least = f"least {result.loops.margin.min():.2f}"
     if result.unstable:
         least = f"{result.unstable} of {comparison.machines.count} not stable"
@@ -210,11 +210,11 @@ def conclusion(comparison: Comparison) -> str:
     return f"{text[0].upper()}{text[1:]}. {_as_is(comparison)}".rstrip()
 
 
-def _number(result: Result, count: int) -> str:
+def _number(result: OptionResult, count: int) -> str:
     return f"all {count}" if result.in_position_count == count else f"{result.in_position_count} of {count}"
 
 
-def _cost(result: Result, comparison: Comparison) -> str:
+def _cost(result: OptionResult, comparison: Comparison) -> str:
     """What an option takes and leaves, against a."""
     if result.letter == "a":
         return ""
@@ -265,7 +265,7 @@ def _performance(comparison: Comparison) -> list[str]:
     return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []
 
 
-def _still(result: Result, comparison: Comparison) -> str:
+def _still(result: OptionResult, comparison: Comparison) -> str:
     return f", stands still to {with_unit(result.in_position.value, 'm')} RMS" if comparison.shaken else ""
 
 
@@ -293,11 +293,11 @@ def _standstill(comparison: Comparison) -> list[str]:
     return [f"Standstill is not compared: the stage file has no [floor].{joint if bought else ''}"]
 
 
-def _names(results: Sequence[Result]) -> str:
+def _names(results: Sequence[OptionResult]) -> str:
     return listed([in_prose(result) for result in results], "or")
 
 
-def _resting(comparison: Comparison) -> list[Result]:
+def _resting(comparison: Comparison) -> list[OptionResult]:
     return [result for result in comparison.results if result.rests]
 
 

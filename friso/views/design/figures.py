@@ -24,9 +24,9 @@ from friso.views.drawing.figure import (
     VERMILLION,
     Array,
     Axis,
+    Category,
     Dash,
     Figure,
-    Kind,
     Limit,
     Map,
     Markers,
@@ -47,7 +47,7 @@ WIDE, FEW = 30.0, 0.01
 SHARES = 401
 """Points of a distribution."""
 
-KINDS = (Kind("rests in all corners", QUIET), Kind("run failed", INK))
+CATEGORIES = (Category("rests in all corners", QUIET), Category("run failed", INK))
 
 
 def design_figures(design: Design) -> tuple[Figure, ...]:
@@ -103,7 +103,7 @@ def _map(design: Design) -> Figure:
     codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
     percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
     strokes, shade = 1e3 * hunting_map.strokes, ("Corners not in position", "%", (0.0, 100.0))
-    field = Map(hunting_map.crossovers, strokes, percents, *shade, kinds=KINDS, codes=codes)
+    field = Map(hunting_map.crossovers, strokes, percents, *shade, categories=CATEGORIES, codes=codes)
     right, up = _reach(hunting_map.crossovers), _reach(strokes)
     edge, limit = design.edges.highest, design.spec.limit
     lines: list[tuple[float, str, Dash]] = [

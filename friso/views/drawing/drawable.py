@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.escapes import escaped
-from friso.views.drawing.figure import Array, Axis, Coloured, Figure, Kind, Limit, Markers, Panel, Series
+from friso.views.drawing.figure import Array, Axis, Category, Coloured, Figure, Limit, Markers, Panel, Series
 from friso.views.drawing.prefixes import choose, pretty
 from friso.views.drawing.thinning import thin
 
@@ -52,18 +52,18 @@ def colour_prefix(field: Coloured) -> tuple[float, str]:
     return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
 
 
-def colour_key(figure: Figure) -> tuple[list[Kind], list[Markers]]:
-    """The kinds that occur, and the markers, of all panels with maps or clouds: each once, for one common legend."""
+def colour_key(figure: Figure) -> tuple[list[Category], list[Markers]]:
+    """The categories that occur, and the markers, of all panels with maps or clouds: each once, in one legend."""
     panels = [panel for panel in figure.panels if panel.coloured]
-    kinds = [
-        field.kinds[int(code)]
+    categories = [
+        field.categories[int(code)]
         for panel in panels
         for field in panel.coloured
         for code in np.unique(_finite(np.empty(0) if field.codes is None else field.codes.ravel()))
     ]
     markers = {(item.label, item.colour, item.symbol): item for panel in panels for item in panel.markers}
-    order = [kind for panel in panels for field in panel.coloured for kind in field.kinds]
-    return sorted(dict.fromkeys(kinds), key=order.index), list(markers.values())
+    order = [category for panel in panels for field in panel.coloured for category in field.categories]
+    return sorted(dict.fromkeys(categories), key=order.index), list(markers.values())
 
 
 def line_key(figure: Figure) -> list[Series]:

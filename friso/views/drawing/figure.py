@@ -114,7 +114,7 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Kind:
+class Category:
     """What has a word instead of a number (a verdict, or the reason why there is no number): one flat colour."""
 
     label: str
@@ -123,10 +123,10 @@ class Kind:
 
 @dataclass(frozen=True)
 class Coloured:
-    """Points x, y coloured by the number z [unit] or, where there is one, by their kind.
+    """Points x, y coloured by the number z [unit] or, where there is one, by their category.
 
     `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`; `colours`, if given,
-    are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, numbers the `kinds`; it is NaN
+    are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, numbers the `categories`; it is NaN
     where z counts.
     """
 
@@ -138,7 +138,7 @@ class Coloured:
     limits: tuple[float, float] | None = None
     log: bool = False
     colours: tuple[str, ...] = ()
-    kinds: tuple[Kind, ...] = ()
+    categories: tuple[Category, ...] = ()
     codes: Array | None = None
 
     def __post_init__(self) -> None:
@@ -161,7 +161,7 @@ class Coloured:
 
 @dataclass(frozen=True)
 class Map(Coloured):
-    """A field z of shape (len(y), len(x)) over cell centres x and y, ascending; NaN cells of no kind stay empty."""
+    """A field z of shape (len(y), len(x)) over cell centres x and y, ascending; NaN cells of no category stay empty."""
 
     def __post_init__(self) -> None:
         super().__post_init__()

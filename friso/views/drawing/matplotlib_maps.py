@@ -25,13 +25,13 @@ _VECTORS = 10_000  # more cells than these become a picture inside an SVG or PDF
 
 
 def draw_coloured(axes: Axes, panel: Panel) -> None:
-    """The maps and clouds of a panel: first what shows a number, then what shows a kind."""
+    """The maps and clouds of a panel: first what shows a number, then what shows a category."""
     for field in panel.coloured:
         colour_scale = scale(field)
         _add(axes, panel, field, painted(field), _colour_map(colour_scale), (colour_scale.low, colour_scale.high))
-        if field.codes is not None and field.kinds:
-            kinds = ListedColormap([kind.colour for kind in field.kinds])
-            _add(axes, panel, field, field.codes, kinds, (-0.5, len(field.kinds) - 0.5))
+        if field.codes is not None and field.categories:
+            categories = ListedColormap([category.colour for category in field.categories])
+            _add(axes, panel, field, field.codes, categories, (-0.5, len(field.categories) - 0.5))
     if panel.maps:
         axes.grid(visible=False)
 
@@ -95,9 +95,11 @@ def add_footer(
 ) -> None:
     """Legend of all maps and clouds, and under it the note, in the strip that `footer_height` asked for."""
     height = float(canvas.get_figheight())
-    kinds, markers = colour_key(figure)
+    categories, markers = colour_key(figure)
     lines = note_lines(figure, width)
-    handles = [Patch(facecolor=kind.colour, edgecolor=GREY, linewidth=0.6, label=kind.label) for kind in kinds]
+    handles = [
+        Patch(facecolor=category.colour, edgecolor=GREY, linewidth=0.6, label=category.label) for category in categories
+    ]
     handles += [
         Line2D([], [], linestyle="none", label=item.label, color=item.colour, **symbols[item.symbol])
         for item in markers

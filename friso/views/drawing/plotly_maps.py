@@ -41,14 +41,16 @@ def bar_panels(panels: Sequence[Panel]) -> tuple[set[int], bool]:
 
 
 def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | None) -> list[Any]:
-    """The maps and clouds of a panel: first what shows a number (with the colour bar `bar`), then the kinds."""
+    """The maps and clouds of a panel: first what shows a number (with the colour bar `bar`), then the categories."""
     traces: list[Any] = []
     for field in panel.coloured:
         colouring = _colouring(scale(field), bar if field.has_numbers else None, field.label)
         traces.append(_layer(panel, field, painted(field), colouring, place))
-        if field.codes is not None and field.kinds:
-            kinds = ColourScale(-0.5, len(field.kinds) - 0.5, tuple(kind.colour for kind in field.kinds), steps=True)
-            traces.append(_layer(panel, field, field.codes, _colouring(kinds, None, ""), place))
+        if field.codes is not None and field.categories:
+            categories = ColourScale(
+                -0.5, len(field.categories) - 0.5, tuple(category.colour for category in field.categories), steps=True
+            )
+            traces.append(_layer(panel, field, field.codes, _colouring(categories, None, ""), place))
     return traces
 
 
@@ -100,9 +102,9 @@ def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str
 
 def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
     """Traces without points that fill the common legend of all maps and clouds."""
-    kinds, markers = colour_key(figure)
+    categories, markers = colour_key(figure)
     square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
-    entries = [(kind.label, square | {"color": kind.colour}) for kind in kinds]
+    entries = [(category.label, square | {"color": category.colour}) for category in categories]
     entries += [(item.label, SYMBOLS[item.symbol] | {"color": item.colour}) for item in markers]
     styles = [(label, {"mode": "markers", "marker": marker}) for label, marker in entries]
     for line in line_key(figure):

@@ -21,21 +21,21 @@ from friso.views.drawing.figure import (
     VERMILLION,
     Array,
     Axis,
+    Category,
     Cloud,
     Figure,
-    Kind,
     Markers,
     Panel,
     Series,
 )
 
 ENDS = {
-    FLIP: Kind("the cycle flips", BLUE),
-    JUMP: Kind("another cycle takes its place", GREEN),
-    FOLD: Kind("it folds", ORANGE),
-    LOST: Kind("just beyond, no orbit can be closed", VERMILLION),
+    FLIP: Category("the cycle flips", BLUE),
+    JUMP: Category("another cycle takes its place", GREEN),
+    FOLD: Category("it folds", ORANGE),
+    LOST: Category("just beyond, no orbit can be closed", VERMILLION),
 }
-HALVES = (Kind("samples of the fit", LIGHT), Kind("samples held out", BLUE))
+HALVES = (Category("samples of the fit", LIGHT), Category("samples held out", BLUE))
 FULL = 1.0
 """Joint force at full stroke over static friction from which a stroke counts as ample in the chart of the joint."""
 
@@ -148,7 +148,7 @@ def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Pan
         _log("edge by the law", line),
         _log("edge computed", line),
         (Series(line, line, "equal", INK, width=1.0), *off),
-        clouds=(Cloud(x, y, np.full(len(x), np.nan), "samples", "", kinds=HALVES, codes=codes),),
+        clouds=(Cloud(x, y, np.full(len(x), np.nan), "samples", "", categories=HALVES, codes=codes),),
     )
 
 
@@ -198,7 +198,7 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
     words = list(ENDS)
     codes = np.array([float(words.index(kind)) for kind in sweep.edges.kind.astype(str)])
     present = tuple(ENDS.values())
-    return Cloud(x, y, np.full(len(x), np.nan), "samples", "", kinds=present, codes=codes)
+    return Cloud(x, y, np.full(len(x), np.nan), "samples", "", categories=present, codes=codes)
 
 
 def _both(fit: Fit, which: object) -> Sweep:

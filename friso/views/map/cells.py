@@ -12,13 +12,13 @@ import numpy as np
 
 from friso.studies.cells import CYCLE_UNITS
 from friso.views.drawing.colours import ramp
-from friso.views.drawing.figure import Array, Axis, Kind
+from friso.views.drawing.figure import Array, Axis, Category
 from friso.views.drawing.prefixes import choose
 from friso.views.map.words import (
+    CATEGORIES,
     FAILED,
     INFERRED,
     INVALID,
-    KINDS,
     NOT_RUN,
     QUIET,
     in_order,
@@ -26,7 +26,7 @@ from friso.views.map.words import (
     quantity,
     unit_of,
     variable,
-    word_kind,
+    word_category,
     words_of,
 )
 
@@ -85,9 +85,9 @@ class CellAxis:
 
 @dataclass(frozen=True)
 class Look:
-    """How a variable is coloured wherever it is shown: quantity and unit, range, scale, and its cells' kinds.
+    """How a variable is coloured wherever it is shown: quantity and unit, range, scale, and its cells' categories.
 
-    `numbers` and `codes` have the dimensions of the runs; codes count in `kinds` and are NaN where a number counts.
+    `numbers` and `codes` have the dimensions of the runs; codes count in `categories`, NaN where a number counts.
     """
 
     quantity: str
@@ -95,14 +95,14 @@ class Look:
     limits: tuple[float, float] | None
     log: bool
     colours: tuple[str, ...]
-    kinds: tuple[Kind, ...]
+    categories: tuple[Category, ...]
     numbers: xr.DataArray
     codes: xr.DataArray
 
     @property
-    def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Kind, ...]]:
+    def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Category, ...]]:
         """What a map or a cloud of these cells is coloured by."""
-        return self.quantity, self.unit, self.limits, self.log, self.colours, self.kinds
+        return self.quantity, self.unit, self.limits, self.log, self.colours, self.categories
 
 
 def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
@@ -178,26 +178,26 @@ def look(runs: xr.Dataset, metric: str) -> Look:
     """How `metric` is coloured: a numeric variable, "outcome" or "verdict". ValueError for others."""
     if metric not in metrics(runs):
         raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(metrics(runs))}")
-    if metric in KINDS:
+    if metric in CATEGORIES:
         codes, words = words_of(runs, metric)
         template = runs[metric]
         numbers = template.copy(data=np.full(template.shape, np.nan))
-        word_kinds = [word_kind(metric, word) for word in words]
-        kinds = in_order(word_kinds)
-        table = np.array([kinds.index(kind) for kind in word_kinds], dtype=float)
-        return Look(variable(metric), "", None, False, (), kinds, numbers, template.copy(data=table[codes]))
+        word_categories = [word_category(metric, word) for word in words]
+        categories = in_order(word_categories)
+        table = np.array([categories.index(category) for category in word_categories], dtype=float)
+        return Look(variable(metric), "", None, False, (), categories, numbers, template.copy(data=table[codes]))
     values = np.asarray(runs[metric].values, dtype=float)
-    kinds, codes = _without_number(runs, metric, values)
+    categories, codes = _without_number(runs, metric, values)
     numbers = np.where(np.isnan(codes), values, np.nan)
     limits, log, colours = _range(metric, numbers)
     arrays = (runs[metric].copy(data=numbers), runs[metric].copy(data=codes))
-    return Look(variable(metric), unit_of(runs[metric]), limits, log, colours, kinds, *arrays)
+    return Look(variable(metric), unit_of(runs[metric]), limits, log, colours, categories, *arrays)
 
 
 def metrics(runs: xr.Dataset) -> list[str]:
     """The variables that a map can show, the words last."""
     numeric = [str(name) for name, array in runs.data_vars.items() if array.dtype.kind in "iuf"]
-    return numeric + [name for name in KINDS if name in runs]
+    return numeric + [name for name in CATEGORIES if name in runs]
 
 
 def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
@@ -220,19 +220,19 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
     return (low, high), False, ()
 
 
-def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Kind, ...], np.ndarray]:
-    """The kinds of the cells that have no number to show, and their codes; NaN where a number counts."""
+def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Category, ...], np.ndarray]:
+    """The categories of the cells that have no number to show, and their codes; NaN where a number counts."""
     shape, dims = runs[metric].shape, runs[metric].dims
     outcome = _texts(runs, "outcome", dims)
     status = _texts(runs, "status", dims)
     pairs = [_state(word, reason) for word in outcome[1] for reason in status[1]]
     attractor = _texts(runs, "attractor", dims) if metric in CYCLE_UNITS else (np.zeros((), dtype=int), [None])
     none = [no_number(metric, word) for word in attractor[1]]
-    kinds = in_order(kind for kind in (*pairs, *none) if kind is not None)
-    table = np.array([np.nan if kind is None else kinds.index(kind) for kind in pairs], dtype=float)
+    categories = in_order(category for category in (*pairs, *none) if category is not None)
+    table = np.array([np.nan if category is None else categories.index(category) for category in pairs], dtype=float)
     codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape)
-    reasons = np.array([kinds.index(kind) for kind in none], dtype=float)[attractor[0]]
-    return kinds, np.where(np.isnan(codes) & ~np.isfinite(values), reasons, codes)
+    reasons = np.array([categories.index(category) for category in none], dtype=float)[attractor[0]]
+    return categories, np.where(np.isnan(codes) & ~np.isfinite(values), reasons, codes)
 
 
 def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.ndarray, Sequence[str | None]]:
@@ -242,11 +242,11 @@ def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.
     return words_of(runs.transpose(*dims), name)
 
 
-def _state(outcome: str | None, status: str | None) -> Kind | None:
+def _state(outcome: str | None, status: str | None) -> Category | None:
     """Why a cell has no numbers of its own; None where it was run to its end."""
     reason = status or ""
     if reason.startswith("inferred"):
-        return INFERRED.get(outcome or "") or Kind("inferred", "#eeeeee")
+        return INFERRED.get(outcome or "") or Category("inferred", "#eeeeee")
     if outcome == "" or reason.startswith("not run"):
         return NOT_RUN
     if outcome == "invalid" or reason.startswith("invalid"):

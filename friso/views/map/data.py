@@ -12,14 +12,14 @@ from friso.views.drawing.drawable import colour_prefix
 from friso.views.drawing.figure import Array, Cloud
 from friso.views.drawing.prefixes import choose
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
-from friso.views.map.words import KINDS, variable, words_of
+from friso.views.map.words import CATEGORIES, variable, words_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
 MOST = 250_000  # cells in a page: more would take a browser seconds to open and to colour
 
-NONE = 255  # in bytes of codes: no kind, the number counts
+NONE = 255  # in bytes of codes: no category, the number counts
 
 
 def page_data(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Any]:
@@ -85,7 +85,7 @@ def _axis(axis: CellAxis, positions: np.ndarray) -> dict[str, Any]:
 
 
 def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
-    """A variable that the page can colour: its numbers, its kinds, and its scale."""
+    """A variable that the page can colour: its numbers, its categories, and its scale."""
     colouring = look(runs, name)
     numbers = colouring.numbers.values.ravel().astype(float)
     none = np.zeros(numbers.size)
@@ -98,8 +98,8 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
         Cloud(none, none, numbers * factor, colouring.quantity, unit, limits, colouring.log, colouring.colours)
     )
     codes = cells.take(colouring.codes)
-    stored = colouring.numbers if name in KINDS else runs[name]
-    kinds = [{"label": kind.label, "colour": kind.colour} for kind in colouring.kinds]
+    stored = colouring.numbers if name in CATEGORIES else runs[name]
+    categories = [{"label": category.label, "colour": category.colour} for category in colouring.categories]
     return {
         "name": name,
         "label": colouring.quantity,
@@ -110,7 +110,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
         "stops": [[_shortened(place), colour] for place, colour in scaled.stops],
         "ticks": list(scaled.ticks),
         "texts": list(scaled.texts),
-        "kinds": kinds,
+        "kinds": categories,
         "codes": _base64(np.where(np.isnan(codes), NONE, codes).astype(np.uint8)),
         "numbers": _base64(_short(cells.take(stored).astype(float) * factor)),
     }

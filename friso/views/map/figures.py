@@ -139,7 +139,7 @@ def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
 def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
     """One variable over a single axis: a line with its points, and patches under it where there is no number."""
     numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
-    occurring = [i for i in range(len(colouring.kinds)) if np.any(codes == i)]
+    occurring = [i for i in range(len(colouring.categories)) if np.any(codes == i)]
     if not np.isfinite(numbers).any():
         return _rows(x, colouring, codes, occurring)
     low, high = float(np.nanmin(numbers)), float(np.nanmax(numbers))
@@ -149,7 +149,13 @@ def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> P
         where = x.positions[codes == i]
         below = low * (low / high) ** 0.06 if colouring.log else low - 0.08 * span
         markers.append(
-            Markers(where, np.full(len(where), below), colouring.kinds[i].label, colouring.kinds[i].colour, "patch")
+            Markers(
+                where,
+                np.full(len(where), below),
+                colouring.categories[i].label,
+                colouring.categories[i].colour,
+                "patch",
+            )
         )
     return Panel(
         "",
@@ -162,13 +168,13 @@ def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> P
 
 def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
     """Words over a single axis: a row of points for each word."""
-    names = tuple(colouring.kinds[i].label for i in occurring)
+    names = tuple(colouring.categories[i].label for i in occurring)
     markers = tuple(
         Markers(
             x.positions[codes == i],
             np.full(int(np.sum(codes == i)), float(row)),
             "",
-            colouring.kinds[i].colour,
+            colouring.categories[i].colour,
             "patch",
         )
         for row, i in enumerate(occurring)

@@ -17,8 +17,8 @@ from friso.views.loop_words import unstable_loop
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, dims_of
 from friso.views.map.words import (
     AT_ONCE,
+    CATEGORIES,
     INVALID,
-    KINDS,
     NOT_RUN,
     failures,
     grouped,
@@ -224,18 +224,18 @@ def _extent(runs: xr.Dataset) -> str:
     status = text_counts(runs, "status")
     inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
     words = word_counts(runs, "outcome")
-    idle = sum(words.get(kind.label, 0) for kind in (INVALID, NOT_RUN))
+    idle = sum(words.get(category.label, 0) for category in (INVALID, NOT_RUN))
     text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
     if inferred:
         text += f", {grouped(inferred)} cells inferred from their neighbours"
-    listing = "; ".join(filter(None, (tally(runs, name) for name in KINDS)))
+    listing = "; ".join(filter(None, (tally(runs, name) for name in CATEGORIES)))
     return f"{text}: {listing}." if listing else f"{text}."
 
 
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
     """All that is said on the terminal: first whether the loop is unstable, then what share of the map swings, and
     where."""
-    words = "; ".join(filter(None, (tally(runs, name) for name in KINDS)))
+    words = "; ".join(filter(None, (tally(runs, name) for name in CATEGORIES)))
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"

@@ -14,7 +14,7 @@ from friso.views.map.cells import SAMPLE, axes_of
 from friso.views.map.data import page_data, picked
 from friso.views.map.figures import map_figure
 from friso.views.map.findings import caveats, failures, headline, meanings, verification
-from friso.views.map.words import KINDS, grouped, tally, variable
+from friso.views.map.words import CATEGORIES, grouped, tally, variable
 from friso.views.pages import Report, print_image, script
 
 if TYPE_CHECKING:
@@ -69,10 +69,10 @@ def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
     facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
     facts.append(("Verification", verification(runs)))
-    for name in KINDS:
+    for name in CATEGORIES:
         facts += [(variable(name), words)] if (words := tally(runs, name)) else []
     facts += meanings(runs)
-    facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in KINDS else []
+    facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in CATEGORIES else []
     facts += [("Note", " ".join(notes))] if (notes := caveats(runs, metric)) else []
     links = json.loads(runs.attrs.get("links", "{}"))
     facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []

@@ -12,7 +12,7 @@ from friso.axis import axis_shown
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.stage.tables import friction_laws
 from friso.studies.cells import NOTHING, SWING, UNKNOWN
-from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
+from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Category
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -48,37 +48,37 @@ _VARIABLES = {
 }
 
 QUIET = "#d3e6f3"  # rest: a pale blue, far from every colour of swings and from white and grey
-INVALID = Kind("invalid", "#b4b4b4")
-FAILED = Kind("failed", INK)
-NOT_RUN = Kind("not run", "#ffffff")
+INVALID = Category("invalid", "#b4b4b4")
+FAILED = Category("failed", INK)
+NOT_RUN = Category("not run", "#ffffff")
 _NO_RESULT = {"failed": FAILED, "invalid": INVALID, "": NOT_RUN}
-KINDS = {
+CATEGORIES = {
     "outcome": {
-        "swings": Kind("swings", VERMILLION),
-        "creeps": Kind("creeps", ORANGE),
-        "rests": Kind("rests", QUIET),
+        "swings": Category("swings", VERMILLION),
+        "creeps": Category("creeps", ORANGE),
+        "rests": Category("rests", QUIET),
         **_NO_RESULT,
     },
     "verdict": {
-        "hunts": Kind("hunts", VERMILLION),
-        "bistable": Kind("bistable", PINK),
-        "transient": Kind("transient", ORANGE),
-        "settles": Kind("settles", QUIET),
+        "hunts": Category("hunts", VERMILLION),
+        "bistable": Category("bistable", PINK),
+        "transient": Category("transient", ORANGE),
+        "settles": Category("settles", QUIET),
         **_NO_RESULT,
     },
 }
 """By variable the words that a cell can have, the worst first, in the colours of every map."""
 # Cells without numbers of their own: paler than the word they are said to have, so that both can stand in a map.
 INFERRED = {
-    "swings": Kind("swings (inferred)", "#f3c39e"),
-    "creeps": Kind("creeps (inferred)", "#f7dfa8"),
-    "rests": Kind("rests (inferred)", "#e4efe0"),
+    "swings": Category("swings (inferred)", "#f3c39e"),
+    "creeps": Category("creeps (inferred)", "#f7dfa8"),
+    "rests": Category("rests (inferred)", "#e4efe0"),
 }
 _NO_NUMBER = "#e8dcc6"
 _OF_ATTRACTORS = {
-    NOTHING: Kind("nothing attracts", QUIET),
-    UNKNOWN: Kind("not certain what attracts", "#8c6d8f"),
-    SWING: Kind("attracts, but not closed as an orbit", PINK),
+    NOTHING: Category("nothing attracts", QUIET),
+    UNKNOWN: Category("not certain what attracts", "#8c6d8f"),
+    SWING: Category("attracts, but not closed as an orbit", PINK),
 }
 """Why a cell has no measure of what attracts its stage, by the word for that."""
 
@@ -107,19 +107,19 @@ def variable(name: Hashable) -> str:
     return axis_shown().text(_VARIABLES.get(str(name)) or quantity(name))
 
 
-def word_kind(name: str, word: str) -> Kind:
+def word_category(name: str, word: str) -> Category:
     """Label and colour of a word of the variable `name`; one that is not known here is grey, under its own name."""
-    return KINDS[name].get(word) or Kind(word, GREY)
+    return CATEGORIES[name].get(word) or Category(word, GREY)
 
 
-def no_number(name: str, attractor: str | None = None) -> Kind:
+def no_number(name: str, attractor: str | None = None) -> Category:
     """What it means that a run that was completed has no such number; `attractor`: the word for what attracts."""
     if name.startswith("settling_time"):
         band = variable(name).removeprefix("Settling time into ")
-        return Kind(f"does not stay within {band}", _NO_NUMBER)
+        return Category(f"does not stay within {band}", _NO_NUMBER)
     if attractor in _OF_ATTRACTORS:
         return _OF_ATTRACTORS[attractor]
-    return Kind("no period" if name == "period" else "no value", _NO_NUMBER)
+    return Category("no period" if name == "period" else "no value", _NO_NUMBER)
 
 
 def grouped(number: int) -> str:
@@ -127,11 +127,19 @@ def grouped(number: int) -> str:
     return f"{number:,}".replace(",", " ")
 
 
-def in_order(kinds: Iterable[Kind]) -> tuple[Kind, ...]:
-    """Each kind once, in the order of every legend: words, the worst first, then what has none."""
-    words = {kind: None for kinds in KINDS.values() for kind in kinds.values()}
-    order = [*(kind for kind in words if kind not in _NO_RESULT.values()), *_NO_RESULT.values(), *INFERRED.values()]
-    return tuple(sorted(dict.fromkeys(kinds), key=lambda kind: order.index(kind) if kind in order else len(order)))
+def in_order(categories: Iterable[Category]) -> tuple[Category, ...]:
+    """Each category once, in the order of every legend: words, the worst first, then what has none."""
+    words = {category: None for categories in CATEGORIES.values() for category in categories.values()}
+    order = [
+        *(category for category in words if category not in _NO_RESULT.values()),
+        *_NO_RESULT.values(),
+        *INFERRED.values(),
+    ]
+    return tuple(
+        sorted(
+            dict.fromkeys(categories), key=lambda category: order.index(category) if category in order else len(order)
+        )
+    )
 
 
 def unit_of(array: xr.DataArray) -> str:
@@ -173,8 +181,8 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """How many cells have each word of the variable `name`, in the order of the legend; none without that variable."""
-    cells = {word_kind(name, word): number for word, number in text_counts(runs, name).items()}
-    return {kind.label: cells[kind] for kind in in_order(cells)}
+    cells = {word_category(name, word): number for word, number in text_counts(runs, name).items()}
+    return {category.label: cells[category] for category in in_order(cells)}
 
 
 def tally(runs: xr.Dataset, name: str) -> str:

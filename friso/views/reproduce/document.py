@@ -16,8 +16,8 @@ from friso.views.reproduce.words import numbers
 
 if TYPE_CHECKING:
     from friso.shares import Share
-    from friso.studies.thesis import Reproduction, Verdict
-    from friso.studies.thesis.claims import Judgement, Part
+    from friso.studies.thesis import ClaimVerdict, Reproduction
+    from friso.studies.thesis.claims import ClaimJudgement, Part
     from friso.studies.thesis.laws import ConclusionsByLaw
     from friso.studies.thesis.plausible import ClaimInSpace, Plausible
     from friso.studies.thesis.space import OpenValue
@@ -34,7 +34,7 @@ def conclusion(reproduction: Reproduction) -> str:
     return f"Of {len(reproduction.verdicts)} claims of the thesis {listed(parts, 'and')}."
 
 
-_VERBS: tuple[tuple[Judgement, str, str], ...] = (
+_VERBS: tuple[tuple[ClaimJudgement, str, str], ...] = (
     ("holds", "holds", "hold"),
     ("holds in part", "holds in part", "hold in part"),
     ("differs", "does not hold", "do not hold"),
@@ -69,7 +69,7 @@ def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None
     return plain_json(document)
 
 
-def _entry(verdict: Verdict) -> dict[str, Any]:
+def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
     return {
         "id": verdict.claim.id,
         "where": verdict.claim.where,

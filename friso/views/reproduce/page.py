@@ -24,7 +24,7 @@ from friso.views.reproduce.questions import QUESTIONS, method_rows
 from friso.views.reproduce.summary import save_summary
 
 if TYPE_CHECKING:
-    from friso.studies.thesis import Reproduction, Verdict
+    from friso.studies.thesis import ClaimVerdict, Reproduction
     from friso.studies.thesis.laws import ConclusionsByLaw
 
 COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not yet covered": GREY}
@@ -38,7 +38,7 @@ class FigureSection:
     key: str
     title: str
     figure: Figure | None
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[ClaimVerdict, ...]
 
 
 def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> dict[str, Content]:
@@ -93,11 +93,11 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
     ).html()
 
 
-def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tuple[FigureSection, ...]:
+def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) -> tuple[FigureSection, ...]:
     """The items in the order of the verdicts, each figure where its first claim stands, those of no claim at the end;
     claims that are not covered stand in the table alone. A panel's claims, such as those of "11A", stand with the
     figure."""
-    groups: dict[str, list[Verdict]] = {}
+    groups: dict[str, list[ClaimVerdict]] = {}
     for verdict in verdicts:
         if verdict.finding:
             groups.setdefault(verdict.figure.rstrip("ABCD"), []).append(verdict)
@@ -113,7 +113,7 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tupl
     )
 
 
-def _titled(place: str, group: Iterable[Verdict]) -> str:
+def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
     """An item without a figure of its own, by where the thesis makes its claims."""
     return f"Figure {place}" if place.isdigit() else ", ".join(dict.fromkeys(item.claim.where for item in group))
 
@@ -126,7 +126,7 @@ def _printed(figure: Figure) -> str:
     return "data:image/png;base64," + base64.b64encode(pixels).decode("ascii")
 
 
-def _counts(verdicts: Iterable[Verdict]) -> dict[str, int]:
+def _counts(verdicts: Iterable[ClaimVerdict]) -> dict[str, int]:
     """How many claims got each judgement, those that occur."""
     parts = [verdict.judgement for verdict in verdicts]
     return {judgement: parts.count(judgement) for judgement in COLOURS if judgement in parts}

@@ -11,14 +11,14 @@ from friso.version import VERSION
 from friso.views.reproduce import words
 
 if TYPE_CHECKING:
-    from friso.studies.thesis import Verdict
+    from friso.studies.thesis import ClaimVerdict
 
 _A4 = 8.27, 11.69
 _COLUMNS = {"id": 0.05, "where": 0.11, "text": 0.23, "word": 0.70, "met": 0.80, "share": 0.86}
 _LETTERS, _LINES = 76, 2
 
 
-def save_summary(verdicts: Sequence[Verdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:
+def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:
     """Write the sheet: every claim with the word of agreement, criteria met, and the draws in which it holds. Raises
     OSError."""
     from matplotlib.backends.backend_pdf import FigureCanvasPdf

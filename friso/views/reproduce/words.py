@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from friso.quantities import percent
 from friso.studies.thesis.plausible import POINTS
 from friso.studies.thesis.space import OPEN
-from friso.studies.thesis.verdicts import Verdict
+from friso.studies.thesis.verdicts import ClaimVerdict
 
 if TYPE_CHECKING:
     from friso.studies.thesis.claims import Part
@@ -22,7 +22,7 @@ AGREEMENT = {"holds": "agrees", "holds in part": "in part", "differs": "contradi
 """The judgements as the word of agreement."""
 
 
-def in_order(verdicts: Iterable[Verdict]) -> list[Verdict]:
+def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
     """The verdicts in the order in which the thesis makes the claims."""
     return sorted(verdicts, key=lambda verdict: verdict.claim.place)
 
@@ -35,12 +35,12 @@ def short(text: str) -> str:
     return first if len(first) <= SHORT else first[:SHORT].rsplit(" ", 1)[0] + " …"
 
 
-def numbers(verdict: Verdict) -> str:
+def numbers(verdict: ClaimVerdict) -> str:
     """The numbers of all parts in one line; empty for a claim that is not covered."""
     return "; ".join(part.number for part in verdict.finding.judged) if verdict.finding else ""
 
 
-def met(verdict: Verdict) -> str:
+def met(verdict: ClaimVerdict) -> str:
     """How many criteria are met."""
     if verdict.finding is None:
         return ""
@@ -48,7 +48,7 @@ def met(verdict: Verdict) -> str:
     return f"{sum(pattern)} of {len(pattern)}"
 
 
-def share(verdict: Verdict) -> str:
+def share(verdict: ClaimVerdict) -> str:
     """In how many draws it holds, and the interval of the share."""
     if verdict.space is None:
         return ""
@@ -56,19 +56,19 @@ def share(verdict: Verdict) -> str:
     return f"{space.count} of {space.draws} ({percent(space.holds.low)} to {percent(space.holds.high)})"
 
 
-def ways(verdict: Verdict) -> list[tuple[str, str]]:
+def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     """The word of agreement by each way of judging, where there are several."""
     if len(verdict.ways) < 2:
         return []
     return [(way, AGREEMENT[finding.judgement]) for way, finding in verdict.ways.items()]
 
 
-def reason(verdict: Verdict) -> str:
+def reason(verdict: ClaimVerdict) -> str:
     """Why it does not hold, the first sentence; the rest is among the details."""
     return short(verdict.reason) if verdict.finding else verdict.reason
 
 
-def self_tests(verdicts: Iterable[Verdict]) -> list[tuple[str, Part]]:
+def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:
     """The parts by which friso only tests itself, with the claim they stand at."""
     return [
         (verdict.claim.id, part)
