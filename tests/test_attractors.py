@@ -18,8 +18,9 @@ from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.margin import margin, search_bandwidths
+from friso.hunting.motions import Motions
 from friso.hunting.outward import Beyond, Outward
-from friso.hunting.verdict import WORK, Motions, judge_many, judge_runs
+from friso.hunting.verdict import WORK, judge_many, judge_runs
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(

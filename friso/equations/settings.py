@@ -81,10 +81,6 @@ def _leaks(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     return {"integral_leak": _scaled(flat[stated] if stated else 1.0, LEAKS)}
 
 
-def _deadbands(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
-    return {"integral_deadband": _scaled(within, DEADBANDS), "integral_deadband_exit": _scaled(within, EXITS)}
-
-
 def _standstill(flat: FlatMachine, within: float) -> dict[str, tuple[float, float]]:
     return {"standstill_window": _scaled(within, WINDOWS), "standstill_factor": FACTORS}
 
@@ -127,7 +123,10 @@ SETTINGS: Mapping[str, Setting] = {
         "the integrator pauses from an error of {integral_deadband} on, until it is {integral_deadband_exit}",
         True,
         lambda _, within: {"integral_deadband": 0.5 * within, "integral_deadband_exit": 2 * within},
-        _deadbands,
+        lambda _, within: {
+            "integral_deadband": _scaled(within, DEADBANDS),
+            "integral_deadband_exit": _scaled(within, EXITS),
+        },
     ),
     "standstill": Setting(
         "k",

@@ -12,13 +12,10 @@ from typing import Any
 import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
-from friso.engine.arrays import Status
-from friso.engine.batch import RunOptions, run_chunks
-from friso.engine.kernel import kernel
-from friso.equations.motion import last_corner
+from friso.engine.batch import RunOptions
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
-from friso.hunting.attractors.rounds import RESOLVED, loose_from
+from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.basin import (
     MOVES,
     Kick,
@@ -28,19 +25,14 @@ from friso.hunting.basin import (
     moves_that_hunt,
     pushes_that_hunt,
 )
-from friso.hunting.criteria import BAND, COUNTED_ABOVE, Verdict, lasts, verdicts
+from friso.hunting.criteria import Verdict, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
-from friso.hunting.cycle.rest import wait
 from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
-from friso.hunting.measures import Measures, measure_runs, measuring_options
+from friso.hunting.measures import Measures, measuring_options
+from friso.hunting.motions import Motions, followed_motions, run_motions, some_of
 from friso.hunting.outward import AttractionEnd
-from friso.hunting.turning import HALF, WINDOW
 from friso.stage import Stage
-
-LONG, SWINGS = 1000.0, 120.0
-"""Time [s] for which a motion that has not settled at its end is followed at least, and how many of the longest waits:
-those at the least distance from which the stage breaks away."""
 
 MOVING = "the reference never stands still"
 """Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
@@ -71,9 +63,6 @@ UNFOLLOWED = (
 
 ROOM = 1 << 14
 """Room for turning points of a motion that is followed for long: one that needs more is run again."""
-
-STEADY = 0.01
-"""Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
 
 
 @dataclass(frozen=True)
@@ -115,28 +104,6 @@ class Judgement:
         return next(iter((*self.hunting.attracting, *self.hunting.cycles)), None)
 
 
-@dataclass(frozen=True)
-class Motions:
-    """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, the thesis's `peaks`,
-    peak to peak of the last quarter, `swing` [m], and the time from the last corner of the reference until they stay
-    within 10 um, `settling` [s] (NaN: not within the run)."""
-
-    completed: np.ndarray
-    peaks: np.ndarray
-    swing: np.ndarray
-    settling: np.ndarray
-
-    @classmethod
-    def of(cls, measures: Measures) -> Motions:
-        """The motions of runs that were measured."""
-        completed = np.equal(measures.status, Status.DONE)
-        return cls(completed, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
-
-    def take(self, numbers: np.ndarray) -> Motions:
-        """Those of the stages with these numbers."""
-        return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
-
-
 PARTS = ATTRACTION, STARTS, BANDWIDTHS = "what attracts the stage", "kicks and moves", "other bandwidths"
 """What is computed for a verdict, in this order; without a cycle that attracts the second is left out."""
 
@@ -168,7 +135,7 @@ def judge(
 
 def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: Hunting, work: float) -> Judgement:
     with allowance(REST * work) as spent:
-        rest = _rest(
+        rest = followed_motions(
             stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
         )
     if attraction.possible and attraction.certain and rest.unknown[0]:
@@ -313,7 +280,7 @@ def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     fail leave the verdict "failed".
     """
     survey = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
-    return judge_runs(flat, _motions(flat, count, measuring_options(rtol)), survey, rtol)
+    return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), survey, rtol)
 
 
 @np.errstate(all="ignore")
@@ -339,19 +306,21 @@ def judge_runs(
     attracted = np.flatnonzero(decided & attracts)
     if survey is not None and attracted.size:
         ends, completed, _ = ends_in(
-            _part(flat, attracted), attracted.size, survey.take(attracted).target, threads=threads, cancel=cancel
+            some_of(flat, attracted), attracted.size, survey.take(attracted).target, threads=threads, cancel=cancel
         )
         in_cycle[attracted], decided[attracted] = ends, completed
         restless = attracted[completed & ~ends & ~np.isfinite(motions.settling[attracted])]
         if restless.size:  # something may attract them that swings less than what was found
-            moved = _part(flat, restless), motions.take(restless)
+            moved = some_of(flat, restless), motions.take(restless)
             in_cycle[restless], decided[restless] = _swing_on(*moved, run_options)
     free = np.flatnonzero(decided & ~attracts)
     if free.size:
-        rest = _rest(_part(flat, free), motions.take(free), free.size, run_options, possible=survey is not None)
+        rest = followed_motions(
+            some_of(flat, free), motions.take(free), free.size, run_options, possible=survey is not None
+        )
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
         if survey is not None:
-            swinging = rest.restless & ~rest.steady & (rest.swing > _resting(_part(flat, free), free.size))
+            swinging = rest.restless & ~rest.steady & (rest.swing > _resting(some_of(flat, free), free.size))
             decided[free] = ~(rest.unknown | swinging)
     return verdicts(decided, attracts, in_cycle, rests)
 
@@ -360,81 +329,6 @@ def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions
     """Of motions that do not end in what was found to attract their stages, which swing on by less once they were
     followed for long, and of which that is decided: they do, or they have come to rest."""
     count = len(motions.completed)
-    rest = _rest(flat, motions, count, run_options, possible=True)
+    rest = followed_motions(flat, motions, count, run_options, possible=True)
     stands = np.isfinite(rest.followed) & (rest.swing <= _resting(flat, count))
     return rest.steady, rest.steady | np.isfinite(rest.after) | stands
-
-
-@dataclass(frozen=True)
-class _Rest:
-    """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
-    their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown);
-    whether they swing on `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
-    than their end, or not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
-
-    rests: np.ndarray
-    after: np.ndarray
-    steady: np.ndarray
-    followed: np.ndarray
-    swing: np.ndarray
-
-    @property
-    def unknown(self) -> np.ndarray:
-        """Which had to be followed for long, and were not to the end of that, shape (count,)."""
-        return ~self.rests & ~np.isfinite(self.followed)
-
-    @property
-    def restless(self) -> np.ndarray:
-        """Which have not settled either by the end of the longer run, shape (count,)."""
-        return ~self.rests & np.isfinite(self.followed) & ~np.isfinite(self.after)
-
-    def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
-        """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""
-        stages = Ensemble.held(flat, count, form=shared_structure(flat))
-        waits = SWINGS * wait(stages, loose_from(stages))
-        lasts_for = np.maximum(np.maximum(LONG, flat["motion.duration"]), waits)
-        long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
-        last = _motions(long, count, replace(run_options, window=WINDOW))
-        done = last.completed.copy()
-        if (swinging := np.flatnonzero(done & (last.swing > COUNTED_ABOVE))).size:
-            half = _motions(_part(long, swinging), swinging.size, replace(run_options, window=HALF))
-            done[swinging] = half.completed
-            swing = last.swing[swinging]
-            self.steady[which[swinging]] = half.completed & lasts(
-                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY)
-            )
-        self.followed[which] = np.where(done, lasts_for, np.nan)
-        self.after[which], self.swing[which] = np.where(done, last.settling, np.nan), last.swing
-
-
-def _rest(flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool) -> _Rest:
-    """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
-    its end is followed, as far as an allowance reaches."""
-    rests = np.isfinite(motions.settling)
-    steady, followed = np.zeros(count, bool), np.full(count, np.nan)
-    rest = _Rest(rests, motions.settling.copy(), steady, followed, motions.swing.copy())
-    if not possible:
-        idle = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
-        return replace(rest, rests=rests | idle)
-    if (moving := np.flatnonzero(~rests)).size:
-        late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)  # what may leave the band, at the end
-        try:
-            rest.follow(moving, _part(flat, moving), moving.size, late)
-        except Exhausted:
-            rest.steady[moving], rest.followed[moving] = False, np.nan
-    return rest
-
-
-def _motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
-    """The motions of stages of one structure, run and measured."""
-    columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
-    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
-        part = Motions.of(measure_runs(runs.part(flat), runs))
-        for column, values in zip(columns, (part.completed, part.peaks, part.swing, part.settling), strict=True):
-            column[runs.numbers] = values
-    return Motions(*columns)
-
-
-def _part(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
-    """Some entries of the arrays among the values."""
-    return {key: value[which] if np.ndim(value) else value for key, value in columns.items()}

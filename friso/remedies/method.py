@@ -113,7 +113,7 @@ def tune(
     a motion after which nothing has to settle."""
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _moves(stage)
-    ideal = _ideal(stage)
+    ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
     later = (PAIRS + 1) * (budget.generations + budget.refined + 4)  # pairs and the least change, about
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
@@ -285,11 +285,6 @@ def _moves(stage: Stage) -> None:
     if kind not in TRAVEL or not flat[TRAVEL[kind][0]] or corner >= duration:
         example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
         raise InputError("motion.kind", f'"{kind}"', "a move whose reference stands in the end", example)
-
-
-def _ideal(stage: Stage) -> Stage:
-    """The stage without what cycles leave out: rail, cable, floor, sampling and delay."""
-    return stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
 
 
 def _steps(remedy: Remedy, budget: Budget) -> int:

@@ -16,7 +16,8 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.measures import BANDS, Measures, measure_runs, measuring_options
-from friso.hunting.verdict import Motions, can_hunt, judge_runs
+from friso.hunting.motions import Motions
+from friso.hunting.verdict import can_hunt, judge_runs
 from friso.stage import Stage, violations
 from friso.studies.links import linked
 

@@ -50,7 +50,7 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
     yield from _packages()
     steps: tuple[tuple[str, Callable[[], str], str], ...] = (
         ("processor", _processor, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
-        ("cores", _cores, ""),
+        ("cores", lambda: f"{usable_cores()} of {os.cpu_count()} may be used", ""),
         ("kept code", lambda: _kept_code(full_paths), "name another folder in FRISO_CACHE_DIR"),
         ("compiling", _compiling, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
         ("running", _running, "empty the folder of kept code, then try again; if it stays, report it with this text"),
@@ -98,10 +98,6 @@ def _processor() -> str:
 
     chosen = processor()
     return f"{chosen.name}, {chosen.triple}: registers of {chosen.lanes} numbers ({64 * chosen.lanes} bits)"
-
-
-def _cores() -> str:
-    return f"{usable_cores()} of {os.cpu_count()} may be used"
 
 
 def _kept_code(full_paths: bool) -> str:

@@ -12,10 +12,10 @@ if TYPE_CHECKING:
 
 def unstable_loop(states: tuple[LoopState, ...]) -> list[str]:
     """In which of its states the loop of the stage as its file gives it is unstable; nothing where it is stable."""
-    if not states:
-        return []
+    return [f"The loop of the stage as its file gives it is {unstable_where(states)}."] if states else []
+
+
+def unstable_where(states: tuple[LoopState, ...]) -> str:
+    """In which of its states a loop is unstable, and what to do about it."""
     where = listed([f"while the stage {state}" for state in states], "and")
-    return [
-        f"The loop of the stage as its file gives it is unstable {where}, whatever the friction: retune the controller "
-        "(friso bode)."
-    ]
+    return f"unstable {where}, whatever the friction: retune the controller (friso bode)"

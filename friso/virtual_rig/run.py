@@ -173,14 +173,11 @@ def _signals(
         cart = true["cart_position"] = samples[:, :, shape.cart_position]
         true["cart_velocity"] = samples[:, :, shape.cart_velocity]
         gap = position - cart
-        noise = np.array([_sensor(int(seed)).standard_normal(len(time)) for seed in seeds])
+        sensors = (np.random.Generator(np.random.Philox(key=[int(seed), SENSOR])) for seed in seeds)
+        noise = np.array([sensor.standard_normal(len(time)) for sensor in sensors])
         logged["relative_position"] = gap + np.reshape(flat.get("drive.relative_noise", 0.0), (-1, 1)) * noise
     true |= {shape.full_state[i]: samples[:, :, i] for i in shape.having(Role.BRISTLE)}
     return logged, true
-
-
-def _sensor(seed: int) -> np.random.Generator:
-    return np.random.Generator(np.random.Philox(key=[seed, SENSOR]))
 
 
 def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:

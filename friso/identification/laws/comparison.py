@@ -16,12 +16,12 @@ from scipy.stats import t as student
 from friso.errors import InputError
 from friso.identification.kind import Prior
 from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
-from friso.identification.laws.fit import LawFit, LawProblem, friction_of
+from friso.identification.laws.fit import LawFit, LawProblem
 from friso.identification.logs.log import Log
 from friso.identification.readings.at_bearing import believed_between
 from friso.progress import Progress, silent
 from friso.stage import Stage
-from friso.stage.tables import FRICTION, FrictionSection
+from friso.stage.tables import FRICTION, FrictionSection, friction_law
 from friso.stage.transmission import MOTOR_FRICTION, moving_mass
 
 PIECES = 5
@@ -111,9 +111,10 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
     flat = {**stage.flat(), **{key: estimate.value for key, estimate in prior.estimates.items()}}
     if f"{MOTOR_FRICTION}.model" in flat:
         raise InputError("--laws", "a stage with friction at the motor too", "the friction of one bearing", "no --laws")
-    before = friction_of(flat) if flat["friction.model"] in comparable() else None
+    model = flat["friction.model"]
+    before = friction_law(model).shown(flat) if model in comparable() else None
     if before is None:
-        actual = f'"{flat["friction.model"]}", from which no fit can begin'
+        actual = f'"{model}", from which no fit can begin'
         raise InputError("friction.model", actual, f"one of {', '.join(comparable())}", 'model = "lugre"')
     mass = float(moving_mass(flat))
     laws, parts = comparable(), blocks(records, PIECES)

@@ -152,8 +152,3 @@ class LawProblem:
 
 FAILED = 1.0
 """Weighed residual of a run that failed: much worse than no model at all."""
-
-
-def friction_of(flat: Mapping[str, Any]) -> MeasuredFriction:
-    """What is known beforehand of the friction of a stage given as flat keys."""
-    return friction_law(flat["friction.model"]).shown(flat)

@@ -218,11 +218,6 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
     return ""
 
 
-def _is_held(flat: Mapping[str, Any], log: Log) -> bool:
-    """Whether the force of a log is held from each of its samples to the next."""
-    return abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME
-
-
 def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
@@ -234,7 +229,8 @@ def tracking(
     smooth, sharper = (
         motion(log["position"][part], log.sample_time, cutoff * bandwidth).position for cutoff in (SMOOTH, 2 * SMOOTH)
     )
-    inputs = Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log))
+    held = abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME  # from each sample to the next
+    inputs = Inputs(smooth, log["force"][part], log.sample_time, held)
     counted = _moving(log["position"][part], smooth, log.sample_time, SETTLED / omega)
     if not counted.any():
         actual = f"{log.sample_time * len(counted):.3g} s, in which it never moves for {SETTLED / omega:.2g} s on end"

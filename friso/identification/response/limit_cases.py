@@ -38,9 +38,8 @@ def visible(response: FrequencyResponse, modes: Modes | None = None) -> Visible:
         modes = fit_modes(response)
     pairs = _resonances(modes)
     case = _case(ordered, pairs)
-    return Visible(
-        case, ordered, modes, (*(_words(line) for line in ordered), *_mode_words(pairs), _verdict(case, pairs))
-    )
+    resonances = (f"{name} at {value:.4g} Hz" for name, value in pairs.items())
+    return Visible(case, ordered, modes, (*map(_words, ordered), *resonances, _verdict(case, pairs)))
 
 
 def _sign(response: FrequencyResponse) -> float | None:
@@ -78,10 +77,6 @@ def _words(line: StraightLine) -> str:
     value = line.value
     text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
     return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"
-
-
-def _mode_words(pairs: Mapping[str, float]) -> list[str]:
-    return [f"{name} at {value:.4g} Hz" for name, value in pairs.items()]
 
 
 def _verdict(case: str, pairs: Mapping[str, float]) -> str:

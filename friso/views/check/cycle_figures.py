@@ -20,12 +20,7 @@ _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
 _WORDS = {True: "attracts", False: "repels"}
 
 
-def cycle_figures(cases: list[ShownCase]) -> tuple[Figure, Figure]:
-    """The return maps and the cycles of cases with time responses; without panels where there are none."""
-    return _return_maps(cases), _cycles(cases)
-
-
-def _return_maps(cases: list[ShownCase]) -> Figure:
+def return_map_figure(cases: list[ShownCase]) -> Figure:
     """How far each swing reaches against the one before: the map, and this motion's own swings."""
     panels = tuple(panel for item in cases for panel in _return_map(item))
     caption = (
@@ -86,7 +81,7 @@ def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
     return tuple(markers)
 
 
-def _cycles(cases: list[ShownCase]) -> Figure:
+def cycle_figure(cases: list[ShownCase]) -> Figure:
     """One period of every cycle in time, and as a loop of velocity over position."""
     panels = tuple(panel for item in cases if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
     caption = (

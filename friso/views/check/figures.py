@@ -11,7 +11,7 @@ from friso.axis import axis_shown
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.criteria.peak_count import RULE
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
-from friso.views.check.cycle_figures import cycle_figures
+from friso.views.check.cycle_figures import cycle_figure, return_map_figure
 from friso.views.check.traces import common_range, samples, subject, trace_of
 from friso.views.drawing.figure import (
     BLUE,
@@ -48,8 +48,8 @@ def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
     if not with_trace:
         return ()
     motion = (_overview(with_trace), _shares(with_trace), _joint(with_trace), _friction(with_trace))
-    figures = (_settling_figure(with_trace), *cycle_figures(with_trace), *motion)
-    return tuple(figure for figure in figures if figure.panels)
+    cycles = return_map_figure(with_trace), cycle_figure(with_trace)
+    return tuple(figure for figure in (_settling_figure(with_trace), *cycles, *motion) if figure.panels)
 
 
 def response_figure(trace: xr.Dataset) -> Figure:
@@ -171,7 +171,8 @@ def _shares(cases: list[ShownCase]) -> Figure:
         start = max(start, end - _PERIODS * max(periods))
     panels = []
     for item in cases:
-        named = [(name, *SHARES[name]) for name in SHARES if name in trace_of(item) and _any(trace_of(item), name)]
+        trace = trace_of(item)
+        named = [(name, *SHARES[name]) for name in SHARES if name in trace and np.any(samples(trace, name))]
         lines = [(*share, 1.8) for share in named] + ([("force", "total", INK, 0.9)] if named else [])
         series = tuple(
             Series(*_cut(item, samples(trace_of(item), name), start, end), label, colour, width=width)
@@ -252,10 +253,6 @@ def _window(cases: list[ShownCase]) -> tuple[float, float]:
     """Begin and end [s] of the settled part: from where peaks count, or the later half of a shorter run."""
     end = max(float(samples(trace_of(item), "time")[-1]) for item in cases)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
-
-
-def _any(trace: xr.Dataset, name: str) -> bool:
-    return bool(np.any(samples(trace, name)))
 
 
 def _deviation(item: ShownCase) -> Array:

@@ -14,6 +14,7 @@ from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
+from friso.views.loop_words import unstable_where
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Kick, Margin
@@ -44,10 +45,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
 
 def _loop(case: Case) -> list[str]:
     """That the loop is not stable comes before what friction makes of it."""
-    if not case.unstable:
-        return []
-    where = listed([f"while the stage {state}" for state in case.unstable], "and")
-    return [f"the loop is unstable {where}, whatever the friction: retune the controller (friso bode). The stage"]
+    return [f"the loop is {unstable_where(case.unstable)}. The stage"] if case.unstable else []
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:
@@ -164,7 +162,8 @@ def _outlook(case: Case) -> list[str]:
     judgement = case.judgement
     says: list[str] = []
     if judgement.margin:
-        says.append(f"Hunting is possible {_below(case, judgement.margin)}.")
+        up_to = "below" if judgement.margin.certain else "up to"
+        says.append(f"Hunting is possible {up_to} {edge_text(case, judgement.margin.end)}.")
     elif judgement.hunting.possible and BANDWIDTHS not in judgement.given_up:
         says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
     return [*says, *_windows(case), *_unsearched(case)]
@@ -179,11 +178,6 @@ def _unsearched(case: Case) -> list[str]:
     if case.judgement.margin:
         return ["The search for the edge of hunting was given up there: it takes more work than a check may."]
     return [f"{_too_much('At which bandwidths hunting is possible')}."]
-
-
-def _below(case: Case, edge: Margin) -> str:
-    """Up to where hunting is possible."""
-    return f"below {edge_text(case, edge.end)}" if edge.certain else f"up to {edge_text(case, edge.end)}"
 
 
 def edge_text(case: Case, end: AttractionEnd) -> str:

@@ -84,7 +84,8 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     lines += [(GREEN, sentence) for sentence in headlines]
     lines += [] if identification.failed else doubts
     if len(effects) < len(visible):
-        lines.append((GREEN, f"None found: {_none_found(visible)}."))
+        absent = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in visible if _absent(one))
+        lines.append((GREEN, f"None found: {absent}."))
     if identification.stage is None:
         lines.append((ORANGE, _why_no_stage(identification)))
     if len(visible) < len(estimates):
@@ -121,10 +122,6 @@ SHOWN_BY = {
 
 def _absent(estimate: Estimate) -> bool:
     return estimate.name in ABSENT and estimate.low <= 0 <= estimate.high
-
-
-def _none_found(estimates: Sequence[Estimate]) -> str:
-    return ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in estimates if _absent(one))
 
 
 def _ways(estimates: Sequence[Estimate], done: AbstractSet[str]) -> str:

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from friso.identification.logs.format import LogFormat
-from friso.identification.logs.measured_response import MeasuredResponse, is_response, response_of
+from friso.identification.logs.measured_response import is_response, response_of
 from friso.identification.logs.sniff import layout
 from friso.identification.logs.text import read_text
-
-
-def _read_response(path: Path) -> MeasuredResponse:
-    return response_of(read_text(path), path)
-
 
 FORMAT = LogFormat(
     "CSV, TXT, TSV",
@@ -21,5 +14,5 @@ FORMAT = LogFormat(
     rank=2,
     times=False,
     holds_response=lambda path: is_response(layout(path).names),
-    read_response=_read_response,
+    read_response=lambda path: response_of(read_text(path), path),
 )

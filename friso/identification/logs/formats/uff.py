@@ -114,14 +114,10 @@ def read_response_uff(path: Path) -> MeasuredResponse:
     return check_response(MeasuredResponse(frequency, response, coherence, name, read, unit), path)
 
 
-def _holds_response(path: Path) -> bool:
-    return any(data["func_type"] == FREQUENCY_RESPONSE for data in sets_58(path))
-
-
 FORMAT = LogFormat(
     "UFF",
     lambda head: is_uff(head.start),
     read_uff,
-    holds_response=_holds_response,
+    holds_response=lambda path: any(data["func_type"] == FREQUENCY_RESPONSE for data in sets_58(path)),
     read_response=read_response_uff,
 )

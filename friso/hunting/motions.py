@@ -1,0 +1,128 @@
+"""What becomes of the stages' own motions: run and measured, and followed for longer where they do not come to rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.engine.allowance import Exhausted
+from friso.engine.arrays import Status
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.motion import last_corner
+from friso.equations.structure import shared_structure
+from friso.hunting.attractors.rounds import loose_from
+from friso.hunting.criteria import BAND, COUNTED_ABOVE, lasts
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.rest import wait
+from friso.hunting.measures import Measures, measure_runs
+from friso.hunting.turning import HALF, WINDOW
+
+LONG, SWINGS = 1000.0, 120.0
+"""Time [s] for which a motion that has not settled at its end is followed at least, and how many of the longest waits:
+those at the least distance from which the stage breaks away."""
+
+STEADY = 0.01
+"""Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
+
+
+@dataclass(frozen=True)
+class Motions:
+    """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, the thesis's `peaks`,
+    peak to peak of the last quarter, `swing` [m], and the time from the last corner of the reference until they stay
+    within 10 um, `settling` [s] (NaN: not within the run)."""
+
+    completed: np.ndarray
+    peaks: np.ndarray
+    swing: np.ndarray
+    settling: np.ndarray
+
+    @classmethod
+    def of(cls, measures: Measures) -> Motions:
+        """The motions of runs that were measured."""
+        completed = np.equal(measures.status, Status.DONE)
+        return cls(completed, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
+
+    def take(self, numbers: np.ndarray) -> Motions:
+        """Those of the stages with these numbers."""
+        return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
+
+
+def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
+    """The motions of stages of one structure, run and measured."""
+    columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
+    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
+        part = Motions.of(measure_runs(runs.part(flat), runs))
+        for column, values in zip(columns, (part.completed, part.peaks, part.swing, part.settling), strict=True):
+            column[runs.numbers] = values
+    return Motions(*columns)
+
+
+@dataclass(frozen=True)
+class FollowedMotions:
+    """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
+    their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown);
+    whether they swing on `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
+    than their end, or not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
+
+    rests: np.ndarray
+    after: np.ndarray
+    steady: np.ndarray
+    followed: np.ndarray
+    swing: np.ndarray
+
+    @property
+    def unknown(self) -> np.ndarray:
+        """Which had to be followed for long, and were not to the end of that, shape (count,)."""
+        return ~self.rests & ~np.isfinite(self.followed)
+
+    @property
+    def restless(self) -> np.ndarray:
+        """Which have not settled either by the end of the longer run, shape (count,)."""
+        return ~self.rests & np.isfinite(self.followed) & ~np.isfinite(self.after)
+
+    def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
+        """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""
+        stages = Ensemble.held(flat, count, form=shared_structure(flat))
+        waits = SWINGS * wait(stages, loose_from(stages))
+        lasts_for = np.maximum(np.maximum(LONG, flat["motion.duration"]), waits)
+        long = {**flat, "motion.duration": lasts_for + last_corner(flat)}
+        last = run_motions(long, count, replace(run_options, window=WINDOW))
+        done = last.completed.copy()
+        if (swinging := np.flatnonzero(done & (last.swing > COUNTED_ABOVE))).size:
+            half = run_motions(some_of(long, swinging), swinging.size, replace(run_options, window=HALF))
+            done[swinging] = half.completed
+            swing = last.swing[swinging]
+            self.steady[which[swinging]] = half.completed & lasts(
+                swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY)
+            )
+        self.followed[which] = np.where(done, lasts_for, np.nan)
+        self.after[which], self.swing[which] = np.where(done, last.settling, np.nan), last.swing
+
+
+def followed_motions(
+    flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool
+) -> FollowedMotions:
+    """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
+    its end is followed, as far as an allowance reaches."""
+    rests = np.isfinite(motions.settling)
+    steady, followed = np.zeros(count, bool), np.full(count, np.nan)
+    rest = FollowedMotions(rests, motions.settling.copy(), steady, followed, motions.swing.copy())
+    if not possible:
+        idle = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
+        return replace(rest, rests=rests | idle)
+    if (moving := np.flatnonzero(~rests)).size:
+        late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)  # what may leave the band, at the end
+        try:
+            rest.follow(moving, some_of(flat, moving), moving.size, late)
+        except Exhausted:
+            rest.steady[moving], rest.followed[moving] = False, np.nan
+    return rest
+
+
+def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
+    """Some entries of the arrays among the values."""
+    return {key: value[which] if np.ndim(value) else value for key, value in columns.items()}
