@@ -85,6 +85,12 @@ class Answer:
     def holds(self) -> bool:
         return self.low <= self.truth <= self.high
 
+    @property
+    def miss(self) -> str:
+        """The interval and the truth that it does not hold."""
+        span = f"{self.low:.4g} to {self.high:.4g}{'' if self.reported else ' (not shown)'}"
+        return f"{self.method}: {self.name} {span}, true {self.truth:.4g}"
+
 
 @dataclass
 class Count:
@@ -212,8 +218,7 @@ def run(tasks: Iterable[Task], kept: Path | None = None) -> list[Answer]:
             print(f"  machine {seed}, {kind}: refused: {' '.join(str(error).split())}")
         for answer in answers:
             if not answer.holds:
-                span = f"{answer.low:.4g} to {answer.high:.4g}{'' if answer.reported else ' (not shown)'}"
-                print(f"  machine {seed}, {answer.method}: {answer.name} {span}, true {answer.truth:.4g}")
+                print(f"  machine {seed}, {answer.miss}")
         print(f"machine {seed}, {kind}: {time.perf_counter() - begin:.0f} s", flush=True)
         if kept:
             with kept.open("a", encoding="utf-8") as file:
@@ -235,6 +240,15 @@ def counted(answers: Iterable[Answer]) -> dict[tuple[str, str], Count]:
     for answer in answers:
         counts[answer.method, answer.name].add(answer)
     return counts
+
+
+HEAD = (
+    "method: quantity",
+    "reported of visible",
+    "held of reported",
+    "median half-width / truth",
+    "range right of not reported",
+)
 
 
 def rows(counts: dict[tuple[str, str], Count]) -> list[list[str]]:
@@ -271,14 +285,7 @@ def main() -> None:
     numbers = {"rigid": arguments.machines, "jointed": arguments.machines, "moves": arguments.moves}
     tasks = [(kind, seed) for kind, n in numbers.items() for seed in range(arguments.first, arguments.first + n)]
     counts = counted(run(tasks, arguments.kept))
-    head = (
-        "method: quantity",
-        "reported of visible",
-        "held of reported",
-        "median half-width / truth",
-        "range right of not reported",
-    )
-    print_table(head, rows(counts))
+    print_table(HEAD, rows(counts))
     print_goals(goals(counts), "Goals")
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.identify import Answer, Count, goals, rows
+from benchmarks.identify import HEAD, Answer, Count, goals, rows
 from benchmarks.report import Goal, print_goals, print_table
 from friso.equations.rail import friction_factors
 from friso.errors import InputError
@@ -103,14 +103,11 @@ def answers(identified: Identification, logs: list[RigLog], machine: Machine) ->
         matching = [log for log in logs if log.name in {source.name.removesuffix(".csv") for source in experiment.logs}]
         words = f"{experiment.kind}, free" if matching[0].name.startswith("free") else experiment.kind
         for estimate in experiment.estimates:
-            yield (
-                words,
-                estimate,
-                mean_level(matching, estimate.name) if estimate.name in LEVELS else flat[estimate.name],
-            )
+            truth = mean_level(matching, estimate.name) if estimate.name in LEVELS else flat[estimate.name]
+            yield Answer.of(words, estimate, truth)
     if len(identified.experiments) > 1:
         for estimate in identified.estimates:
-            yield "stage file", estimate, travelled[estimate.name]
+            yield Answer.of("stage file", estimate, travelled[estimate.name])
 
 
 def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdicts]:
@@ -127,12 +124,10 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
             except InputError as error:
                 print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
                 continue
-            for method, estimate, truth in answers(identified, logs, machine):
-                counts[method, estimate.name].add(estimate, truth)
-                if not estimate.holds(truth):
-                    remark = "" if estimate.determined else " (not shown)"
-                    span = f"{estimate.low:.4g} to {estimate.high:.4g}{remark}"
-                    print(f"  machine {seed}, {method}: {estimate.name} {span}, true {truth:.4g}")
+            for answer in answers(identified, logs, machine):
+                counts[answer.method, answer.name].add(answer)
+                if not answer.holds:
+                    print(f"  machine {seed}, {answer.miss}")
             if number == 0:
                 _compare(machine, stage, verdicts, seed)
         print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
@@ -164,8 +159,7 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=0, help="number of the first machine")
     arguments = parser.parse_args()
     counts, verdicts = run(arguments.first, arguments.machines)
-    head = ("method: quantity", "held of shown", "median half-width / truth", "range right of not shown")
-    print_table(head, rows(counts))
+    print_table(HEAD, rows(counts))
     pairs = [[case, *pair, n] for case, table in verdicts.items() for pair, n in sorted(table.items())]
     print_table(("case", "verdict of the machine", "identified", "machines"), pairs)
     print_goals([*goals(counts), *same(verdicts)], "Goals")
