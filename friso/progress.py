@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from threading import Lock
 from typing import Protocol
 
 
@@ -33,8 +34,10 @@ class Tally:
 
     def __init__(self, progress: Progress, total: int) -> None:
         self.progress, self.total, self.done = progress, total, 0
+        self._turn = Lock()
 
     def add(self, steps: int, label: str) -> None:
-        """So many more steps are done; `label` says what is being done now."""
-        self.done += steps
-        self.progress(self.done, self.total, label)
+        """So many more steps are done; `label` says what is being done now. Several threads may tell."""
+        with self._turn:
+            self.done += steps
+            self.progress(self.done, self.total, label)

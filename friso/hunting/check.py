@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from friso.engine.allowance import Exhausted, allowance
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import KernelRequest, kernel, kernels
+from friso.engine.side_by_side import side_by_side
 from friso.engine.simulate import RTOL, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
@@ -104,13 +106,13 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     different: list[Stage] = []
     different += (variant for variant in variants.values() if variant not in different)
     done = Tally(progress, len(different) * len(PARTS))
-    judged: list[tuple[Stage, Case]] = []
-    left = WORK
-    for variant in sorted(different, key=_is_free):  # a free joint takes the most work: it gets what the other leaves
-        with allowance() as spent:
-            judged.append((variant, _case(variant, rtol, traces, done, left / (len(different) - len(judged)))))
-        left -= spent.used
-    return {name: next(case for stage, case in judged if stage == variant) for name, variant in variants.items()}
+
+    def judged(variant: Stage) -> Case:
+        others = len(different) > 1 and not _is_free(variant)  # a free joint takes the most work
+        return _case(variant, rtol, traces, done, WORK / 2 if others else WORK)
+
+    cases = side_by_side([partial(judged, variant) for variant in different])
+    return {name: cases[different.index(variant)] for name, variant in variants.items()}
 
 
 def needed_kernels(stage: Stage) -> set[KernelRequest]:
@@ -138,19 +140,24 @@ def _needed(stage: Stage) -> set[KernelRequest]:
 
 
 def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> Case:
-    flat = stage.flat()
-    begun = done.done
+    flat, ended = stage.flat(), 0
+
+    def begin(part: str) -> None:
+        nonlocal ended
+        ended += (step := int(part != ATTRACTION))
+        done.add(step, part)
+
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
     measures = measure_runs(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
     with allowance() as spent:
-        judgement = judge(stage, measures, max(rtol, LONG), lambda part: done.add(int(part != ATTRACTION), part), work)
+        judgement = judge(stage, measures, max(rtol, LONG), begin, work)
     fed = None
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, FED * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, FEEDING))
-    done.add(begun + len(PARTS) - done.done, PARTS[-1])  # the last, too, where nothing attracts
+    done.add(len(PARTS) - ended, PARTS[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,
         judgement=judgement,

@@ -16,7 +16,7 @@ from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import families, hunting_cycles
+from friso.hunting.cycle.find import Cycles, families, hunting_cycles
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import swings_of_simplest
@@ -37,9 +37,9 @@ BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
 multipliers rough."""
 
-BETWEEN = np.array([0.1, 0.3, 0.6, 1.0])
-"""Shares of the way there at which cycles, and motions beside those that repel, are looked for that attract over less,
-or from a narrow range."""
+BETWEEN = np.array([0.1, 0.3, 0.6])
+"""Shares of the way there at which, as at its end, cycles, and motions beside those that repel, are looked for that
+attract over less, or from a narrow range."""
 
 SPREAD, ENOUGH = 9, 6
 """Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
@@ -85,12 +85,17 @@ class _Place:
 
 @dataclass(frozen=True)
 class _Suggested:
-    """What return maps suggest at factors: cycles that attract, `motions`, and distances [m], (factors, n), in motions
-    that go on beside those that repel, `held` (NaN: none)."""
+    """What return maps suggest at factors: `cycles`, of which those that attract are `motions`, and distances [m],
+    (factors, n), in motions that go on beside those that repel, `held` (NaN: none)."""
 
     factors: np.ndarray
+    cycles: tuple[Cycles, ...]
     motions: list[Swinging]
     held: np.ndarray
+
+    def of(self, numbers: np.ndarray) -> tuple[Cycles, ...]:
+        """The cycles at the factors with these numbers."""
+        return tuple(family.take(numbers) for family in self.cycles)
 
 
 class Beyond(Exception):
@@ -140,7 +145,7 @@ class Outward:
                 raise Beyond
             suggested = self._suggested(at, next_to, reserve)
             starts = np.append(ALONG * distance, suggested.held[-1])
-            survey = self.surveyed(np.array([next_to]), starts, at_once=True)
+            survey = self.surveyed(np.array([next_to]), starts, suggested=suggested.of(np.array([-1])))
             if survey.attracts[0]:
                 place.at, place.motions = next_to, survey.motions
                 continue
@@ -152,12 +157,12 @@ class Outward:
 
     def _suggested(self, at: float, next_to: float, reserve: float) -> _Suggested:
         """What the return maps suggest from the end of an orbit, known up to a share of it, to a factor next to it."""
-        factors = at * (next_to / at) ** BETWEEN
+        factors = np.append(at * (next_to / at) ** BETWEEN, next_to)
         factors = factors[np.abs(np.log(factors / at)) > reserve]
         stages = self._stages(factors)
         cycles = families(stages)
         motions = [m for family in cycles for m in of_cycles(np.arange(factors.size), family, stages.sticking)]
-        return _Suggested(factors, motions, np.hstack([held_beside(stages, family) for family in cycles]))
+        return _Suggested(factors, cycles, motions, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def _between(self, suggested: _Suggested) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
         """The last factor but that next to an end, at which nothing attracts, at which something does of what is
@@ -168,7 +173,9 @@ class Outward:
         doubtful = np.flatnonzero(np.isfinite(suggested.held[:last]).any(axis=1))
         doubtful = doubtful[doubtful > nearest]
         if doubtful.size:
-            survey = self.surveyed(suggested.factors[doubtful], suggested.held[doubtful], at_once=True)
+            survey = self.surveyed(
+                suggested.factors[doubtful], suggested.held[doubtful], suggested=suggested.of(doubtful)
+            )
             motions += [replace(motion, stage=int(doubtful[motion.stage])) for motion in survey.motions]
             decided = bool(survey.decided.all())
         if not motions:
@@ -189,13 +196,18 @@ class Outward:
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def surveyed(
-        self, factors: np.ndarray, distances: np.ndarray | None = None, cycles: bool = True, at_once: bool = False
+        self,
+        factors: np.ndarray,
+        distances: np.ndarray | None = None,
+        cycles: bool = True,
+        suggested: tuple[Cycles, ...] = (),
     ) -> Attractors:
         """What attracts at some factors, tried from distances [m] as well, the same (n,) for all or (factors, n), all
-        starts `at_once` or not. Without `cycles` simulations alone tell: orbits that attract from a narrow range show
-        where they are followed from wider ones."""
+        starts at once where the cycles that the return maps suggest are known, `suggested`. Without `cycles`
+        simulations alone tell: orbits that attract from a narrow range show where they are followed from wider
+        ones."""
         begins = None if distances is None else np.broadcast_to(distances, (len(factors), np.shape(distances)[-1]))
-        return attractors(self._stages(factors), distances=begins, cycles=cycles, at_once=at_once)
+        return attractors(self._stages(factors), distances=begins, cycles=cycles, suggested=suggested)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))

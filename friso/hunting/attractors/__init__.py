@@ -104,22 +104,22 @@ def attractors(
     rtol: float = RTOL,
     distances: np.ndarray | None = None,
     cycles: bool = True,
-    at_once: bool = False,
+    suggested: tuple[Cycles, ...] = (),
 ) -> Attractors:
     """What attracts: everything that simulations from many starts end in, and the cycles that the return map suggests.
     Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the `distances` [m], (count, n), too, where they are finite. Without
     `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
-    Starts are tried `at_once`, and beside the cycles, by a thorough survey and where nothing is thought to attract: one
-    run alone takes as long as eight together. A thorough survey whose allowance is used up tells what it has found by
-    then, which is decided where an orbit was closed; others raise Exhausted."""
+    Starts are tried at once, and beside the cycles, by a thorough survey and where nothing is thought to attract, so
+    that the cycles are known already, `suggested`: one run alone takes as long as eight together. A thorough survey
+    whose allowance is used up tells what it has found by then, which is decided where an orbit was closed; others raise
+    Exhausted."""
     survey, numbers = Survey(stages.count, thorough, rtol, prove=cycles), np.arange(stages.count)
-    at_once = thorough or at_once
+    at_once = thorough or bool(suggested)
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
-    suggested: tuple[Cycles, ...] = ()
     try:
-        if at_once and cycles:
+        if thorough and cycles:
             suggested = families(stages, rtol)
         starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
         if distances is not None:

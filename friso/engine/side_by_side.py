@@ -1,0 +1,38 @@
+"""Several things computed at once, each in a thread of its own: what runs leaves the interpreter to the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
+from contextvars import copy_context
+from typing import TypeVar
+
+import numpy as np
+
+from friso.engine.overtaken import ended_by, go_on
+from friso.system import usable_cores
+
+_T = TypeVar("_T")
+
+_PATIENCE = 0.1
+"""How long [s] is waited before it is looked again whether anybody waits for all of it still."""
+
+
+def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
+    """What the tasks return, in their order. What ends one of them early ends the others, too, at their next batch of
+    runs, and is raised. On a single core they are done one after the other."""
+    if len(tasks) < 2 or usable_cores() < 2:
+        return [task() for task in tasks]
+    flag = np.zeros(1, np.int64)
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        with ended_by(flag):
+            jobs = [pool.submit(copy_context().run, task) for task in tasks]
+        try:
+            while any(not job.done() for job in jobs):
+                for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:
+                    job.result()
+                go_on()
+            return [job.result() for job in jobs]
+        except BaseException:
+            flag[0] = 1
+            raise
