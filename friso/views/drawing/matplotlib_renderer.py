@@ -141,7 +141,8 @@ def _laid_out(figure: Figure) -> Canvas:
     last = _last.get("canvas")
     if last is None or last[0] is not figure:
         canvas = render(figure)
-        canvas.draw_without_rendering()
+        if engine := canvas.get_layout_engine():
+            engine.execute(canvas)
         canvas.set_layout_engine("none")
         last = _last["canvas"] = (figure, canvas)
     return last[1]
