@@ -1,18 +1,53 @@
-"""What the user waits for and needs: wall time of `friso check`, cold and warm, and the memory of a large sweep."""
+"""What the user waits for and needs: by ``python -m benchmarks.command`` the times of the README's commands, each in a
+fresh process; for `benchmarks.engine`, `friso check` and the memory of a large sweep."""
 
 from __future__ import annotations
 
+import argparse
 import os
 import re
+import shlex
+import statistics
 import subprocess
 import sys
 import tempfile
+import time
+from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.report import Goal, clock, print_table, spread
+from benchmarks.report import Goal, clock, machine, print_table, spread
 from benchmarks.rigs import FILE
 
 START = "from friso.cli import main; main()"
+ROOT = Path(__file__).parents[1]
+PAGE = ROOT / "docs" / "speed.md"
+PATIENCE = 60.0
+"""Time [s] after which a command is not run once more."""
+
+LOCKED = "--set joint.locked=true"
+CROSSOVER = '--x controller.crossover="1 Hz..40 Hz"'
+THESIS_MAP = '--x controller.crossover="1 Hz..16 Hz:{n}" --y joint.stroke="1 um..1 mm:{n}"'
+COMMANDS: dict[str, float | None] = {
+    "--help": 0.2,
+    "check {rig}": 1.2,
+    "check {rig} --out report": None,
+    f"boundary {{rig}} {LOCKED} {CROSSOVER} --out boundary": None,
+    f'boundary {{rig}} {LOCKED} {CROSSOVER} --y masses.cart="0.6 kg..2.4 kg" --out boundary': 15.0,
+    'bode {rig} --set drive.sample_time="50 us" --set drive.delay="100 us" --out bode': 3.0,
+    f"map {{rig}} {THESIS_MAP.format(n=41)} --out map": 2.5,
+    f"map {{rig}} {THESIS_MAP.format(n=21)} --metric verdict --out map": None,
+    "design {rig} {specification} --out design": 20.0,
+    f'tune {{rig}} {LOCKED} --bandwidth-limit "25 Hz" --out tuned': None,
+    "compare {drive} --machines 200 --out compare": 60.0,
+    "rig hunting {drive} --out hunting": 20.0,
+}
+"""The README's commands, and others with a goal: the wall time wanted of each, warm [s] (None: no goal)."""
+
+PLACES = {
+    "rig": "examples/thesis_rig.toml",
+    "drive": "examples/thesis_drive.toml",
+    "specification": "examples/specs/thesis.toml",
+}
 SWEPT = 100_000
 
 _SWEEP = f"""
@@ -40,6 +75,81 @@ for runs in run_chunks(rig.kernel, flat, n, measuring_options(1e-4)):
 peak = max(high_water(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 """
+
+
+@dataclass(frozen=True)
+class Timed:
+    """A command as it is typed, and its wall and CPU times [s]: with an empty cache, and one for each warm run."""
+
+    command: str
+    wanted: float | None
+    cold: float
+    wall: list[float]
+    cpu: list[float]
+
+    @property
+    def row(self) -> tuple[str, ...]:
+        """A row of the table."""
+        wanted = "" if self.wanted is None else f"{self.wanted:g}"
+        times = [f"{time:.1f}" for time in (min(self.wall), statistics.median(self.wall), statistics.median(self.cpu))]
+        return (f"`friso {self.command}`", f"{self.cold:.1f}", *times, str(len(self.wall)), wanted)
+
+
+HEAD = ("command", "cold", "warm, least", "median", "CPU, median", "runs", "wanted")
+
+
+def time_command(command: str, wanted: float | None, repetitions: int) -> Timed:
+    """Run a command with an empty cache, and then again and again, in a folder of its own."""
+    with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
+        environment = {**os.environ, "FRISO_CACHE_DIR": str(Path(folder, "cache")), "PYTHONPATH": str(ROOT)}
+        places = {name: str(ROOT / place) for name, place in PLACES.items()}
+        arguments = [sys.executable, "-c", START, *shlex.split(command.format(**places))]
+        walls: list[float] = []
+        cpus: list[float] = []
+        while len(walls) < 2 or (len(walls) <= repetitions and sum(walls) < PATIENCE):
+            before, start = os.times(), time.perf_counter()
+            done = subprocess.run(arguments, env=environment, capture_output=True, text=True, cwd=folder)
+            walls.append(time.perf_counter() - start)
+            after = os.times()
+            cpus.append(after[2] + after[3] - before[2] - before[3])
+            if done.returncode:
+                raise RuntimeError(f"friso {command} ended with status {done.returncode}: {done.stderr[-500:]}")
+    return Timed(command.format(**PLACES), wanted, walls[0], walls[1:], cpus[1:])
+
+
+def page(timed: list[Timed], machine: str) -> str:
+    """docs/speed.md."""
+    rows = "\n".join(f"| {' | '.join(item.row)} |" for item in timed)
+    return f"""# Speed
+
+What a person waits for: times [s] of whole commands, each in a fresh process. Cold is with an empty cache, where the
+equations are compiled first; warm every time after that. CPU time is that of all cores together.
+
+| {" | ".join(HEAD)} |
+|{"---|" * len(HEAD)}
+{rows}
+
+Measured by `python -m benchmarks.command --write` on {time.strftime("%d %B %Y")}: {machine}. What a step of the
+simulation costs is told in [engine.md](engine.md), what large studies cost in [scaling.md](scaling.md).
+"""
+
+
+def main() -> None:
+    """Time the commands and print the table, or write the page."""
+    import friso
+
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=5, help="warm runs of each command that takes no longer than that")
+    parser.add_argument("--only", default="", help="commands that contain this text")
+    parser.add_argument("--write", action="store_true", help="write docs/speed.md")
+    chosen = parser.parse_args()
+    wanted = {command: goal for command, goal in COMMANDS.items() if chosen.only in command}
+    timed, measured_on = [], machine([friso])
+    for command, goal in wanted.items():
+        timed.append(time_command(command, goal, chosen.runs))
+        print_table(HEAD, [timed[-1].row])
+    if chosen.write:
+        PAGE.write_text(page(timed, measured_on), encoding="utf-8")
 
 
 def _check(cache: Path, *options: str) -> tuple[float, str]:
@@ -99,3 +209,7 @@ def run_memory() -> list[Goal]:
         Goal(about + "kernel in the cache", "< 500 MB", f"{peak:.0f} MB", peak < 500),
         Goal(about + "kernel compiled first", "< 500 MB", f"{cold:.0f} MB", cold < 500),
     ]
+
+
+if __name__ == "__main__":
+    main()

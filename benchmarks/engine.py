@@ -27,13 +27,13 @@ def main() -> None:
     from benchmarks import command, prototype, two_maps
     from benchmarks.precision import work_precision
     from benchmarks.race import run_race
-    from benchmarks.report import Goal, print_goals
+    from benchmarks.report import Goal, machine, print_goals
     from benchmarks.rigs import rig
 
     arguments = _arguments()
     chosen = (arguments.only,) if arguments.only else SECTIONS
     repetitions = 1 if arguments.quick else 3
-    print(_machine())
+    print(machine(_libraries()))
     start = time.perf_counter()
     goals: list[Goal] = []
     rigs = [rig(locked=True), rig(locked=False)]
@@ -86,23 +86,14 @@ def _places(rigs: list[Rig], lanes: ModuleType | None, repetitions: int, quick: 
     return places
 
 
-def _machine() -> str:
+def _libraries() -> list[ModuleType]:
     import numba
     import numpy
     import scipy
 
     import friso
-    from friso.system import usable_cores
 
-    names = [line.split(":")[1].strip() for line in _cpu_lines() if line.startswith("model name")]
-    versions = ", ".join(f"{module.__name__} {module.__version__}" for module in (friso, numba, numpy, scipy))
-    cores, load = usable_cores(), os.getloadavg()[0]
-    return f"{versions}; {names[0] if names else 'unknown processor'}, {cores} cores, load before {load:.1f}"
-
-
-def _cpu_lines() -> list[str]:
-    file = Path("/proc/cpuinfo")
-    return file.read_text().splitlines() if file.exists() else []
+    return [friso, numba, numpy, scipy]
 
 
 def _arguments() -> argparse.Namespace:

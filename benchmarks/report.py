@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
 from typing import Any
+
+from friso.system import usable_cores
 
 
 @dataclass(frozen=True)
@@ -50,3 +55,13 @@ def clock(job: Callable[[], Any]) -> float:
 def spread(seconds: Sequence[float], scale: float = 1.0, digits: int = 1) -> str:
     """Least and median of some times, times `scale`."""
     return f"{min(seconds) * scale:.{digits}f} / {statistics.median(seconds) * scale:.{digits}f}"
+
+
+def machine(libraries: Sequence[ModuleType]) -> str:
+    """The versions of libraries, the processor, its cores that may be used, and the load of the last minute."""
+    versions = [f"{library.__name__} {library.__version__}" for library in libraries]
+    file = Path("/proc/cpuinfo")
+    lines = file.read_text().splitlines() if file.exists() else []
+    names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
+    processor = names[0] if names else "unknown processor"
+    return ", ".join([*versions, processor, f"{usable_cores()} cores, load before {os.getloadavg()[0]:.1f}"])

@@ -6,17 +6,21 @@ from collections.abc import Callable
 
 import numpy as np
 
-FINER, ROUNDS = 9, 6
-"""Into how many steps that with an end is divided, and how often: to 4 millionths of it."""
+PRECISE = 4e-6
+"""Share of a step of the places, in its logarithm, up to which an end is located."""
+
+EVENLY, NEAR = np.linspace(0, 1, 6)[1:-1], np.array([-0.002, 0.0, 0.002])
+"""Where a step with an end is divided: evenly, and about the zero of a straight line, as shares of it."""
 
 Range = tuple[float, float]
 
 
 def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> tuple[Range, ...]:
     """The ranges of positive ascending places (n,) in which a function of them is below 0."""
-    below = excess(at) < 0
+    values = excess(at)
+    below = values < 0
     changes = np.flatnonzero(below[1:] != below[:-1])
-    ends = [_end(at[k], at[k + 1], bool(below[k]), excess) for k in changes]
+    ends = [_end(at[k : k + 2], values[k : k + 2], excess) for k in changes]
     ends = [*at[:1][below[:1]], *ends, *at[-1:][below[-1:]]]
     return tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))
 
@@ -27,11 +31,15 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
     return tuple(pair for pair in pairs if pair[0] < pair[1])
 
 
-def _end(low: float, high: float, first: bool, excess: Callable[[np.ndarray], np.ndarray]) -> float:
-    """The zero of the function between two points; `first` says whether it is negative at the lower one."""
-    for _ in range(ROUNDS):
-        finer = np.geomspace(low, high, FINER)
-        other = (excess(finer[1:-1]) < 0) != first
-        k = int(other.argmax()) + 1 if other.any() else FINER - 1
-        low, high = finer[k - 1], finer[k]
-    return float(np.sqrt(low * high))
+def _end(at: np.ndarray, values: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> float:
+    """The zero of the function between two places, at which it has these values."""
+    precise = PRECISE * np.log(at[-1] / at[0])
+    while np.log(at[-1] / at[0]) > precise:
+        with np.errstate(invalid="ignore"):
+            zero = np.nan_to_num(values[0] / (values[0] - values[-1]), nan=0.5)
+        shares = np.unique(np.clip(np.append(EVENLY, zero + NEAR), 0.0005, 0.9995))
+        places = at[0] * (at[-1] / at[0]) ** shares
+        at, values = np.array([at[0], *places, at[-1]]), np.array([values[0], *excess(places), values[-1]])
+        k = int(((values < 0) != (values[0] < 0)).argmax())
+        at, values = at[k - 1 : k + 1], values[k - 1 : k + 1]
+    return float(np.sqrt(at[0] * at[1]))
