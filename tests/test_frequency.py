@@ -1,5 +1,9 @@
 """Linear systems from the declared equations: limit cases, the family behind them, against closed forms and twins."""
 
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
 import control
 import numpy as np
 import pytest
@@ -12,9 +16,10 @@ from scipy.optimize import brentq
 from variants import VARIANTS
 
 import friso
-from friso.equations.model import REFERENCE, assemble
+from friso.equations.component import TIME
+from friso.equations.model import REFERENCE, Model, assemble
 from friso.equations.roles import Role
-from friso.equations.structure import structure
+from friso.equations.structure import Structure, structure
 from friso.errors import InputError
 from friso.frequency.bode import bode
 from friso.frequency.crossover import WANTED, limits, settled_members
@@ -89,7 +94,7 @@ def test_closed_loop_is_the_jacobian_of_the_whole_model(name: str) -> None:
     for one in limit_cases(flat).values():
         whole = np.linalg.eigvals(jacobian(flat, one))
         parts = np.linalg.eigvals(closed_loop(flat, one).a[0])
-        model = assemble(structure(flat))
+        model, _ = derived(structure(flat))
         # where a stuck cart got stuck, or the force of an element that slips; that of GMS is drawn to its level
         stay = one.stuck[0] or flat["friction.model"] == "maxwell_slip"
         extra = len(whole) - len(parts)
@@ -100,22 +105,33 @@ def test_closed_loop_is_the_jacobian_of_the_whole_model(name: str) -> None:
             assert np.abs(whole).min() < 1e-9 * np.abs(whole).max()
 
 
+TURNS = {"sine": lambda turns: np.sin(2 * np.pi * turns)}
+
+
+@cache
+def derived(form: Structure) -> tuple[Model, Callable[..., Any]]:
+    """The equations of stages of a structure, and the Jacobian of their right-hand side, by SymPy."""
+    model = assemble(form)
+    rates = sp.Matrix(model.rhs)
+    arguments = [*model.symbols, TIME, *REFERENCE, *(kink.beyond for kink in model.kinks), *model.parameters]
+    return model, sp.lambdify(arguments, rates.jacobian(model.symbols).tolist(), [TURNS, "math"], cse=True)
+
+
 def jacobian(flat: dict, one: Members) -> np.ndarray:
-    """Of the right-hand side of a stage with its controller, by SymPy, at a state that is put in by hand."""
-    model = assemble(structure(flat))
+    """Of the right-hand side of a stage with its controller, at a state that is put in by hand."""
+    model, derivatives = derived(structure(flat))
     speed = float(one.speed[0])
     here = {symbol: speed if str(symbol).endswith("velocity") else 0.0 for symbol in model.symbols}
-    here |= dict.fromkeys(REFERENCE, 0.0)  # it stands
+    here |= dict.fromkeys((TIME, *REFERENCE), 0.0)  # it stands
     modes = {"forward": 1.0, "stroke_ahead": float(one.touched[0])}
     modes |= dict.fromkeys(("plastic_ahead", "slipping_ahead"), float(speed > 0))
     modes |= {switch.name: float(not one.stuck[0]) for switch in model.switches}
     here |= {kink.beyond: modes.get(kink.name, 0.0) for kink in model.kinks}
+    numbers = {key: flat.get(str(key), np.nan) for key in model.parameters}  # the motion plays no part
     rates = {state.symbol: state.derivative for state in model.states if state.role == Role.BRISTLE}
-    numbers = {key: flat[str(key)] for key in sp.Matrix(model.rhs).free_symbols if str(key) in flat}
     for z, rate in rates.items() if speed else ():
         here[z] = steady(rate.subs(numbers).subs({s: v for s, v in here.items() if s != z}), z)
-    matrix = sp.Matrix(model.rhs).jacobian(model.symbols).subs(numbers).subs(here)
-    return np.array(matrix.evalf(), dtype=float)
+    return np.array(derivatives(*here.values(), *numbers.values()), dtype=float)
 
 
 def steady(rate: sp.Expr, z: sp.Symbol) -> float:
