@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 
 from friso.views.drawing.figure import Array
@@ -17,34 +15,36 @@ def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
 
     x, y: shape (n,), any unit, NaN where the line is broken. Lines of up to KEPT * buckets samples come back
     as they are. Of a longer one are kept: its first and last sample and, in each bucket of neighbouring
-    samples, those with the smallest and largest y and x and the first gap. Buckets hold equally many samples;
+    samples, those with the smallest and largest y and x (the first of equal ones) and the first gap. Buckets hold equally many samples;
     where x runs to and fro (a loop) they are equally long pieces of the path instead, so that a state that
     rests for seconds takes no samples from one that moves.
     """
     if len(x) <= KEPT * buckets:
         return x, y
-    edges = _edges(x, y, buckets)
-    keep = {0, len(x) - 1}
-    for start, stop in pairwise(edges):
-        for values in (x[start:stop], y[start:stop]):
-            finite = np.isfinite(values)
-            if finite.any():
-                keep.add(start + int(np.argmin(np.where(finite, values, np.inf))))
-                keep.add(start + int(np.argmax(np.where(finite, values, -np.inf))))
-            if not finite.all():
-                keep.add(start + int(np.argmin(finite)))
-    chosen = np.array(sorted(keep))
+    starts = _starts(x, y, buckets)
+    bucket = np.zeros(len(x), int)
+    bucket[starts[1:]] = 1
+    bucket = np.cumsum(bucket)
+    kept = [np.array([0, len(x) - 1])]
+    for values in (x, y):
+        finite = np.isfinite(values)
+        least = np.minimum.reduceat(np.where(finite, values, np.inf), starts)[bucket]
+        greatest = np.maximum.reduceat(np.where(finite, values, -np.inf), starts)[bucket]
+        for wanted in (finite & (values == least), finite & (values == greatest), ~finite):
+            places = np.flatnonzero(wanted)
+            kept.append(places[np.unique(bucket[places], return_index=True)[1]])
+    chosen = np.unique(np.concatenate(kept))
     return x[chosen], y[chosen]
 
 
-def _edges(x: Array, y: Array, buckets: int) -> list[int]:
-    """First sample of every bucket, and n: strictly rising."""
+def _starts(x: Array, y: Array, buckets: int) -> np.ndarray:
+    """The first sample of every bucket: strictly rising."""
     count = len(x)
     if not np.any(np.diff(x) < 0):
-        return [count * bucket // buckets for bucket in range(buckets + 1)]
+        return count * np.arange(buckets) // buckets
     path = np.cumsum(_steps(x) + _steps(y))
     inner = np.searchsorted(path, path[-1] * np.arange(1, buckets) / buckets)
-    return np.unique(np.concatenate(([0], inner, [count]))).tolist()
+    return np.unique(np.concatenate(([0], inner[inner < count])))
 
 
 def _steps(values: Array) -> Array:
