@@ -62,12 +62,12 @@ function changed(dragged) {
   form.ask({ machine: machines.sent() });
 }
 
-/** Verdict and picture follow the machine. */
+/** The picture follows the machine, and then the verdict: both at once would be slower. */
 function follow(dragged) {
   const given = machines.changes();
+  const machine = machines.sent();
   const label = Object.entries(given).at(-1)?.join(" ") ?? "as opened";
-  verdict.ask({ machine: machines.sent() }, { changes: given, label });
-  pictures.changed(dragged);
+  pictures.changed(dragged, () => verdict.ask({ machine }, { changes: given, label }));
 }
 
 /** The server has read the machine, or refused it. */

@@ -14,7 +14,10 @@ export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
   constructor(sent, tell) {
     Object.assign(this, { sent, tell, shown: "run", machine: null, answer: null, timer: 0, kept: new Map() });
-    this.live = new Live("run", "picture", 3000, (answer) => this.arrived(answer));
+    this.live = new Live("run", "picture", 3000, (answer, then) => {
+      this.arrived(answer);
+      if (answer.kind !== "message") then();
+    });
     this.tabs = [
       { id: "run", label: "Run" },
       { id: "check", label: "Hunting" },
@@ -78,12 +81,13 @@ export class Pictures {
     place.append(this.plots, this.below);
   }
 
-  /** The machine has changed; `dragged`: not yet for good. */
-  changed(dragged) {
-    this.bar();
+  /** The machine has changed; `dragged`: not yet for good. `then` is called once a picture that follows is drawn. */
+  changed(dragged, then) {
+    if (!dragged) this.bar();
+    if (this.shown !== "run") then();
     if (this.own[this.shown]) return;
     if (!this.plots) this.begin($("picture"));
-    if (this.shown === "run") this.live.ask(this.body());
+    if (this.shown === "run") this.live.ask(this.body(), then);
     else {
       stale($("picture"));
       clearTimeout(this.timer);
@@ -94,7 +98,7 @@ export class Pictures {
   async ask() {
     const { shown } = this;
     if (!this.machine || this.own[shown]) return;
-    if (shown === "run") return this.live.ask(this.body());
+    if (shown === "run") return this.live.ask(this.body(), () => {});
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;

@@ -13,11 +13,11 @@ KEPT = 5  # at most this many samples of a bucket are kept: the extremes of x an
 def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
     """Samples of the line (x, y), in order, that look like all of it.
 
-    x, y: shape (n,), any unit, NaN where the line is broken. Lines of up to KEPT * buckets samples come back
-    as they are. Of a longer one are kept: its first and last sample and, in each bucket of neighbouring
-    samples, those with the smallest and largest y and x (the first of equal ones) and the first gap. Buckets hold equally many samples;
-    where x runs to and fro (a loop) they are equally long pieces of the path instead, so that a state that
-    rests for seconds takes no samples from one that moves.
+    x, y: shape (n,), any unit, NaN where the line is broken. Lines of up to KEPT * buckets samples come back as they
+    are. Of a longer one are kept: its first and last sample and, in each bucket of neighbouring samples, those with the
+    smallest and largest y and x (the first of equal ones) and the first gap. Buckets hold equally many samples; where x
+    runs to and fro (a loop) they are equally long pieces of the path instead, so that a state that rests for seconds
+    takes no samples from one that moves.
     """
     if len(x) <= KEPT * buckets:
         return x, y
