@@ -78,6 +78,16 @@ def test_a_stage_file_uses_one_and_page_and_document_name_it(installed: Path) ->
     assert "controller pi-d (own_controller)" in document["plug_ins"]
 
 
+def test_processes_that_compile_and_that_compute_cells_know_one(installed: Path) -> None:
+    """Neither imports the package before it is handed a stage with its controller."""
+    bandwidths = "controller.bandwidth=8 Hz, 9 Hz"
+    done = friso_command(installed, "map", "stage.toml", "--x", bandwidths, "--workers", "2", "--out", "m", "--json")
+    assert done.returncode == 0, done.stderr
+    outcomes = json.loads(done.stdout)["outcomes"]
+    assert sum(outcomes.values()) == 2
+    assert not outcomes.get("failed")
+
+
 @pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing")])
 def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str, tmp_path: Path) -> None:
     (tmp_path / "taken.py").write_text(LAW.replace("{name}", name))
