@@ -135,7 +135,7 @@ def identify(
     dt : str or float, optional
         Sample time, "1 ms" or a number [s], if a file does not contain it.
     axis : str, optional
-        "rotary" for angles, torques and moments of inertia; a stage tells it, too.
+        "rotary" for angles, torques and moments of inertia; a stage file may state this instead.
     predict : path or list of paths, optional
         Other logs, simulated with the identified stage.
     bandwidth : str or float, optional

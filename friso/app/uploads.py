@@ -31,7 +31,7 @@ class Uploads:
         OSError for one that cannot be written."""
         place = self.folder / str(next(self.numbers))  # several may come at the same time
         if len([*self.folder.iterdir()]) >= MOST_FILES:
-            raise InputError("file", f"more than {MOST_FILES} files", "a server that is started anew")
+            raise InputError("file", f"more than {MOST_FILES} files", "a new start of the server")
         plain = plain_name(name, "log")
         place.mkdir()
         size = 0

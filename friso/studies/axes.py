@@ -133,7 +133,7 @@ def _number(value: Any) -> float | None:
 def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
     match = _RANGE.fullmatch(text)
     if match is None:
-        raise InputError("", quoted(text), "FIRST..LAST:POINTS, with :log behind it if so wanted", RANGE_EXAMPLE)
+        raise InputError("", quoted(text), "FIRST..LAST:POINTS, optionally followed by :log", RANGE_EXAMPLE)
     first, last = reader.text(match["first"]), reader.text(match["last"])
     if not first < last:
         order = "empty" if first == last else "reversed"

@@ -222,7 +222,7 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
     if followed <= FIXED * went:
         return True, ()
     finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
-    return False, (f"{finding}; the deflection of the joint was measured all the same.",)
+    return False, (f"{finding}; the deflection of the joint was measured nevertheless.",)
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:

@@ -117,7 +117,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
     if abs(slip) * periods.count > SLIPPED:
-        text = f"a period has {periods.samples + slip:.7g} samples, since clocks differ: taken anew at whole ones"
+        text = f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
         warnings = (*warnings, text)
         record = _at_other_rate(record, 1 + slip / periods.samples)
         periods = find_periods(record.driving, periods.samples)
@@ -140,7 +140,7 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
     if not alike.all():
-        yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, in which the input is another"
+        yield f"{np.count_nonzero(~alike)} of {alike.size} periods left out, because their input differs"
     if first:
         yield f"the first {first} of {np.count_nonzero(alike)} periods left out as transient"
 

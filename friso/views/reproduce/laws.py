@@ -17,8 +17,8 @@ def laws_sentences(laws: ConclusionsByLaw) -> list[str]:
     """How many conclusions survive, which do not, and which laws cannot say since they keep too little."""
     count, of_one = len(laws.conclusions), [conclusion.claim.id for conclusion in laws.dependent]
     others = ", ".join(laws.laws[1:])
-    alike = f"{count - len(of_one)} of {count} conclusions are judged alike"
-    lines = [f"{alike} under every law that keeps what is measured ({others})."]
+    alike = f"{count - len(of_one)} of {count} conclusions have the same judgement"
+    lines = [f"{alike} under every law that preserves what is measured ({others})."]
     if of_one:
         lines.append(f"These depend on the law: {listed(of_one, 'and')}.")
     lines += [f"{law} does not keep {listed([SHOWN[k] for k in lost], 'and')}." for law, lost in laws.left_out.items()]
