@@ -29,7 +29,7 @@ HEADERS = {
 
 REFUSED = (
     "friso app answers only the browser that was opened with the address it printed: open that address. "
-    "One that was started anew has printed a new one.\n"
+    "After a restart the server prints a new one.\n"
 )
 
 

@@ -74,7 +74,7 @@ def read_log(
 def _undecided(proposal: Proposal) -> list[str]:
     """A line for each role that no channel has since several could."""
     return [
-        f"{role}: not assigned, because {' and '.join(channel.name for channel in channels)} are all candidates; to use one: "
+        f"{role}: several candidates ({', '.join(channel.name for channel in channels)}); to use one: "
         f"{option('--map', role, channels[0].name)}"
         for role, channels in proposal.rivals.items()
     ]

@@ -117,7 +117,9 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     warnings = periods.warnings
     slip = _slip(driving, periods.samples)
     if abs(slip) * periods.count > SLIPPED:
-        text = f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
+        text = (
+            f"a period has {periods.samples + slip:.7g} samples, because the clocks differ: resampled to whole periods"
+        )
         warnings = (*warnings, text)
         record = _at_other_rate(record, 1 + slip / periods.samples)
         periods = find_periods(record.driving, periods.samples)
