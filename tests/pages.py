@@ -22,7 +22,8 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
-        self.loads += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
+        addresses = [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
+        self.loads += [address for address in addresses if not address.startswith("#")]
 
     def handle_data(self, data: str) -> None:
         if self.tags[-1:] not in (["script"], ["style"]):

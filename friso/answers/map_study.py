@@ -28,9 +28,13 @@ from friso.studies.study import Study, study_of
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.studies.traces import Traces
     from friso.views.files import Content
 
 AXIS_EXAMPLE = 'masses.stage="0.2 kg..2 kg:41"'
+
+DRAWN = 4096
+"""Cells up to which a page holds the run of each of them."""
 
 BYTES = 8
 """Bytes of a number in a store, before they are compressed."""
@@ -154,8 +158,15 @@ def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content
     """The figure and the page of a map, beside its store."""
     from friso.views.map.page import map_files
 
-    files = map_files(runs, metric, f"friso simulate --cell {store} {{indices}}")
+    files = map_files(runs, metric, f"friso simulate --cell {store} {{indices}}", drawn_runs(study_of(runs)))
     return {_path_beside(store, form): content for form, content in files.items()}
+
+
+def drawn_runs(study: Study) -> Traces | None:
+    """The runs of the cells, for the page to draw; None of more than DRAWN."""
+    from friso.studies.traces import traces
+
+    return traces(study) if study.cells <= DRAWN else None
 
 
 def place_of_store(folder: str | os.PathLike[str]) -> Path:

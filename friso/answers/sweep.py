@@ -15,6 +15,7 @@ from friso.answers.map_study import (
     Varied,
     as_stored,
     coloured_by,
+    drawn_runs,
     export_files,
     own_views,
     place_of_store,
@@ -106,7 +107,7 @@ class SweepAnswer(Answer):
         from friso.views.map.page import map_files
 
         repeated = 'friso.simulate(runs.cell("{indices}"))'
-        files = map_files(self.result, self.metric, repeated) if self.drawable else {}
+        files = map_files(self.result, self.metric, repeated, drawn_runs(self.study)) if self.drawable else {}
         return {f"map.{form}": content for form, content in files.items()}
 
     def files_beside(self) -> Mapping[Path, Content]:

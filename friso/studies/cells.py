@@ -109,7 +109,7 @@ def run_cells(
     parts = list(by_words(stage, links, columns))
     for flat, cells in parts:
         table.invalidate(cells, flat)
-    for flat, cells, shape in _groups(parts, table.valid):
+    for flat, cells, shape in by_equations(parts, table.valid):
         for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
             table.write(cells[runs.numbers], measure_runs(runs.part(flat), runs), runs)
     if any(name in metrics for name in BY_ATTRACTORS):
@@ -133,7 +133,7 @@ def cell_attractors(
 
     The motion plays no part: of cells that differ in it alone one is surveyed.
     """
-    for flat, cells, shape in _groups(parts, chosen):
+    for flat, cells, shape in by_equations(parts, chosen):
         yield flat, cells, _once(flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
 
 
@@ -166,7 +166,7 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
     return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
 
 
-def _groups(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
+def by_equations(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
     """The cells that are chosen, shape (cells,), by the equations they need: their flat SI form, numbers, structure."""
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):

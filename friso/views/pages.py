@@ -18,6 +18,7 @@ from friso.version import VERSION
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Figure
 from friso.views.drawing.prefixes import listed
+from friso.views.glossary import Glossary
 
 if TYPE_CHECKING:
     from friso.stage import Stage
@@ -79,7 +80,8 @@ def script(name: str) -> Markup:
 
 
 def environment() -> Environment:
-    """The templates of friso/views/templates; texts are escaped, a name without a value is an error."""
+    """The templates of friso/views/templates, for one page: texts are escaped, a name without a value is an error,
+    and words of `explained` texts are linked to what the `glossary` says of them."""
     templates = Environment(
         loader=PackageLoader("friso.views"),
         autoescape=True,
@@ -88,6 +90,8 @@ def environment() -> Environment:
         finalize=_escaped_text,
     )
     templates.tests["starting"] = str.startswith
+    glossary = Glossary()
+    templates.filters["explained"], templates.globals["glossary"] = glossary.linked, glossary
     return templates
 
 

@@ -38,8 +38,7 @@ def init(
     overrides: Overrides = None,
     overwrite: Overwrite = False,
 ) -> None:
-    """Write a stage file to start from: a commented one, or with --from that of an axis in a drive's parameter file; or
-    with --spec a specification.
+    """Write a stage file to start from: a commented one, that of an axis of a drive (--from), or a specification.
 
     What a parameter file does not tell, of the machine above all, is asked for in one list; --set answers.
 

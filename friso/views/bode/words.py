@@ -27,6 +27,12 @@ BACKLASH = (
 )
 
 
+TARGET = (
+    "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself crosses 0 dB "
+    "where the table says, since friction, joint, sampling and delay are in it."
+)
+
+
 def sentences(bode: Bode) -> list[str]:
     """All that is said, in order."""
     return [*stability(bode), crossover_heading(bode), *crossovers(bode).values(), *caveats(bode)]
@@ -84,12 +90,13 @@ def crossovers(bode: Bode) -> dict[str, str]:
 
 
 def caveats(bode: Bode) -> list[str]:
-    """That a loop is looked at on one flank of a backlash; that stability does not go on for ever, where the search
-    found no end."""
+    """What a crossover is; that a loop is looked at on one flank of a backlash; that stability does not go on for ever,
+    where the search found no end."""
     ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
-    flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
+    remarks = [TARGET] if _crossing(bode) and bode.stage.controller.bandwidth_name == "crossover" else []
+    remarks += [BACKLASH] if structure(bode.stage.flat()).plays else []
     if not ends:
-        return flanks
+        return remarks
     drive = bode.stage.drive
     timed = drive is not None and drive.sample_time is not None
     causes = [] if timed else ["sampling (drive.sample_time)"]
@@ -97,7 +104,7 @@ def caveats(bode: Bode) -> list[str]:
     half = ", half the sampling frequency" if timed and _crossing(bode) else ""
     end, causes = with_unit(max(ends), _unit(bode)), listed([*causes, "modes"], "and")
     return [
-        *flanks,
+        *remarks,
         f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes}, which the "
         "stage file leaves out, set a lower limit.",
     ]

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.axis import unit_shown
+from friso.hunting.measures import BANDS
+from friso.views.check.traces import common_range
 from friso.views.drawing.colours import scale
 from friso.views.drawing.drawable import colour_prefix
 from friso.views.drawing.figure import Array, Cloud
@@ -17,14 +20,17 @@ from friso.views.map.words import CATEGORIES, variable, words_of
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.studies.traces import Traces
+
 MOST = 250_000  # cells in a page: more would take a browser seconds to open and to colour
 
 NONE = 255  # in bytes of codes: no category, the number counts
 
 
-def page_data(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Any]:
+def page_data(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> dict[str, Any]:
     """Everything the page's script reads, ready for JSON; arrays are base64 of little-endian numbers, cell by cell in
-    the order of the axes, the last one fastest. Raises ValueError as `look` and `axes_of` do."""
+    the order of the axes, the last one fastest. `drawn`: the runs of all cells. Raises ValueError as `look` and
+    `axes_of` do."""
     axes = axes_of(runs)
     sampled = SAMPLE in runs.dims
     chosen = picked(runs)
@@ -38,6 +44,7 @@ def page_data(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Any]:
         "axes": [_axis(axis, positions) for axis, positions in zip(axes, cells.positions(), strict=True)],
         "order": [axes.index(axis) for axis in order],
         "variables": [_coloured(runs, name, cells) for name in metrics(runs)],
+        "lines": None if drawn is None else _lines(drawn, runs, cells),
         "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
     }
 
@@ -69,6 +76,28 @@ class _Cells:
         """The values of the picked cells, shape (cells,)."""
         dims = (SAMPLE,) if self.sampled else tuple(axis.key for axis in self.axes)
         return np.asarray(array.transpose(*dims).values)[np.ix_(*self.indices())].ravel()
+
+
+FINEST = 2 * min(BANDS)
+"""The least range [m] over which a run is drawn."""
+
+HIGHEST = 250
+"""The largest of the bytes that stand for the heights of a drawn run; 255 stands for none."""
+
+
+def _lines(drawn: Traces, runs: xr.Dataset, cells: _Cells) -> dict[str, Any]:
+    """The runs as lines: for each the range that shows what it does at its end, and heights in bytes, 0 to HIGHEST from
+    half a range below it to half a range above it, where lines are cut."""
+    outcome = runs["outcome"]
+    of_cell = cells.take(outcome.copy(data=np.arange(outcome.size).reshape(outcome.shape)))
+    deviations, late = drawn.deviations[of_cell], drawn.late[of_cell]
+    time = np.linspace(0.0, drawn.duration, deviations.shape[1])
+    ends = [common_range([line[time >= start]], FINEST) for line, start in zip(deviations, late, strict=True)]
+    low, high = np.array([end or (-FINEST, FINEST) for end in ends]).T[:, :, None]
+    shares = ((deviations - low) / (high - low) + 0.5) / 2
+    heights = np.where(np.isnan(shares), NONE, np.clip(np.round(HIGHEST * shares), 0, HIGHEST)).astype(np.uint8)
+    ranges = {"low": _base64(low.astype("<f4")), "high": _base64(high.astype("<f4"))}
+    return {"duration": drawn.duration, "unit": unit_shown("m"), "heights": _base64(heights), **ranges}
 
 
 def _axis(axis: CellAxis, positions: np.ndarray) -> dict[str, Any]:

@@ -20,23 +20,26 @@ from friso.views.pages import Report, print_image, script
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.studies.traces import Traces
+
 FORMS = (*matplotlib_renderer.FORMATS, "html")
 """Suffixes of the files of a map."""
 
 
-def map_files(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Content]:
-    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` as in
-    `map_html`."""
+def map_files(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None) -> dict[str, Content]:
+    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` and `drawn`
+    as in `map_html`."""
     figure = map_figure(runs, metric)
     files: dict[str, Content] = {form: partial(matplotlib_renderer.save, figure) for form in FORMS[:-1]}
-    return {**files, FORMS[-1]: map_html(runs, metric, rerun)}
+    return {**files, FORMS[-1]: map_html(runs, metric, rerun, drawn)}
 
 
-def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
+def map_html(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> str:
     """The whole page of the runs of a sweep, which opens with the variable `metric`.
 
-    `rerun`: the command that repeats one run, with {indices} where the indices of its cell go, in the order of the
-    axes: "friso simulate --cell map.zarr {indices}". Raises ValueError where that is missing, and as `map_figure`.
+    `drawn`: the runs of all cells, in C order; the page draws that of a cell that is chosen. `rerun`: the command that
+    repeats one run, with {indices} where the indices of its cell go, in the order of the axes: "friso simulate --cell
+    map.zarr {indices}". Raises ValueError where that is missing, and as `map_figure`.
     """
     if "{indices}" not in rerun:
         raise ValueError(
@@ -54,7 +57,7 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
             "verification": verification(runs),
             "facts": _facts(runs, metric),
             "thinned": _thinned(runs),
-            "data": packed_json(page_data(runs, metric, rerun)),
+            "data": packed_json(page_data(runs, metric, rerun, drawn)),
             "figure": figure,
             "printed": print_image(replace(figure, note="")),
             "script": script("map"),

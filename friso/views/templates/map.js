@@ -1,7 +1,8 @@
 "use strict";
 (async () => {
   const data = JSON.parse(await unpacked(document.getElementById("data")));
-  const NONE = 255; // no kind: the number counts
+  const NONE = 255; // no kind: the number counts; no height: the run has ended
+  const HIGHEST = 250; // heights from half a range below it to half a range above
   const GREY = "#767676", INK = "#222222";
   const plot = document.getElementById("plot");
 
@@ -11,6 +12,10 @@
     item.numbers = new Float32Array(bytes(item.numbers).buffer);
   }
   for (const item of data.texts) item.codes = new Uint32Array(bytes(item.codes).buffer);
+  if (data.lines) {
+    data.lines.heights = bytes(data.lines.heights);
+    for (const end of ["low", "high"]) data.lines[end] = new Float32Array(bytes(data.lines[end]).buffer);
+  }
 
   // Axes: of a map two, then those with a control; points (samples, or a single axis) stand by themselves.
   const points = data.sampled || data.axes.length === 1;
@@ -23,8 +28,8 @@
   const cellOf = (where) => where.reduce((cell, place, i) => cell * sizes[i] + place, 0);
   const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
   const labelled = (item) => (item.unit ? `${item.label} [${item.unit}]` : item.label);
-  const six = (value) => String(Number(value.toPrecision(6)));
-  const withUnit = (value, unit) => (unit ? `${six(value)} ${unit}` : six(value));
+  const rounded = (value) => String(Number(value.toPrecision(4)));
+  const withUnit = (value, unit) => (unit ? `${rounded(value)} ${unit}` : rounded(value));
   const valueAt = (axis, place) =>
     axis.words.length ? axis.words[axis.values[place]] : withUnit(axis.values[place], axis.unit);
 
@@ -188,6 +193,7 @@
     const cell = data.sampled ? at[0] : cellOf(at);
     const indices = data.indices.map((places, i) => places[at[i]]);
     element("h2", section, data.sampled ? `Sample ${indices[0]}` : `Cell ${indices.join(" ")}`);
+    drawRun(section, cell);
     const body = element("tbody", element("table", section));
     const row = (name, text) => {
       const line = element("tr", body);
@@ -203,6 +209,27 @@
       row(item.label, Number.isFinite(value) ? withUnit(value, item.unit) : kind);
     }
     showRerun(section, data.rerun.split("{indices}").join(indices.join(" ")));
+  }
+
+  // The run of a cell over the whole of it, at the scale of what it does at its end.
+  function drawRun(section, cell) {
+    const lines = data.lines;
+    const count = lines ? lines.heights.length / lines.low.length : 0;
+    const heights = lines ? lines.heights.subarray(cell * count, (cell + 1) * count) : [];
+    if (heights.every((height) => height === NONE)) return;
+    const [low, high] = [lines.low[cell], lines.high[cell]];
+    const [factor, prefix] = [[1e9, "n"], [1e6, "\u00b5"], [1e3, "m"], [1, ""]].find(([f]) => Math.max(Math.abs(low), Math.abs(high)) * f < 1000) || [1, ""];
+    const y = Array.from(heights, (height) => (height === NONE ? null : factor * (low + (2 * height / HIGHEST - 0.5) * (high - low))));
+    const x = y.map((_, i) => (lines.duration * (i + 0.5)) / count);
+    const style = { showline: true, linecolor: GREY, ticks: "outside", tickcolor: GREY, zerolinecolor: GREY, gridcolor: "#e3e3e3" };
+    const layout = { template: "none", margin: { l: 72, r: 14, t: 10, b: 44 }, height: 230, showlegend: false,
+      font: { family: "system-ui, sans-serif", size: 12, color: INK },
+      xaxis: { ...style, title: { text: "Time [s]", standoff: 6 }, range: [0, lines.duration] },
+      yaxis: { ...style, title: { text: `Deviation [${prefix}${lines.unit}]`, standoff: 8 }, range: [factor * low, factor * high] } };
+    const line = { type: "scatter", mode: "lines", x, y, line: { color: "#0072B2", width: 1.4 }, hoverinfo: "skip" };
+    const picture = element("div", element("figure", section));
+    Plotly.newPlot(picture, [line], layout, { displayModeBar: false, responsive: true });
+    element("p", section, "The deviation of the position from its reference, at the scale of what the run does at its end; the move itself is cut off.").className = "caption";
   }
 
   function showRerun(section, command) {

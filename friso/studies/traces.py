@@ -1,0 +1,72 @@
+"""Runs of cells as lines to draw: how far each position is from its reference, the extremes of short times."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.engine.batch import run_chunks
+from friso.engine.kernel import Kernel, kernel
+from friso.equations import motion
+from friso.hunting.measures import measuring_options
+from friso.studies.cells import allowed_cells, by_equations, by_words
+from friso.studies.study import Study
+
+BINS = 150
+"""Pieces of a run of which the extremes are kept: a drawn line of as many points is a few hundred pixels wide."""
+
+IN_BIN = 20
+"""Samples of each of them."""
+
+CHUNK = 128
+"""Runs whose samples are held at once."""
+
+
+@dataclass(frozen=True)
+class Traces:
+    """How far positions are from their references [m]: `deviations`, shape (cells, 2 BINS), the two extremes of each
+    of the BINS pieces of `duration` [s] as they follow each other, NaN where a run has ended; and `late`, shape
+    (cells,), the time [s] from which on a run shows what it does at its end: half of what follows its last corner."""
+
+    deviations: np.ndarray
+    late: np.ndarray
+    duration: float
+
+
+def traces(study: Study) -> Traces:
+    """The runs of all cells of a study once more, at its tolerance. Cells that no stage may have are NaN throughout."""
+    columns = study.columns(np.arange(study.cells))
+    parts = list(by_words(study.stage, study.links, columns))
+    allowed = allowed_cells(study.stage, study.links, columns)
+    duration = max(float(np.max(flat["motion.duration"])) for flat, _ in parts)
+    interval = duration / (BINS * IN_BIN)
+    options = replace(measuring_options(study.rtol), interval=interval, chunk=CHUNK)
+    time = np.arange(BINS * IN_BIN) * interval
+    drawn = Traces(np.full((study.cells, 2 * BINS), np.nan), np.zeros(study.cells), duration)
+    for flat, cells, shape in by_equations(parts, allowed):
+        form = kernel(shape)
+        for runs in run_chunks(form, flat, len(cells), options):
+            for number, states in zip(runs.numbers, runs.results.samples, strict=True):
+                one = {key: value[number] if np.ndim(value) else value for key, value in flat.items()}
+                drawn.deviations[cells[number]] = _extremes(_deviation(form, one, states, time))
+                end, corner = float(one["motion.duration"]), float(motion.last_corner(one))
+                drawn.late[cells[number]] = (end + (corner if corner < 0.9 * end else 0.0)) / 2
+    return drawn
+
+
+def _deviation(form: Kernel, flat: Mapping[str, Any], states: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Position minus reference [m] at the times; NaN beyond what was sampled."""
+    deviation = np.full(time.shape, np.nan)
+    sampled = states[: len(time), form.position]
+    deviation[: len(sampled)] = sampled - motion.reference(flat, time[: len(sampled)])
+    return deviation
+
+
+def _extremes(values: np.ndarray) -> np.ndarray:
+    """The least and the largest value of each piece, as they follow each other; NaN where a piece is not complete."""
+    pieces = values.reshape(BINS, IN_BIN)
+    places = np.sort(np.stack([pieces.argmin(axis=1), pieces.argmax(axis=1)], axis=1), axis=1)
+    return np.take_along_axis(pieces, places, axis=1).ravel()
