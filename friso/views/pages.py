@@ -68,8 +68,9 @@ class Report:
         """The page: it opens offline, prints, and is the same bytes on every run."""
         figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
         scripts = plotly_renderer.script() if figures or self.scripted else None
-        values: dict[str, Any] = {"figures": figures, "plotly": scripts, "drawing": script("page")}
+        values: dict[str, Any] = {"figures": figures, "plotly": scripts, "page_script": script("page")}
         values |= {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
+        assert not values.keys() & self.values.keys()  # a value of a command's page may not stand in for these
         template = environment().select_template([f"{self.command}.html", "page.html"])
         return template.render(**{**values, **CONTENTS, **self.values})
 
