@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 import struct
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -30,13 +29,13 @@ def frame(value: Any) -> bytes:
 def figure_on_page(figure: Figure, narrow: bool = False) -> dict[str, Any]:
     """A figure as a page draws it: name, title, caption, and what plotly takes; on a narrow page, panels one below the
     other."""
-    if narrow and not any(panel.coloured for panel in figure.panels):
-        figure = replace(figure, columns=1)
+    of_maps = any(panel.coloured for panel in figure.panels)
+    drawn = plotly_renderer.narrow_parts if narrow and not of_maps else plotly_renderer.parts
     return {
         "name": figure.name,
         "title": figure.title,
         "caption": figure.caption,
-        **plotly_renderer.parts(figure),
+        **drawn(figure),
     }
 
 

@@ -28,8 +28,8 @@ BACKLASH = (
 
 
 TARGET = (
-    "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself crosses 0 dB "
-    "where the table says, since friction, joint, sampling and delay are in it."
+    "The crossover that is set is the target of van Dijk's rules, for the tuned mass alone; the loop itself crosses "
+    "0 dB where the table says, since friction, joint, sampling and delay are in it."
 )
 
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 import base64
 import html
 import math
-from dataclasses import replace
+import textwrap
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,9 @@ from friso.views.drawing.figure import GREY, INK, Axis, Band, Figure, Markers, P
 from friso.views.drawing.packing import packed, packed_json
 from friso.views.drawing.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
 
-HEADER = 54  # [px] title and legend above the axes
+WIDE, NARROW = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
+TITLE, KEY_ROW, SPACE = 17, 19, 18  # [px] a line of the title, a row of the legend, and what lies about them
+TITLE_LETTER, KEY_LETTER, KEY_MARK = 7.6, 6.6, 45  # [px] one letter of each, and the sign of a legend's entry
 PLOT = 230  # [px] height of the axes
 MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: both axes matter equally
 EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
@@ -47,12 +50,12 @@ def script() -> str:
 
 
 def fragment(figure: Figure) -> str:
-    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it; for panels side by
-    side also the layout on a narrow screen, one below the other."""
+    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it; but for maps also
+    the layout on a narrow screen."""
     drawn = render(figure)
     parts = {**_single(drawn.to_plotly_json()), "config": _CONFIG}
-    if figure.columns > 1 and not any(panel.coloured for panel in figure.panels):
-        parts["narrow"] = _single(render(replace(figure, columns=1)).to_plotly_json())["layout"]
+    if not any(panel.coloured for panel in figure.panels):
+        parts["narrow"] = _single(_checked(narrow_parts(figure)).to_plotly_json())["layout"]
     return (
         f'<div id="figure-{figure.name}" style="height: {drawn.layout.height}px"></div>\n'
         f'<script type="application/gzip" class="figure">{packed_json(parts)}</script>'
@@ -73,16 +76,27 @@ def _single(part: Any) -> Any:
 
 def render(figure: Figure) -> go.Figure:
     """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
-    plain = parts(figure)
+    return _checked(parts(figure))
+
+
+def _checked(plain: dict[str, Any]) -> go.Figure:
+    """What plotly draws as a figure of its own, which has checked it."""
     return go.Figure(plain["data"], {"template": "none", **plain["layout"]})
 
 
-def parts(figure: Figure) -> dict[str, Any]:
+def narrow_parts(figure: Figure) -> dict[str, Any]:
+    """The same for a narrow screen: panels one below the other."""
+    return parts(replace(figure, columns=1), NARROW)
+
+
+def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
     """What plotly draws, traces and layout, as plain dictionaries that hold NumPy arrays; not checked by plotly, which
-    takes ten times as long as to make them."""
+    takes ten times as long as to make them. `width`: the least [px] that there is for the axes of all columns."""
     prepared = drawable(figure)
-    plot = _plot_height(prepared)
-    row = HEADER + plot + FOOTER
+    plot = _plot_height(prepared, width)
+    heads = [_Head.of(panel, width // prepared.columns) for panel in prepared.panels]
+    header = max(head.height for head in heads)
+    row = header + plot + FOOTER
     height = row * prepared.rows
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
     below, legend, note = footer(prepared, key)
@@ -99,22 +113,58 @@ def parts(figure: Figure) -> dict[str, Any]:
     with_bar, shared_bar = bar_panels(prepared.panels)
     for number, panel in enumerate(prepared.panels):
         top = height - (number // prepared.columns) * row
-        y_domain = ((top - HEADER - plot) / height, (top - HEADER) / height)
+        y_domain = ((top - header - plot) / height, (top - header) / height)
         x_domain = _columns(number % prepared.columns, prepared.columns)
         bar = None
         if shared_bar and number in with_bar:
-            bar = {"x": 1.0, "y": (FOOTER + height - HEADER) / 2 / height, "len": 1 - (FOOTER + HEADER) / height}
+            bar = {"x": 1.0, "y": (FOOTER + height - header) / 2 / height, "len": 1 - (FOOTER + header) / height}
         elif number in with_bar:
             x_domain = (x_domain[0], x_domain[1] - BAR)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
-        _add_panel(layout, panel, number, x_domain, y_domain, HEADER / height, links)
+        _add_panel(layout, panel, number, x_domain, y_domain, links)
+        layout["annotations"].append(heads[number].title(x_domain[0], y_domain[1]))
         traces += _traces(panel, number, bar)
     return {"data": traces + key_traces(prepared, key), "layout": layout}
 
 
-def _plot_height(figure: Figure) -> int:
+@dataclass(frozen=True)
+class _Head:
+    """What stands above the axes of a panel: the lines of its title, and below them the rows of its legend."""
+
+    lines: tuple[str, ...]
+    rows: int
+
+    @classmethod
+    def of(cls, panel: Panel, width: int) -> _Head:
+        """As title and legend are broken at this width [px]: entries stand in columns as wide as the longest."""
+        labels = _labels(panel)
+        entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
+        columns = max(1, int(width / entry))
+        lines = textwrap.wrap(panel.title, int(width / TITLE_LETTER)) or [""]
+        return cls(tuple(lines), max(1, math.ceil(len(labels) / columns)))
+
+    @property
+    def height(self) -> int:
+        """Of all of it [px]."""
+        return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
+
+    def title(self, left: float, top: float) -> dict[str, Any]:
+        """The title as plotly takes it, above axes that begin and end there, in shares of the figure."""
+        text = "<br>".join(map(html.escape, self.lines))
+        place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
+        above = {"yshift": KEY_ROW * self.rows + SPACE - 4, "align": "left"}
+        return {"text": f"<b>{text}</b>", "showarrow": False, "font": {"size": 13}, **place, **above}
+
+
+def _labels(panel: Panel) -> list[str]:
+    """The entries of the legend of a panel: none where there is a single one, or where colours tell numbers."""
+    labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers) if item.label]
+    return labels if len(labels) > 1 and not panel.coloured else []
+
+
+def _plot_height(figure: Figure, width: int) -> int:
     if any(panel.equal for panel in figure.panels):
-        return EQUAL_PLOTS.get(figure.columns, PLOT)
+        return min(EQUAL_PLOTS.get(figure.columns, PLOT), max(width, PLOT))
     mapped = any(panel.coloured for panel in figure.panels)
     return MAP_PLOTS.get(figure.columns, PLOT) if mapped else PLOT
 
@@ -132,10 +182,9 @@ def _add_panel(
     number: int,
     x_domain: tuple[float, float],
     y_domain: tuple[float, float],
-    header: float,
     links: dict[Axis, str],
 ) -> None:
-    """Axes, legend and title of one panel; panels with equal x axes are zoomed together."""
+    """Axes and legend of one panel; panels with equal x axes are zoomed together."""
     suffix = _suffix(number)
     shape = {"constrain": "domain"} if panel.equal else {}
     x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
@@ -153,19 +202,6 @@ def _add_panel(
         "yanchor": "bottom",
         "bgcolor": "rgba(0,0,0,0)",
     }
-    layout["annotations"].append(
-        {
-            "text": f"<b>{html.escape(panel.title)}</b>",
-            "x": x_domain[0],
-            "xref": "paper",
-            "xanchor": "left",
-            "y": y_domain[1] + header * 0.62,
-            "yref": "paper",
-            "yanchor": "bottom",
-            "showarrow": False,
-            "font": {"size": 13},
-        }
-    )
 
 
 def _axis(axis: Axis) -> dict[str, Any]:
@@ -197,8 +233,7 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     """What is drawn in a panel, maps first, in the order of `drawable`."""
     suffix = _suffix(number)
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
-    count = sum(bool(item.label) for item in (*panel.bands, *panel.series, *panel.markers))
-    key = count > 1 and not panel.coloured
+    key = bool(_labels(panel))
     named = place | {"legend": f"legend{suffix}"}
     return [
         *coloured_traces(panel, place, bar),
