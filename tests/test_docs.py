@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 import friso
+from friso.views.glossary import Glossary, entries
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -105,8 +106,16 @@ def test_every_public_function_is_on_its_page() -> None:
 
 @pytest.mark.parametrize("word", WORDS)
 def test_the_glossary_explains(word: str) -> None:
-    terms = re.findall(r"^\| ([^|]+) \|", (DOCS / "glossary.md").read_text(encoding="utf-8"), flags=re.MULTILINE)
-    assert any(word.lower() in term.lower() for term in terms)
+    assert any(word.lower() in explained for explained in entries())
+
+
+def test_words_are_linked_where_they_first_stand_on_a_page() -> None:
+    glossary = Glossary()
+    text = glossary.linked("Folds & multipliers; a fold, <b>")
+    assert [entry.name for entry in glossary.used.values()] == ["fold", "multiplier"]
+    assert text.count("<a ") == 2
+    assert text.startswith('<a class="word" href="#word-fold"')
+    assert text.endswith("; a fold, &lt;b&gt;")
 
 
 @pytest.fixture(scope="module")
