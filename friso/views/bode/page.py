@@ -8,7 +8,7 @@ from friso.frequency.bode import Bode
 from friso.views.bode.figures import bode_figures
 from friso.views.bode.states import shown_states
 from friso.views.bode.table import rows
-from friso.views.bode.words import caveats, crossover_heading, crossovers, stability
+from friso.views.bode.words import caveats, crossover_heading, crossover_meaning, crossovers, stability
 from friso.views.check.cases import COLOURS
 from friso.views.drawing.figure import GREEN, VERMILLION, Figure
 from friso.views.files import Content, pictures
@@ -38,7 +38,7 @@ def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:
         sentences=further,
         heading=crossover_heading(bode),
         crossovers=[(COLOURS[name], sentence) for name, sentence in crossovers(bode).items()],
-        caveats=caveats(bode),
+        caveats=[*crossover_meaning(bode), *caveats(bode)],
         columns=states,
         rows=rows(states),
         computed=f" from the equations of the simulation, linearised in {len(bode.scan.members)} states. {DEFINITIONS}",

@@ -35,7 +35,8 @@ TARGET = (
 
 def sentences(bode: Bode) -> list[str]:
     """All that is said, in order."""
-    return [*stability(bode), crossover_heading(bode), *crossovers(bode).values(), *caveats(bode)]
+    limits = [crossover_heading(bode), *crossovers(bode).values()]
+    return [*stability(bode), *limits, *crossover_meaning(bode), *caveats(bode)]
 
 
 def stability(bode: Bode) -> list[str]:
@@ -89,14 +90,18 @@ def crossovers(bode: Bode) -> dict[str, str]:
     return {name: f"{labels[name]}: {_limits(bode, name)}" for name in bode.limits}
 
 
+def crossover_meaning(bode: Bode) -> list[str]:
+    """What the crossover is that a stage file states: not where the loop crosses 0 dB."""
+    return [TARGET] if _crossing(bode) and bode.stage.controller.bandwidth_name == "crossover" else []
+
+
 def caveats(bode: Bode) -> list[str]:
-    """What a crossover is; that a loop is looked at on one flank of a backlash; that stability does not go on for ever,
-    where the search found no end."""
+    """That a loop is looked at on one flank of a backlash; that stability does not go on for ever, where the search
+    found no end."""
     ends = {limits.searched[1] for limits in bode.limits.values() if limits.open_ended}
-    remarks = [TARGET] if _crossing(bode) and bode.stage.controller.bandwidth_name == "crossover" else []
-    remarks += [BACKLASH] if structure(bode.stage.flat()).plays else []
+    flanks = [BACKLASH] if structure(bode.stage.flat()).plays else []
     if not ends:
-        return remarks
+        return flanks
     drive = bode.stage.drive
     timed = drive is not None and drive.sample_time is not None
     causes = [] if timed else ["sampling (drive.sample_time)"]
@@ -104,7 +109,7 @@ def caveats(bode: Bode) -> list[str]:
     half = ", half the sampling frequency" if timed and _crossing(bode) else ""
     end, causes = with_unit(max(ends), _unit(bode)), listed([*causes, "modes"], "and")
     return [
-        *remarks,
+        *flanks,
         f"The loop is still stable at {end}{half}, where the search ended; on the real machine {causes}, which the "
         "stage file leaves out, set a lower limit.",
     ]
