@@ -1,6 +1,7 @@
 """Kernels of the test run are compiled into a folder of its own, which its worker processes share; each of these has a
 core to itself, so that its BLAS takes no more."""
 
+import gc
 import os
 import shutil
 import signal
@@ -36,6 +37,12 @@ def pytest_configure(config: pytest.Config) -> None:
         signal.signal(signal.SIGHUP, signal.SIG_DFL)
     if FOLDER not in os.environ:
         os.environ[FOLDER] = os.environ[MADE] = tempfile.mkdtemp(prefix="friso-tests-")
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """What is imported by now stays: looking through it for garbage, again and again, takes a twentieth of the time."""
+    gc.freeze()
+    gc.set_threshold(20_000, 20, 10)
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
