@@ -143,7 +143,7 @@ def _laid_out(figure: Figure) -> Canvas:
         canvas = render(figure)
         if engine := canvas.get_layout_engine():
             engine.execute(canvas)
-        canvas.set_layout_engine("none")
+        canvas.set_layout_engine(None)  # with any, each format is drawn twice
         last = _last["canvas"] = (figure, canvas)
     return last[1]
 
