@@ -52,8 +52,8 @@ def raising() -> Iterator[None]:
     finally:
         _raising = False
         no_signal_later()
-        sys.unraisablehook = ignored
         if not _IS_COMMAND:  # which ends now, and is not to be interrupted in that
+            sys.unraisablehook = ignored
             _came.clear()
             for number, handler in before.items():
                 signal.signal(number, handler)
@@ -99,10 +99,10 @@ def _arrived(number: int, frame: FrameType | None) -> None:
 
 def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
     """Python ignores what is raised while an object goes (a finalizer, the callback of a weak reference), and prints a
-    traceback: a KeyboardInterrupt is raised again instead."""
+    traceback: a KeyboardInterrupt is raised again instead, and of what was cut short by one nothing is said."""
     if _raising and isinstance(what.exc_value, KeyboardInterrupt):
         signal_later(_AGAIN, _arrived)
-    else:
+    elif not came():
         otherwise(what)
 
 

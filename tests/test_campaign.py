@@ -8,14 +8,14 @@ import pytest
 
 import friso
 from benchmarks.trust import campaign, commands
-from benchmarks.trust.arguments import ARGUMENTS, CALLS, LINES
+from benchmarks.trust.arguments import CALLS, LINES
 from benchmarks.trust.campaign import failure, run_part
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.readers import READERS
-from benchmarks.trust.writing import WRITING
 from friso.cli.command import COMMANDS as REGISTERED
 
 CASES = {
+    "app": 25,
     "arguments": 25,
     "options": 12,
     "binary-logs": 20,
@@ -27,7 +27,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", [*READERS, *ARGUMENTS, *WRITING])
+@pytest.mark.parametrize("name", [name for name in campaign.NAMES if name not in commands.COMMANDS])
 def test_light_cases_pass(name: str) -> None:
     assert run_part(name, 3, range(CASES.get(name, 100))).failures == []
 
@@ -50,7 +50,7 @@ def test_a_crash_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
         raise ZeroDivisionError("of case")
 
     assert failure("crash", crash, 1, 1) == "ZeroDivisionError: of case"
-    monkeypatch.setitem(WRITING, "crash", crash)
+    monkeypatch.setitem(campaign.CASES, "crash", crash)
     assert [number for number, _ in campaign.run_part("crash", 1, range(3)).failures] == [0, 1, 2]
 
 

@@ -28,6 +28,16 @@ def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.Mon
     assert str(cache_folder().parent) not in texts[False]
 
 
+def test_a_user_without_a_home_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none() -> Path:
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.setattr(Path, "home", none)
+    monkeypatch.setattr(doctor, "_running", lambda: "well")
+    monkeypatch.setattr(doctor, "_compiling", lambda: "well")
+    assert all(finding.works for finding in doctor.checks())
+
+
 def test_a_wrong_result_and_what_cannot_be_loaded_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,6 +20,7 @@ from friso.cli.terminal import Escaping, console
 from friso.escapes import escaped, one_line, table_cell
 from friso.studies.export import export
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Axis, Figure, Panel, Series
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -80,6 +81,11 @@ def test_a_picture_shows_what_a_text_is() -> None:
     ET.fromstring(matplotlib_renderer.image(figure, "svg"))  # what a control character would break
     page = plotly_renderer.fragment(figure)
     assert not steers(page + json.dumps(packed_values(page), ensure_ascii=False))
+
+
+def test_a_text_that_is_too_long_to_be_drawn_is_shortened() -> None:
+    figure = drawable(Figure("name", "x" * 10**6, "", ()))
+    assert len(figure.title) < 2000
 
 
 def test_a_table_for_a_spreadsheet_has_no_formulas(tmp_path: Path) -> None:

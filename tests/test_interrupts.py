@@ -89,6 +89,26 @@ def test_ctrl_c_while_an_object_goes_is_not_lost(capsys: pytest.CaptureFixture[s
     assert sys.unraisablehook is hook
 
 
+class Cut:
+    """Its finalizer stumbles over what an interrupt has cut short."""
+
+    def __del__(self) -> None:
+        raise ValueError("created in a different Context")
+
+
+def test_nothing_is_said_of_what_ctrl_c_has_cut_short(capfd: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(KeyboardInterrupt), interrupts.raising():
+        _stumble()
+    assert capfd.readouterr().err == ""
+
+
+def _stumble() -> None:
+    try:
+        signal.raise_signal(signal.SIGINT)
+    finally:
+        Cut()
+
+
 def _let_go_and_wait() -> None:
     Going()
     time.sleep(10)

@@ -5,6 +5,7 @@ import os
 import struct
 import sys
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import log_files
@@ -15,7 +16,7 @@ from hypothesis import strategies as st
 from refusals import Refused, Wording
 from scipy.io import savemat
 
-from friso.errors import InputError
+from friso.errors import InputError, LogError
 from friso.identification.logs import confined
 from friso.identification.logs import format as reading
 from friso.identification.logs.channel import Channel, ChannelTable
@@ -622,3 +623,26 @@ def test_a_column_of_forty_thousand_digits_is_left_out(tmp_path: Path, column: i
     others = {name: k for k, name in enumerate(("time", "position", "force")) if k != column}
     assert read.keys() == others.keys()
     assert all(np.array_equal(read[name], [float(row[k]) for row in rows]) for name, k in others.items())
+
+
+@pytest.mark.parametrize("filler", [" ", "\t", '"', ",", ";", "#", "/", "[", "("])
+def test_a_line_of_hundred_thousand_signs_takes_no_time(tmp_path: Path, filler: str) -> None:
+    """Which once took a time that grew with the square of their number: the file is read or refused."""
+    rows = "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(50))
+    long = filler * 100_000
+    for text in (
+        f"key: v{long}x\ntime [s],position [mm],force [N]\n{rows}",
+        f"{long}\ntime [s],position [mm],force [N]\n{rows}",
+        f"time [s],position{long}x [mm],force [N]\n{rows}",
+        f"time [s],position [mm],force [N]\n{rows}0.2,{long},3\n",
+    ):
+        (tmp_path / "log.csv").write_text(text)
+        with suppress(LogError):
+            read_table(tmp_path / "log.csv")
+
+
+@pytest.mark.parametrize("text", ["time [s],position{}\n0,1\n1,2\n", "0,1\n1,2\n2,{}\n", "Name,{}\n\nName,x\n0,1\n"])
+def test_a_cell_longer_than_csv_reads(tmp_path: Path, text: str) -> None:
+    (tmp_path / "log.csv").write_text(text.format("x" * 200_000))
+    with suppress(LogError):
+        read_table(tmp_path / "log.csv")

@@ -141,6 +141,13 @@ def test_a_file_that_friso_has_not_written_stays(
     assert (tmp_path / "out" / "figure.png").read_text() == "friso's"
 
 
+def test_unfinished_work_is_kept_nowhere_else(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / UNFINISHED).symlink_to(tmp_path)
+    with pytest.raises(InputError, match="link"):
+        OutputFolder("reproduce", tmp_path / "out", False)
+
+
 def test_overwriting_does_not_make_the_folder_friso_s(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     place(tmp_path, overwrite=True).write({"page.html": ""})

@@ -300,6 +300,11 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "negative": ("[JOINT_0]\nP = -50\n", "a gain of 0 or more"),
     "broken json": ('{"axis0": {"vel_integrator_gain": ', "not JSON"),
     "nested": ('{"axis0": "vel_integrator_gain", "x": ' + "[" * 100_000, "nested too deeply|not JSON"),
+    "empty lines": ("\n" * 1_000_000, "a file of another kind|an empty file"),
+    "long keys": (
+        json.dumps({"axis0": {"vel_integrator_gain": {"x" * 10_000: dict.fromkeys(map(str, range(99_000)), 0)}}}),
+        "a key of 10",
+    ),
     "old firmware": (
         '{"axis0": {"controller": {"config": {"pos_gain": 1, "vel_gain": 1, "vel_integrator_gain": 1}}}}',
         "0.5.1 to 0.5.6",

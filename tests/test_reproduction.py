@@ -29,6 +29,7 @@ from friso.hunting.margin import margin
 from friso.shares import share
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.moves_on_rails import distance
+from friso.studies.store_files import kept_arrays
 from friso.studies.thesis import (
     STUDIES,
     Evidence,
@@ -50,7 +51,7 @@ from friso.studies.thesis.experiments import BUILT as LOOPS_BUILT
 from friso.studies.thesis.gains import rig_gains
 from friso.studies.thesis.judges import design_rules
 from friso.studies.thesis.judges.shares import NARROW, WIDE
-from friso.studies.thesis.kept import Kept
+from friso.studies.thesis.kept import Kept, kept_findings
 from friso.studies.thesis.laws import conclusions_by_law
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
@@ -681,9 +682,14 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
     assert resumed.maps.keys() == {"friction", "isolator-friction"}
     assert (resumed.linear, resumed.experiments) == (None, None)
     assert [item.claim.id for item in resumed.verdicts if item.finding] == ["F15B"]
-    damaged = next((tmp_path / "kept").glob("*.json"))
-    damaged.write_text("[1, 2")
-    assert reproduce_document(reproduce(**{**orders, "draws": 1}, kept=kept))["claims"]
+    for file in [file for suffix in ("json", "npz") for file in [*(tmp_path / "kept").glob(f"*.{suffix}")][:2]]:
+        content = file.read_bytes()
+        others = next(other for other in file.parent.iterdir() if other.suffix == file.suffix and other != file)
+        for damaged in (content[:-2], content.replace(b"1", b"2", 1), b"[1, 2", others.read_bytes()):
+            file.write_bytes(damaged)
+            assert kept_arrays(file) is None
+            assert kept_findings(file) is None
+        file.write_bytes(content)
     kept.clear()
     assert kept.count == 0
 

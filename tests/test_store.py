@@ -10,8 +10,10 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -443,13 +445,44 @@ def test_nothing_is_written_where_a_link_in_a_store_leads(stored: Path, rig: Sta
 
 @pytest.mark.parametrize("name", ["../mine/.zattrs", "/mine/.zarray", "../mine", "peaks/../../.zarray"])
 def test_metadata_name_no_file_outside_their_store(stored: Path, rig: Stage, name: str) -> None:
+    with sealed_again(stored) as metadata:
+        metadata[name] = {"written": "by others"}
+    with pytest.raises(StoreError, match="damaged"):
+        sweep(rig, AXES, store=stored)
+
+
+@contextmanager
+def sealed_again(stored: Path) -> Iterator[dict[str, Any]]:
+    """The metadata of a store, to be changed as whoever knows friso can: the digest is that of what is changed."""
     document = json.loads((stored / ".zmetadata").read_text())
-    document["metadata"][name] = {"written": "by others"}
+    yield document["metadata"]
     entry = document["friso"]
     entry["sha256"] = digest([document["metadata"], {key: entry[key] for key in entry if key != "sha256"}])
     (stored / ".zmetadata").write_text(json.dumps(document))
-    with pytest.raises(StoreError, match="damaged"):
-        sweep(rig, AXES, store=stored)
+
+
+@pytest.mark.parametrize("name", ["joint.stroke", "peaks"])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"dtype": "|O", "filters": [{"id": "vlen-utf8"}, {"id": "pickle"}]},
+        {"compressor": {"id": "pickle"}},
+        {"dtype": "|S8"},
+        {"chunks": [10**12]},
+    ],
+)
+def test_arrays_that_friso_does_not_write_are_not_decoded(stored: Path, name: str, change: dict[str, Any]) -> None:
+    with sealed_again(stored) as metadata:
+        metadata[f"{name}/.zarray"] |= change
+    with pytest.raises(StoreError, match=r"\.zmetadata is damaged"):
+        read_store(stored)
+
+
+def test_an_axis_is_not_longer_than_what_is_there_of_it(stored: Path) -> None:
+    with sealed_again(stored) as metadata:
+        metadata["joint.stroke/.zarray"]["shape"] = [10**11]
+    with pytest.raises(StoreError, match=r"\.zmetadata is damaged"):
+        read_store(stored)
 
 
 def test_metadata_of_an_equal_number_of_another_kind_are_damaged(stored: Path) -> None:

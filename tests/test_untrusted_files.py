@@ -3,6 +3,8 @@
 import inspect
 import json
 import os
+import shlex
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -48,6 +50,34 @@ def test_a_text_file_has_a_largest_size_and_a_name_a_longest(tmp_path: Path) -> 
     for name, reason in (("huge.toml", "MB"), ("x" * 5000, "name")):
         with pytest.raises(InputError, match=reason):
             friso.load(tmp_path / name)
+
+
+def test_a_table_of_countless_keys_is_refused_at_once() -> None:
+    """For each of which the nearest known one would be looked for."""
+    text = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
+    keys = "".join(f"k{number} = 1\n" for number in range(50_000))
+    for place in ("", "[masses]\n"):
+        with pytest.raises(InputError, match="a table of 5000"):
+            friso.loads(text.replace(place, place + keys, 1))
+
+
+@posix
+def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
+    file = tmp_path / os.fsdecode(b"r\xffg.toml")
+    file.write_bytes((EXAMPLES / "lugre_stick_slip.toml").read_bytes())
+    done = friso_inside(tmp_path, "convert", file, "--friction", "gms", "--out", tmp_path / os.fsdecode(b"o\xff"))
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / os.fsdecode(b"o\xff") / "r_g_gms.toml").exists()
+
+
+@posix
+@pytest.mark.parametrize("arguments", [[], ["schema"]])
+@pytest.mark.parametrize("way", [">/dev/full", "<&- >&- 2>&-"])
+def test_where_nothing_can_be_printed_there_is_no_traceback(tmp_path: Path, arguments: list[str], way: str) -> None:
+    line = shlex.join([sys.executable, "-m", "friso.cli", *arguments])
+    done = subprocess.run(["sh", "-c", f"{line} {way}"], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    assert done.returncode in (0, 1, 2)
+    assert "Traceback" not in done.stderr
 
 
 def test_every_public_function_checks_its_arguments() -> None:

@@ -114,12 +114,12 @@ def arguments(rng: random.Random, folder: Path) -> None:
         return
     key, value = rng.choice(names), rng.choice((*VALUES, *TEXTS))
     what = f"{name}({key}={_shown(value)})"
-    with ready(folder), _nothing_computed(), redirect_stdout(StringIO()):
+    with ready(folder), nothing_computed(), redirect_stdout(StringIO()):
         before = _tree(folder)
         try:
             function(**{**sound, key: value})
         except InputError as error:
-            _assert_clear(what, str(error))
+            assert_clear(what, str(error))
             assert _tree(folder) == before, f"{what}: wrote {_tree(folder) - before}"
         except Computed:
             pass
@@ -138,7 +138,7 @@ def options(rng: random.Random, folder: Path) -> None:
     elif valued:
         line += [rng.choice(valued), text]
     what = _shown(line)
-    with ready(folder), _nothing_computed():
+    with ready(folder), nothing_computed():
         before = _tree(folder)
         try:
             status, err = _run(["friso", *line])
@@ -149,7 +149,7 @@ def options(rng: random.Random, folder: Path) -> None:
         assert status in (0, 1, 2), f"{what}: status {status}"
         assert "could not be completed" not in err, f"{what}: {err[:300]}"
         if status == 2:
-            _assert_clear(what, err)
+            assert_clear(what, err)
             assert _tree(folder) == before, f"{what}: refused, but wrote {_tree(folder) - before}"
 
 
@@ -163,7 +163,7 @@ def _run(line: list[str]) -> tuple[int, str]:
             return int(end.code or 0), err.getvalue()
 
 
-def _assert_clear(what: str, message: str) -> None:
+def assert_clear(what: str, message: str) -> None:
     """Raises AssertionError for a message that is none, or that is longer than anyone reads."""
     assert message.strip(), f"{what}: a refusal without words"
     longest = max(map(len, message.splitlines()))
@@ -186,7 +186,7 @@ def _valued_options() -> dict[str, list[str]]:
 
 
 @contextmanager
-def _nothing_computed() -> Iterator[None]:
+def nothing_computed() -> Iterator[None]:
     """Kernels are neither built nor loaded, and nothing is served: Computed is raised instead. Pictures are empty."""
 
     def computed(*_: object, **__: object) -> None:

@@ -20,6 +20,7 @@ import numpy as np
 from benchmarks.trust.arguments import ARGUMENTS
 from benchmarks.trust.commands import COMMANDS
 from benchmarks.trust.damage import damaged
+from benchmarks.trust.questions import questions
 from benchmarks.trust.readers import READERS
 from benchmarks.trust.writing import WRITING
 from friso.errors import InputError
@@ -31,11 +32,14 @@ Case = Callable[[random.Random, Path], None]
 """One case, which raises what it finds wrong: with its random numbers, in a folder of its own."""
 
 
-NAMES = (*READERS, *ARGUMENTS, *WRITING, *COMMANDS)
-"""The campaigns."""
+CASES: dict[str, Case] = {**ARGUMENTS, "app": questions, **WRITING, **COMMANDS}
+"""The campaigns but for those of `READERS`."""
 
-HEAVY = {"binary-logs": 8, "arguments": 8, "options": 32, "stores": 16, "store-faults": 32, "store-exchanges": 32,
-         "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
+NAMES = (*READERS, *CASES)
+"""All campaigns."""
+
+HEAVY = {"binary-logs": 8, "arguments": 8, "options": 32, "app": 8, "stores": 16, "store-faults": 32,
+         "store-exchanges": 32, "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """By how much fewer the cases of a campaign are whose cases take long."""
 
 
@@ -62,7 +66,7 @@ def run_part(name: str, seed: int, numbers: range, end: float = float("inf")) ->
 @cache
 def case_of(name: str) -> Case:
     """The case of a campaign."""
-    return WRITING.get(name) or ARGUMENTS.get(name) or COMMANDS.get(name) or reading(name)
+    return CASES.get(name) or reading(name)
 
 
 def failure(campaign: str, case: Case, seed: int, number: int) -> str | None:

@@ -18,7 +18,7 @@ from tempfile import mkdtemp
 
 import psutil
 
-from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC
+from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC, STICK_SLIP
 from friso.answers.drafts import DRAFTS
 from friso.answers.output_folder import MARKER, UNFINISHED, marked, write
 
@@ -32,8 +32,8 @@ QUICK: dict[str, list[str]] = {
     "simulate": ["simulate", RIG, *OUT],
     "flexure": ["flexure", LEAVES, *OUT],
     "convert": ["convert", RIG, "--friction", "gms", *OUT],
-    "export": ["export", "gains", RIG, "--to", "linuxcnc", "--set", "machine_unit=mm", "--set", "force_per_output=20 N",
-               *OUT],
+    "export": ["export", "gains", STICK_SLIP, "--to", "linuxcnc", "--set", "machine_unit=mm",
+               "--set", "force_per_output=20 N", *OUT],
     "logs": ["logs", "log.csv", *OUT],
     "init": ["init", "stage.toml"],
     "specification": ["init", "stage.toml", "--spec", RIG],

@@ -9,6 +9,7 @@ from pathlib import Path
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))
+STICK_SLIP = str(EXAMPLES / "lugre_stick_slip.toml")
 SPEC = str(EXAMPLES / "specs" / "thesis.toml")
 
 AXIS = str(EXAMPLES / "drives" / "linuxcnc_torque_axis.ini")

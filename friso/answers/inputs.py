@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from pathlib import Path
@@ -91,8 +92,8 @@ def correlations_of(source: StageLike, stage: Stage) -> Correlations:
 
 
 def stem_of(source: StageLike, usual: str = "stage") -> str:
-    """What files about a stage are called: the name of its file without the suffix."""
-    return usual if isinstance(source, Stage | Mapping) else Path(source).stem
+    """What files about a stage are called: the name of its file without the suffix, "_" for bytes that are no text."""
+    return usual if isinstance(source, Stage | Mapping) else re.sub("[\ud800-\udfff]", "_", Path(source).stem)
 
 
 def tolerance_of(value: str | float) -> float:

@@ -44,6 +44,8 @@ class OutputFolder:
         """Raises InputError where the command must not write there, or cannot."""
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
         refuse_place("--out", folder)
+        if self.unfinished.is_symlink():
+            raise InputError("--out", f"{folder}, where {UNFINISHED} is a link", "no link", f"rm {self.unfinished}")
         _check_writable(folder)
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)

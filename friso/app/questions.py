@@ -140,7 +140,7 @@ COARSE_TO_FINE = (6, 21, 41)
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """A map over two keys, coarse to fine; where the machine stands in it, and the pinned one."""
     options = asked.chosen("x", "y", "metric")
-    axes = {name: options.get(name, "") for name in ("x", "y")}
+    axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
     metric = options.get("metric", "outcome")
     stands = [("this machine", asked.machine.stage)]

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import io
 import logging
+import os
 import sys
 from contextvars import copy_context
-from typing import Annotated, Any, NoReturn
+from typing import Annotated, Any, NoReturn, TextIO
 
 import typer
 from typer.core import TyperGroup
@@ -81,14 +82,17 @@ def command_line() -> typer.Typer:
 
 def main() -> NoReturn:
     """Run the command line; wrong input ends in one message and status 2, never in a traceback."""
+    sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # None where the caller closed them
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
-    if len(sys.argv) == 1:
-        print(TOUR)
-        sys.exit(0)
     with escaping():
         sys.exit(_status())
+
+
+def _nowhere() -> TextIO:
+    """A stream that keeps nothing."""
+    return open(os.devnull, "w", encoding="utf-8")
 
 
 def _status() -> int:
@@ -117,6 +121,9 @@ def _run() -> int:
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     log.addHandler(messages)
     try:
+        if len(sys.argv) == 1:
+            print(TOUR)
+            return 0
         refuse_empty(sys.argv[1:])
         app = command_line()
         if {"-h", "--help"} & {*sys.argv[1:2]}:

@@ -82,10 +82,10 @@ def _with_answers(
 ) -> Stage:
     """The stage of the tables with the answers laid over them: those with a dot are keys of the stage."""
     source = (
-        f"Controller: {path.name}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "
+        f"Controller: {one_line(path.name)}, {axis.name}, by the formulas of {kind.firmware} ({kind.source}); "
         "machine: as given to friso init"
     )
-    tables: dict[str, Any] = {"name": f"{path.stem}, {axis.name}", "source": source}
+    tables: dict[str, Any] = {"name": one_line(f"{path.stem}, {axis.name}"), "source": source}
     tables |= {name: dict(table) for name, table in of_axis.tables.items()}
     for key, value in user_answers.items():
         table, dot, name = key.partition(".")

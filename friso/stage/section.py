@@ -46,6 +46,10 @@ def keys_below(flat: Mapping[str, Any], place: str) -> dict[str, Any]:
     return {key.removeprefix(f"{place}."): value for key, value in flat.items() if key.startswith(f"{place}.")}
 
 
+MOST_KEYS = 100
+"""Keys of a table at most, unknown ones too: for each of these the nearest known one is looked for."""
+
+
 class Section(BaseModel):
     """A table of a TOML file. Raises its `refusal` when it is made from wrong data."""
 
@@ -66,6 +70,9 @@ class Section(BaseModel):
         return section
 
     def _take(self, data: Mapping[str, Any], kind: AxisKind) -> None:
+        if len(data) > MOST_KEYS:
+            first = ", ".join(quoted(key) for key, _ in zip(data, range(3), strict=False))
+            raise self.refusal("", f"a table of {len(data)} keys: {first}, ...", f"at most {MOST_KEYS} keys")
         for key in data:
             if not isinstance(key, str):
                 raise self.refusal("", f"a key that is no text: {quoted(key)}", "keys of texts", '"stiffness"')

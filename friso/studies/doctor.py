@@ -148,4 +148,7 @@ def _stage() -> Stage:
 
 
 def _without_home(text: str, full_paths: bool) -> str:
-    return text if full_paths else text.replace(str(Path.home()), "~")
+    try:
+        return text if full_paths else text.replace(str(Path.home()), "~")
+    except RuntimeError:  # a user without a home has none to be left out
+        return text

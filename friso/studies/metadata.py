@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -26,6 +28,11 @@ _FILE, _OWN, _ATTRIBUTES = ".zmetadata", "friso", ".zattrs"
 
 _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w[\w.-]*/\d+")
 """Names of files beside the arrays and of those of axes: all of them in the store, whatever metadata of others say."""
+
+_KIND, _CODECS = re.compile(r"[<>|][bfiuU]([0-9]{1,4})"), {"blosc", "crc32"}
+"""Types of numbers and texts, with their size; codecs that only decode."""
+_CHUNK = 1 << 30
+"""Size of a chunk in memory at most: the longest axis has no larger one."""
 
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
@@ -153,8 +160,31 @@ def _mentions(file: Path, words: bytes) -> bool:
 
 
 def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
-    """Whether the files that metadata name are such as a store has: none is elsewhere."""
-    return all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group)
+    """Whether the files that metadata name are such as a store has, none elsewhere; the arrays hold numbers or texts as
+    friso writes them, for other codecs may run code; and all of each axis is there."""
+    if not all(name.fullmatch(file) for name, group in zip(_NAMES, (files, axes), strict=True) for file in group):
+        return False
+    try:
+        arrays = {name.rpartition("/")[0]: content for name, content in files.items() if name.endswith("/.zarray")}
+        indices = {name for name in arrays if files[f"{name}/.zattrs"]["_ARRAY_DIMENSIONS"] == [name]}
+        chunks = Counter(file.rpartition("/")[0] for file in axes)
+        return all(map(_is_plain, arrays.values())) and all(
+            chunks[name] == _chunks(arrays[name]) for name in indices | chunks.keys()
+        )
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
+        return False
+
+
+def _is_plain(array: Mapping[str, Any]) -> bool:
+    """Whether chunks decode to numbers or texts, compressed and checked as friso does, of a size that it writes."""
+    kind = _KIND.fullmatch(array["dtype"])
+    codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
+    return kind is not None and codecs <= _CODECS and int(kind[1]) * math.prod(array["chunks"]) <= _CHUNK
+
+
+def _chunks(array: Mapping[str, Any]) -> int:
+    """How many chunks an array has."""
+    return math.prod(-(-length // size) for length, size in zip(array["shape"], array["chunks"], strict=True))
 
 
 def _damaged(path: Path, damage: str) -> StoreError:

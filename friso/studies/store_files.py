@@ -9,8 +9,9 @@ import os
 import stat
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -42,6 +43,23 @@ def stored_arrays(file: Path) -> dict[str, np.ndarray] | None:
             return dict(arrays)
     except (OSError, ValueError, EOFError, KeyError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error):
         return None
+
+
+def kept_arrays(file: Path) -> dict[str, np.ndarray] | None:
+    """The arrays that `keep_arrays` wrote into this file; None where they are damaged, or another's."""
+    arrays = stored_arrays(file)
+    about = None if arrays is None else arrays.pop(_ABOUT, None)
+    return None if about is None or str(about) != file.name else arrays
+
+
+def keep_arrays(file: Path, arrays: Mapping[str, Any]) -> None:
+    """Keep arrays in an archive with the name of its file, which tells of one that is exchanged. Raises OSError."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with whole_file(file) as stream:
+        np.savez_compressed(stream, allow_pickle=False, **{**arrays, _ABOUT: np.array(file.name)})
+
+
+_ABOUT = "about"
 
 
 def put(file: Path, content: bytes) -> None:

@@ -65,7 +65,7 @@ HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforwa
 
 def recognises(name: str, text: str) -> bool:
     """By a section of a joint or an axis."""
-    return re.search(rf"^\s*\[{_AXIS}\]", text, re.MULTILINE) is not None
+    return re.search(rf"^[ \t]*\[{_AXIS}\]", text, re.MULTILINE) is not None
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:

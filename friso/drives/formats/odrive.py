@@ -29,7 +29,7 @@ RATE = 8000.0
 POSITION_CONTROL, PASSTHROUGH, AHEAD = 3, 1, (3, 5)
 """Values of control_mode and input_mode; `AHEAD`, those in which the drive feeds its own reference forward."""
 
-MOST_KEYS = 100_000
+MOST_KEYS, LONGEST_KEY = 100_000, 200
 
 OTHERS = frozenset(
     [
@@ -97,6 +97,8 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     waiting: list[tuple[str, Any]] = [("", document)]
     while waiting:
         place, entry = waiting.pop()
+        if len(place) > LONGEST_KEY:
+            raise InputError("", f"a key of {len(place)} characters", "a configuration as odrivetool writes it")
         if isinstance(entry, dict):
             waiting += [(f"{place}.{key}" if place else str(key), inner) for key, inner in entry.items()]
         else:

@@ -17,8 +17,10 @@ STEPS = frozenset(
      "samplingperiod", "interval", "timestep", "timeincrement", "deltat", "abtastzeit", "abtastintervall"}
 )  # fmt: skip
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
-_PAIR = re.compile(r"[\s#%*/\"]*(?P<key>[^:=;,\t\"]+?)\"?\s*[:=;,\t]\s*(?P<value>\S.*?)[\s;,\"]*")
-_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
+_BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
+"""What stands around a key and its value, and is no part of them."""
+_SEPARATOR = re.compile(r"[:=;,\t]\s*(?:(?<=\s)[:=;,])?")
+_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
@@ -38,14 +40,14 @@ class Preamble:
 def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Preamble:
     """What the lines above a table with columns of these names tell. Intervals that contradict each other are none."""
     lines = [line for line in lines if line.strip()]
-    pairs = [match for line in lines if (match := _PAIR.fullmatch(line))]
-    units = _row_of_units(lines, names, delimiter) or _units_by_name(pairs, names)
+    pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
+    units = _row_of_units(lines, names, delimiter) or _units_by_name(pairs.values(), names)
     read = [f"units from the lines above the table: {', '.join(units.values())}"] if units else []
     intervals, scalars = {}, {}
-    for pair in pairs:
-        name, unit = split_heading(pair["key"].strip())
+    for line, (stated, value) in pairs.items():
+        name, unit = split_heading(stated)
         key = re.sub(r"[\W\d_]+", "", name.lower())
-        amount = _AMOUNT.fullmatch(pair["value"]) if key in RATES | STEPS else None
+        amount = _AMOUNT.fullmatch(value) if key in RATES | STEPS else None
         if amount is None:
             continue
         if _GROUPED.fullmatch(amount["number"]):
@@ -53,13 +55,22 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
         number = float(amount["number"].replace(",", "."))
         seconds = _seconds(number, amount["unit"].strip("[]()") or unit)
         if seconds is not None:
-            intervals[pair.group().strip()] = seconds
+            intervals[line] = seconds
         else:
             scalars[name] = number
     if intervals and max(intervals.values()) <= min(intervals.values()) * (1 + 1e-9):
         line, interval = next(iter(intervals.items()))
         return Preamble(interval, scalars, units, (*read, f"sample time {interval:g} s, from the line {line!r}"))
     return Preamble(None, scalars, units, tuple(read))
+
+
+def _pair(line: str) -> tuple[str, str] | None:
+    """Key and value of a line that has both."""
+    line = line.lstrip(_BEFORE)
+    if (separator := _SEPARATOR.search(line)) is None:
+        return None
+    key, value = line[: separator.start()].rstrip().removesuffix('"').rstrip(), line[separator.end() :].rstrip(_BEHIND)
+    return (key, value) if key and value and '"' not in key else None
 
 
 def _seconds(number: float, unit: str) -> float | None:
@@ -73,9 +84,9 @@ def _seconds(number: float, unit: str) -> float | None:
 def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) -> dict[str, str]:
     """The units of columns where a line lists them, with or without a word for units in front."""
     for line in lines:
-        pair = _PAIR.fullmatch(line)
-        listed = pair is not None and pair["key"].strip().lower() in ("unit", "units", "einheit", "einheiten")
-        cells = re.split(r"[;,\t]|\s+", pair["value"]) if pair and listed else line.lstrip("#% ").split(delimiter)
+        key, value = _pair(line) or ("", "")
+        listed = key.lower() in ("unit", "units", "einheit", "einheiten")
+        cells = re.split(r"[;,\t]|\s+", value) if listed else line.lstrip("#% ").split(delimiter)
         cells = [cell for cell in cells if cell] if listed and len(cells) != len(names) else cells
         units = [cell.strip(' []()"') for cell in cells]
         stated = [unit for unit in units if unit and unit != "-"]
@@ -84,12 +95,12 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
     return {}
 
 
-def _units_by_name(pairs: Iterable[re.Match[str]], names: Sequence[str]) -> dict[str, str]:
+def _units_by_name(pairs: Iterable[tuple[str, str]], names: Sequence[str]) -> dict[str, str]:
     """The units of columns where lines tell them one by one: "position unit: mm", or "position: mm"."""
     plain = {name.lower(): name for name in names if name}
     units = {}
-    for pair in pairs:
-        key, unit = pair["key"].strip(), pair["value"].strip("[]() ")
+    for key, value in pairs:
+        unit = value.strip("[]() ")
         of_unit = _OF_UNIT.fullmatch(key)
         column = (of_unit["after"] or of_unit["before"]) if of_unit else key
         if column.lower() in plain and is_unit(unit):

@@ -89,10 +89,18 @@ def split_line(line: str, delimiter: str) -> list[str]:
     """The cells of a line, without quotes and blanks around; spaces inside brackets do not split."""
     if delimiter == " ":
         if '"' not in line:
-            line = re.sub(r"\s+(?=[\[(])", "\0", line.strip())  # "Time (s)" is one heading
+            line = re.sub(r"(?<!\s)\s+(?=[\[(])", "\0", line.strip())  # "Time (s)" is one heading
             return [cell.replace("\0", " ") for cell in line.split()]
-        return [cell for cell in next(csv.reader([line.strip()], delimiter=" ", skipinitialspace=True)) if cell]
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+        return [cell for cell in csv_cells(line.strip(), " ", skipinitialspace=True) if cell]
+    return [cell.strip() for cell in csv_cells(line, delimiter, skipinitialspace=True)]
+
+
+def csv_cells(line: str, delimiter: str, skipinitialspace: bool = False) -> list[str]:
+    """The cells of a line as CSV has them; the line itself where one is longer than Python's reader takes."""
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=skipinitialspace), [])
+    except csv.Error:
+        return [line]
 
 
 def is_number(cell: str, decimal: str) -> bool:
@@ -175,6 +183,6 @@ def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
     """The headings in a line; between spaces also names of several words, where each ends with its unit in brackets."""
     cells = split_line(line, delimiter)
     if delimiter == " " and len(cells) != columns:
-        named = re.findall(r"[^\[\]()]+[\[(][^\])]*[\])]", line)
+        named = re.findall(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\])]*[\])]", line)
         return [name.strip() for name in named] if len(named) == columns else cells
     return cells

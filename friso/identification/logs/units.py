@@ -49,9 +49,6 @@ _SPELLINGS = {
     "Newton": "N",
     "hz": "Hz",
 }
-_BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
-
-
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
     r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
@@ -70,7 +67,7 @@ _MEASURED_IN = {
 
 def spelled(text: str) -> str:
     """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none."""
-    text = re.sub(r"(?:\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
+    text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
     text = "" if text.lower() in ("none", "-", "n/a") else text
     parts = re.split(r"([*/· ])", text)
@@ -115,15 +112,12 @@ def split_heading(heading: str) -> tuple[str, str]:
     unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none). Without
     brackets a name may end with its unit, and keeps it: "angle_deg"."""
     heading = heading.strip()
-    match = _BRACKETS.fullmatch(heading)
-    if match is None or not match["name"]:
+    opening, closing = "[]" if heading.endswith("]") else "()"
+    name, bracket, inner = heading.removesuffix(closing).rpartition(opening)
+    if not (heading.endswith(closing) and bracket and name.strip()) or closing in inner:
         return heading, _last_part(heading)
-    square = match["square"]
-    if square is not None and not re.fullmatch(r"[\d:, ]*", square):
-        return match["name"], square.strip()
-    if match["round"] is not None and is_unit(match["round"]):
-        return match["name"], match["round"].strip()
-    return heading, ""
+    is_in = not re.fullmatch(r"[\d:, ]*", inner) if opening == "[" else is_unit(inner)
+    return (name.rstrip(), inner.strip()) if is_in else (heading, "")
 
 
 def _last_part(name: str) -> str:

@@ -20,9 +20,8 @@ from friso.hunting.edges import ROUNDS, Edges, concatenate_edges, find_edges
 from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
-from friso.studies.store_files import stored_arrays
+from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.version import VERSION
-from friso.whole_file import whole_file
 
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
 
@@ -124,14 +123,11 @@ class Keep:
         settings = (VERSION, _sources(), name, *boxes, ROUNDS)
         key = hashlib.sha256(repr(settings).encode()).hexdigest()[:16]
         path = self.folder / f"{key}.npz"
-        kept = stored_arrays(path)
+        kept = kept_arrays(path)
         if kept is not None and kept.keys() == {field.name for field in fields(Edges)}:
             return Edges(**kept)
         edges = make()
-        self.folder.mkdir(parents=True, exist_ok=True)
-        with whole_file(path) as file:
-            words = {"kind": edges.kind.astype(str)}
-            np.savez(file, allow_pickle=False, **(vars(edges) | words))
+        keep_arrays(path, vars(edges) | {"kind": edges.kind.astype(str)})
         return edges
 
 

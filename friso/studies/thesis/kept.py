@@ -15,12 +15,12 @@ import numpy as np
 
 from friso.engine.cache import code_digest, machine
 from friso.studies.cells import WORDS
-from friso.studies.store_files import put, stored, stored_arrays
+from friso.studies.metadata import digest
+from friso.studies.store_files import keep_arrays, kept_arrays, put, stored
 from friso.studies.study import Study, equations_version
 from friso.studies.sweep import dataset
 from friso.studies.thesis.claims import Finding, Part
 from friso.studies.thesis.studies import thesis_rig
-from friso.whole_file import whole_file
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -52,7 +52,7 @@ class Kept:
         """The runs of a study, as they were kept or made now."""
         axes = [(axis.name, axis.values.tolist()) for axis in study.axes]
         file = self._file("npz", study.stage.to_toml(), axes, dict(study.links), study.rtol, study.metrics, verify)
-        columns = None if file is None else stored_arrays(file)
+        columns = None if file is None else kept_arrays(file)
         notes = None if columns is None else columns.pop("notes", None)
         if columns is not None and notes is not None and columns.keys() == set(study.metrics):
             runs = dataset(study, {name: values.reshape(study.shape) for name, values in columns.items()})
@@ -62,53 +62,54 @@ class Kept:
         if file is not None:
             arrays: dict[str, Any] = {name: runs[name].values.astype(WORDS.get(name, "f8")) for name in study.metrics}
             verified = {name: value for name, value in runs.attrs.items() if name.startswith("verified")}
-            with whole_file(file) as stream:
-                np.savez_compressed(stream, notes=np.array(json.dumps(verified)), **arrays)
+            keep_arrays(file, {"notes": np.array(json.dumps(verified)), **arrays})
         return runs
 
     def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
         """Arrays by name `about` something, as they were kept or made now."""
         file = self._file("npz", "flags", *about)
-        columns = None if file is None else stored_arrays(file)
+        columns = None if file is None else kept_arrays(file)
         if columns is not None:
             return columns
         arrays = make()
         if file is not None:
-            with whole_file(file) as stream:
-                np.savez_compressed(stream, allow_pickle=False, **arrays)
+            keep_arrays(file, arrays)
         return arrays
 
     def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
         """Findings `about` something, as they were kept or made now."""
         file = self._file("json", "findings", *about)
-        if file is not None and (kept := _read(file)) is not None:
+        if file is not None and (kept := kept_findings(file)) is not None:
             return kept
         findings = make()
         if file is not None:
             document = {name: [asdict(part) for part in item.parts] for name, item in findings.items()}
-            put(file, json.dumps(document).encode("utf-8"))
+            file.parent.mkdir(parents=True, exist_ok=True)
+            put(file, json.dumps({"findings": document, "sha256": digest([file.name, document])}).encode("utf-8"))
         return findings
 
     def _file(self, suffix: str, *about: Any) -> Path | None:
         if self.folder is None:
             return None
-        self.folder.mkdir(parents=True, exist_ok=True)
-        digest = hashlib.sha256(
+        about_all = hashlib.sha256(
             repr((equations_version(), _sources(), machine(), thesis_rig().to_toml(), about)).encode()
         ).hexdigest()
-        return self.folder / f"{digest[:24]}.{suffix}"
+        return self.folder / f"{about_all[:24]}.{suffix}"
 
 
 NOT_KEPT = Kept()
 """Keeps nothing."""
 
 
-def _read(file: Path) -> Findings | None:
-    """Findings from a file; None where there are none, or it is damaged."""
+def kept_findings(file: Path) -> Findings | None:
+    """Findings from a file; None where there are none, or it is damaged or another's."""
     try:
-        document = json.loads(stored(file))
+        kept = json.loads(stored(file))
+        document = kept["findings"]
+        if kept["sha256"] != digest([file.name, document]):
+            return None
         return {name: Finding(tuple(Part(**part) for part in parts)) for name, parts in document.items()}
-    except (OSError, ValueError, TypeError, AttributeError):
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
 
 

@@ -19,15 +19,20 @@ from friso.views.drawing.thinning import thin
 Field = TypeVar("Field", bound=Coloured)
 
 
+LONGEST_TEXT = 1000
+"""Characters of a text in a figure at most: the longest caption has half of them."""
+
+
 def drawable(figure: Figure) -> Figure:
     """The figure with prefixed units, thinned series, limits as series, and markers that can be drawn."""
     return _escaped_part(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
 
 
 def _escaped_part(part: Any) -> Any:
-    """A part of a figure whose texts are escaped: they may come from a file."""
+    """A part of a figure whose texts are escaped, and no longer than can be drawn: they may come from a file."""
     if isinstance(part, str):
-        return escaped(part)
+        text = escaped(part)
+        return text if len(text) <= LONGEST_TEXT else f"{text[:LONGEST_TEXT]}..."
     if isinstance(part, tuple):
         return tuple(map(_escaped_part, part))
     if is_dataclass(part) and not isinstance(part, type):

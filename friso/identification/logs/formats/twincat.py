@@ -7,7 +7,6 @@ Layout after the exports of Scope 3.4 in github CagtayFabry/pytcs (tests/data) a
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +16,7 @@ import pandas as pd
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
-from friso.identification.logs.sniff import TextLayout, decoded_head, is_number
+from friso.identification.logs.sniff import TextLayout, csv_cells, decoded_head, is_number
 from friso.identification.logs.text import as_numbers, read_frame, unique
 from friso.identification.logs.units import spelled
 from friso.quantities import quoted
@@ -69,7 +68,7 @@ def read_twincat(path: Path) -> ChannelTable:
 
 def _cells(line: str, delimiter: str) -> list[str]:
     """The cells of a line: several spaces between two are empty cells, those of groups that have ended."""
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
+    return [cell.strip() for cell in csv_cells(line, delimiter)]
 
 
 def _is_data(cells: list[str]) -> bool:
