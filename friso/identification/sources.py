@@ -167,6 +167,6 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     reasons = {name: reason for name, claims in claims_of.items() if (reason := claims(course)) is not None}
     if len(reasons) == 1:
         return next(iter(reasons.items()))
-    names = sorted(reasons or KINDS, key=lambda name: name != "moves")
+    names = sorted(reasons or KINDS, key=lambda name: KINDS[name].around is None)
     expected = f"the kind of experiment: {', '.join(names)}"
     raise LogError("--as", course.words, expected, f"--as {names[0]}", str(path))

@@ -13,8 +13,8 @@ from friso.equations import motion
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
 from friso.hunting.criteria.peak_count import peaks_in_traces
-from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, outcomes
-from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
+from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, lasts, outcomes
+from friso.hunting.turning import COUNTED_ABOVE, HALF, WINDOW, zigzag
 from friso.hunting.turns import scan_turning_points
 from friso.progress import Progress, silent
 from friso.shares import Share, share
@@ -226,7 +226,7 @@ def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: floa
     """The swings in the last half of a run, from its turning points, times [s] and values [m]: above, below,
     rising, scatter of period and of height, as in `RailRuns`."""
     nothing = (np.nan,) * 5
-    if not swing > max(DISTINCT, 2 * BAND):
+    if not lasts(np.asarray(swing), 0.0, BAND):
         return nothing
     late = times >= ended / 2
     at, value = times[late], values[late]
