@@ -220,13 +220,23 @@ def _axis(axis: Axis) -> dict[str, Any]:
         positions, words = word_ticks(axis)
         settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
     if axis.log:
-        decades = math.log10(axis.limits[1] / axis.limits[0]) if axis.limits else math.inf
-        settings["dtick"] = "D2" if decades < 2 else 1  # 1, 2, 5, 10 where decades alone are too few
+        settings |= _log_ticks(axis.limits)
     if axis.step:
         settings |= {"tick0": 0, "dtick": axis.step}
     if axis.limits:
         settings["range"] = [math.log10(limit) for limit in axis.limits] if axis.log else list(axis.limits)
     return settings
+
+
+def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
+    """Decades; between them 2 and 5, or more, where they are too few: plotly alone writes 0.5 as "5"."""
+    decades = math.log10(limits[1] / limits[0]) if limits else math.inf
+    if limits is None or decades >= 2:
+        return {"dtick": 1}
+    steps = (1, 2, 5) if decades >= 1 else (1, 1.5, 2, 3, 4, 5, 7)
+    exponents = range(math.floor(math.log10(limits[0])), math.ceil(math.log10(limits[1])) + 1)
+    values = [step * 10.0**exponent for exponent in exponents for step in steps]
+    return {"tickmode": "array", "tickvals": values, "ticktext": [f"{value:.4g}" for value in values]}
 
 
 def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:

@@ -42,11 +42,21 @@
 
   // ------------------------------------------------------------------ drawing
 
+  // Decades; between them 2 and 5, or more, where they are too few.
+  function logTicks(values) {
+    const [low, high] = [Math.log10(Math.min(...values)), Math.log10(Math.max(...values))];
+    if (high - low >= 2) return { dtick: 1 };
+    const steps = high - low >= 1 ? [1, 2, 5] : [1, 1.5, 2, 3, 4, 5, 7];
+    const exponents = Array.from({ length: Math.ceil(high) - Math.floor(low) + 1 }, (_, i) => Math.floor(low) + i);
+    const ticks = exponents.flatMap((exponent) => steps.map((step) => step * 10 ** exponent));
+    return { tickmode: "array", tickvals: ticks, ticktext: ticks.map((value) => rounded(value)) };
+  }
+
   function plotAxis(axis) {
     const style = { title: { text: escaped(labelled(axis)), standoff: 8 }, showline: true, linecolor: GREY,
       ticks: "outside", tickcolor: GREY, zeroline: false, showgrid: points, gridcolor: "#e3e3e3",
       type: axis.log ? "log" : "linear", exponentformat: axis.log ? "power" : "none" };
-    if (axis.log) style.dtick = 1;
+    if (axis.log) Object.assign(style, logTicks(axis.values));
     if (axis.words.length) {
       const every = Math.ceil(axis.words.length / 12);
       const ticks = axis.words.map((_, i) => i).filter((i) => i % every === 0);
@@ -161,6 +171,7 @@
     if (data.sampled || !points) return data.axes[up];
     const numbers = shown.codes.includes(NONE);
     return { label: shown.label, unit: shown.unit, log: shown.log && numbers,
+      values: Array.from(shown.numbers).filter((value) => value > 0),
       words: numbers ? [] : shown.kinds.map((kind) => kind.label) };
   }
 
