@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass, field, replace
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ from friso.equations.controllers.van_dijk import VanDijk
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare
 from friso.hunting.attractors import Target
 from friso.hunting.cycle.return_map import ReturnMap
+from friso.views.check.page import check_html
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
 
@@ -234,3 +236,9 @@ def same(left: list[list[np.ndarray]], right: list[list[np.ndarray]]) -> bool:
         for one, other in zip(left, right, strict=True)
         for a, b in zip(one, other, strict=True)
     )
+
+
+def digests() -> list[str]:
+    """Of a figure in all formats, and of a page of several."""
+    images = [matplotlib_renderer.image(small_figure(), form) for form in matplotlib_renderer.FORMATS]
+    return [hashlib.sha256(content).hexdigest() for content in (*images, check_html(both_joints()).encode())]

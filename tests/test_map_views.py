@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
@@ -561,9 +562,11 @@ print(hashlib.sha256(t.map_html(t.troubled(), "peaks", t.RERUN).encode()).hexdig
 
 
 def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
+    environment = {"PYTHONHASHSEED": "7", "HOME": str(tmp_path), "PYTHONPATH": str(request.config.rootpath)}
+    environment |= {"MPLCONFIGDIR": matplotlib.get_cachedir()}  # the list of fonts takes seconds to make
     done = subprocess.run(
         [sys.executable, "-c", SCRIPT.format(tests=str(request.path.parent))],
-        env={"PYTHONHASHSEED": "7", "HOME": str(tmp_path), "PYTHONPATH": str(request.config.rootpath)},
+        env=environment,
         capture_output=True,
         text=True,
         check=True,
