@@ -63,10 +63,10 @@ def run_verdict(repetitions: int) -> list[Goal]:
 
 def _what_starts(stage: Stage) -> None:
     verdict = hunting(stage)
-    if verdict.attracting:
-        for kind in (displacements_that_hunt, pushes_that_hunt, moves_that_hunt):
-            kind(stage, verdict.attracting[0])
-    margin(stage, bool(verdict.attracting))
+    if verdict.target:
+        for starts in (displacements_that_hunt, pushes_that_hunt, moves_that_hunt):
+            starts(stage, verdict.target)
+    margin(stage, verdict.target is not None)
 
 
 def run_curve(repetitions: int) -> list[Goal]:

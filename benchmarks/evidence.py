@@ -193,12 +193,12 @@ def hunting_limiter() -> Values:
     aside = np.concatenate([-aside, aside]) * np.abs(cycles.states[0, stages.sticking])
     several = np.zeros(len(aside), dtype=np.int64)
     beside = replace(cycles.take(several).orbits, states=cycles.states + aside[:, None] * cycles.direction)
-    local = multipliers(stages.take(several), beside, RTOL).local[:, 0].real
+    local = np.real(multipliers(stages.take(several), beside, RTOL).local[:, 0])
     return {
-        "touches": np.count_nonzero(np.diff(touching.astype(int)) == 1),
-        "least": local.min(),
-        "greatest": local.max(),
-        "slope": cycles.slope[0],
+        "touches": float(np.count_nonzero(np.diff(touching.astype(int)) == 1)),
+        "least": float(local.min()),
+        "greatest": float(local.max()),
+        "slope": float(cycles.slope[0]),
     }
 
 

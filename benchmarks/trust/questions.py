@@ -12,7 +12,7 @@ from benchmarks.trust.arguments import TEXTS, Computed, assert_clear, nothing_co
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.inputs import LEAVES, RIG, ready
 from friso.app.frames import frame
-from friso.app.questions import QUESTIONS, REPORTS, Asked, report
+from friso.app.questions import QUESTIONS, REPORTS, PageRequest, report
 from friso.app.uploads import Uploads
 from friso.app.work import Work
 from friso.errors import InputError
@@ -56,7 +56,7 @@ def questions(rng: random.Random, folder: Path) -> None:
     what = f"{name}: {json.dumps(sent)[:300]}"
     with ready(folder), nothing_computed():
         try:
-            for part in job(Asked.of(sent, uploads), Work(lambda _: None)):
+            for part in job(PageRequest.of(sent, uploads), Work(lambda _: None)):
                 frame(part)
         except InputError as error:
             assert_clear(what, str(error))
