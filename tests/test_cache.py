@@ -283,6 +283,18 @@ def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> N
     assert log.count("temporary folder") == 1
 
 
+def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(name: str) -> str:
+        raise RuntimeError("could not determine the home directory")
+
+    monkeypatch.delenv(cache.FOLDER_VARIABLE, raising=False)
+    monkeypatch.setattr(cache, "user_cache_dir", none)
+    folder = cache.cache_folder.__wrapped__()
+    assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    cache.remove_if_passing(folder)
+    assert not folder.exists()
+
+
 # nobody else
 
 

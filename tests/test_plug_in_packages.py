@@ -55,7 +55,8 @@ def friso_command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[
 
 @pytest.fixture
 def installed(tmp_path: Path) -> Path:
-    (tmp_path / "own_controller.py").write_text((TESTS / "own_controller.py").read_text(encoding="utf-8"))
+    own = (TESTS / "own_controller.py").read_text(encoding="utf-8")
+    (tmp_path / "own_controller.py").write_text(f"{own}\nprint('what a plug-in prints is no answer')\n")
     (tmp_path / "air_film.py").write_text(LAW.replace("{name}", "air"))
     package(tmp_path, "other", controllers="own_controller", friction="air_film")
     (tmp_path / "stage.toml").write_text(STAGE)
@@ -88,9 +89,10 @@ def test_processes_that_compile_and_that_compute_cells_know_one(installed: Path)
     assert not outcomes.get("failed")
 
 
-@pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing")])
+@pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing"), ("air", "leaves")])
 def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str, tmp_path: Path) -> None:
     (tmp_path / "taken.py").write_text(LAW.replace("{name}", name))
+    (tmp_path / "leaves.py").write_text("raise SystemExit(0)")
     package(tmp_path, "other", friction=module)
     done = friso_command(tmp_path, "--help")
     assert done.returncode == 2

@@ -55,12 +55,12 @@ DAY = 86_400.0
 @cache
 def cache_folder() -> Path:
     """The folder of compiled code, mode 0700; a temporary one, with a warning, where that cannot be had."""
-    folder = (Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels").absolute()
     try:
+        folder = (Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels").absolute()
         make_private(folder)
         with tempfile.TemporaryFile(dir=folder):
             return folder
-    except OSError as error:
+    except (OSError, RuntimeError) as error:  # the latter of a user without a home
         logger.warning(
             "kernels are compiled into a temporary folder and not kept: %s; %s names another folder",
             error,

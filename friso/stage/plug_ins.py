@@ -14,6 +14,7 @@ import importlib
 import importlib.util
 import sys
 from collections.abc import Iterable
+from contextlib import redirect_stdout
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -93,9 +94,10 @@ def load_installed(group: str) -> None:
 
     for point in sorted(entry_points(group=group), key=lambda point: point.name):
         try:
-            point.load()
+            with redirect_stdout(sys.stderr):  # what a plug-in prints is no answer
+                point.load()
         except InputError as error:
             raise error.under(f"{group}: {point.name}") from None
-        except Exception as error:
+        except (Exception, SystemExit) as error:
             actual = f"{point.value}, which cannot be imported: {error}"
             raise InputError(f"{group}: {point.name}", actual, "a module that registers its class") from error

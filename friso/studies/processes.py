@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
@@ -51,6 +52,7 @@ def _prepare(shared: Any, cache: Path) -> None:
     global _cancel
     _cancel = np.frombuffer(shared, np.int64)
     os.environ[FOLDER_VARIABLE] = str(cache.parent)
+    sys.stdout = sys.stderr  # what plug-ins print is no answer
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, args=(cache,), daemon=True).start()
 
