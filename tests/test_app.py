@@ -136,9 +136,14 @@ def test_a_rebound_name_is_refused(served: Served, host: str | None) -> None:
         assert served.request("GET", path, Host=host)[0] in (403, 400)
 
 
-def test_a_token_for_once_is_taken_once(served: Served) -> None:
+def test_a_token_for_once_is_taken_once_and_whoever_was_faster_than_the_browser_is_shut_out(served: Served) -> None:
     path = f"/?token={served.access.token_for_once()}"
-    assert [served.request("GET", path, Cookie=None)[0] for _ in range(2)] == [303, 403]
+    status, headers, _ = served.request("GET", path, Cookie=None)
+    cookie = headers["Set-Cookie"].partition(";")[0]
+    assert (status, served.request("GET", "/begin", Cookie=cookie)[0]) == (303, 200)
+    assert served.request("GET", path, Cookie=None)[0] == 403
+    assert [served.request("GET", "/begin", Cookie=value)[0] for value in (cookie, None)] == [403, 403]
+    assert served.request("GET", "/begin")[0] == 200
 
 
 def test_the_port_takes_connections_before_the_browser_opens_and_is_free_again_at_once() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import secrets
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
@@ -33,6 +34,14 @@ REFUSED = (
 )
 
 
+TWICE = (
+    "the address with which the browser was started was opened twice, once perhaps by another user of this machine; "
+    "whoever was first is shut out: open the address printed above"
+)
+
+LOGGER = logging.getLogger("friso")
+
+
 @dataclass(frozen=True)
 class Access:
     """The names by which the server may be addressed, with the port, and the secrets of its token and its cookie."""
@@ -41,8 +50,10 @@ class Access:
     cookie: str
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
-    once: set[str] = field(default_factory=set)
-    """Tokens that are taken once."""
+    once: dict[str, str] = field(default_factory=dict)
+    """Tokens that are taken once, with the session that each began; "" before that."""
+    ended: set[str] = field(default_factory=set)
+    """Sessions that are over."""
 
     @classmethod
     def at(cls, host: str, port: int) -> Access:
@@ -55,7 +66,7 @@ class Access:
     def token_for_once(self) -> str:
         """A token that is taken once: commands that are running, and the addresses in them, can be seen by others."""
         token = secrets.token_urlsafe(32)
-        self.once.add(token)
+        self.once[token] = ""
         return token
 
     def is_host(self, host: str) -> bool:
@@ -66,14 +77,20 @@ class Access:
         """Whether a request comes from a page of this server, or from no page at all."""
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
-    def has_token(self, query: bytes) -> bool:
-        """Whether an address has the token, or one that is taken once and now was."""
+    def session_of(self, query: bytes) -> str:
+        """The session that an address with a token begins, "" without one. A token that is taken once and comes again
+        was seen by two: what it began is over."""
         tokens = parse_qs(query.decode("latin-1")).get("token", [])
         if len(tokens) != 1:
-            return False
-        taken = {token for token in self.once if _same(tokens[0], token)}
-        self.once.difference_update(taken)
-        return bool(taken) or _same(tokens[0], self.token)
+            return ""
+        for token, session in self.once.items():
+            if _same(tokens[0], token) and session:
+                self.ended.add(session)
+                LOGGER.warning(TWICE)
+            elif _same(tokens[0], token):
+                self.once[token] = secrets.token_urlsafe(32)
+                return self.once[token]
+        return self.session if _same(tokens[0], self.token) else ""
 
     def has_cookie(self, header: str) -> bool:
         """Whether a request has the cookie."""
@@ -81,7 +98,8 @@ class Access:
             cookies = SimpleCookie(header)
         except CookieError:
             return False
-        return self.cookie in cookies and _same(cookies[self.cookie].value, self.session)
+        sessions = {self.session, *self.once.values()} - self.ended - {""}
+        return self.cookie in cookies and any(_same(cookies[self.cookie].value, session) for session in sessions)
 
 
 HTTP = 80
@@ -117,9 +135,9 @@ class Gate:
             return PlainTextResponse(REFUSED, 403)
         if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and scope["path"] != "/":
             return PlainTextResponse(REFUSED, 403)
-        if scope["path"] == "/" and access.has_token(scope["query_string"]):
+        if scope["path"] == "/" and (session := access.session_of(scope["query_string"])):
             response = RedirectResponse("/", 303)
-            response.set_cookie(access.cookie, access.session, httponly=True, samesite="strict", path="/")
+            response.set_cookie(access.cookie, session, httponly=True, samesite="strict", path="/")
             return response
         return None if access.has_cookie(headers.get("cookie", "")) else PlainTextResponse(REFUSED, 403)
 
