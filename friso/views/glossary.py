@@ -17,7 +17,7 @@ _HEADING = "word"
 
 
 @dataclass(frozen=True)
-class Entry:
+class Explanation:
     """A row of the glossary: its words, and what they mean."""
 
     words: tuple[str, ...]
@@ -35,7 +35,7 @@ class Entry:
 
 
 @cache
-def entries() -> Mapping[str, Entry]:
+def entries() -> Mapping[str, Explanation]:
     """What the glossary explains, by its words in small letters.
 
     Words that mean this in one context only stand there as "slope (of the return map)": they are left out, since pages
@@ -43,7 +43,9 @@ def entries() -> Mapping[str, Entry]:
     """
     text = (resources.files("friso.views") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
-    rows = [Entry(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words]
+    rows = [
+        Explanation(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words
+    ]
     return {word.lower(): entry for entry in rows for word in entry.words if word != _HEADING}
 
 
@@ -58,7 +60,7 @@ class Glossary:
     """What one page explains: the entries `used` on it, in the order of their first words."""
 
     def __init__(self) -> None:
-        self.used: dict[str, Entry] = {}
+        self.used: dict[str, Explanation] = {}
 
     def linked(self, text: str) -> Markup:
         """The text, escaped, with links from words that are new on the page."""
@@ -73,5 +75,5 @@ class Glossary:
         return Markup("").join([*parts, escape(text[end:])])
 
     @staticmethod
-    def _link(word: str, entry: Entry) -> Markup:
+    def _link(word: str, entry: Explanation) -> Markup:
         return Markup('<a class="word" href="#{}" title="{}">{}</a>').format(entry.place, entry.meaning, word)
