@@ -17,7 +17,7 @@ _HEADING = "word"
 
 
 @dataclass(frozen=True)
-class Explanation:
+class Explained:
     """A row of the glossary: its words, and what they mean."""
 
     words: tuple[str, ...]
@@ -35,7 +35,7 @@ class Explanation:
 
 
 @cache
-def entries() -> Mapping[str, Explanation]:
+def entries() -> Mapping[str, Explained]:
     """What the glossary explains, by its words in small letters.
 
     Words that mean this in one context only stand there as "slope (of the return map)": they are left out, since pages
@@ -43,9 +43,7 @@ def entries() -> Mapping[str, Explanation]:
     """
     text = (resources.files("friso.views") / "templates" / "glossary.md").read_text(encoding="utf-8")
     plain = re.sub(r"[*`]", "", text)
-    rows = [
-        Explanation(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words
-    ]
+    rows = [Explained(tuple(words.split(", ")), meaning) for words, meaning in _ROW.findall(plain) if "(" not in words]
     return {word.lower(): entry for entry in rows for word in entry.words if word != _HEADING}
 
 
@@ -60,20 +58,20 @@ class Glossary:
     """What one page explains: the entries `used` on it, in the order of their first words."""
 
     def __init__(self) -> None:
-        self.used: dict[str, Explanation] = {}
+        self.used: dict[str, Explained] = {}
 
     def linked(self, text: str) -> Markup:
         """The text, escaped, with links from words that are new on the page."""
         parts, end = [], 0
         text = escaped(text)
-        for found in _any_word().finditer(text):
-            entry = entries()[found[1].lower()]
+        for match in _any_word().finditer(text):
+            entry = entries()[match[1].lower()]
             if entry.name not in self.used:
                 self.used[entry.name] = entry
-                parts += [escape(text[end : found.start()]), self._link(found[0], entry)]
-                end = found.end()
+                parts += [escape(text[end : match.start()]), self._link(match[0], entry)]
+                end = match.end()
         return Markup("").join([*parts, escape(text[end:])])
 
     @staticmethod
-    def _link(word: str, entry: Explanation) -> Markup:
+    def _link(word: str, entry: Explained) -> Markup:
         return Markup('<a class="word" href="#{}" title="{}">{}</a>').format(entry.place, entry.meaning, word)
