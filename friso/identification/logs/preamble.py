@@ -19,7 +19,7 @@ STEPS = frozenset(
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """What stands around a key and its value, and is no part of them."""
-_SEPARATOR = re.compile(r"[:=;,\t]\s*(?:(?<=\s)[:=;,])?")
+_SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
@@ -69,7 +69,7 @@ def _pair(line: str) -> tuple[str, str] | None:
     line = line.lstrip(_BEFORE)
     if (separator := _SEPARATOR.search(line)) is None:
         return None
-    key, value = line[: separator.start()].rstrip().removesuffix('"').rstrip(), line[separator.end() :].rstrip(_BEHIND)
+    key, value = line[: separator.start()].rstrip().removesuffix('"').rstrip(), line[separator.end() :].strip().rstrip(_BEHIND)
     return (key, value) if key and value and '"' not in key else None
 
 
