@@ -29,7 +29,7 @@ from friso.quantities import percent
 from friso.views.check.figures import check_figures
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import Axis, Figure, Map, Panel, Series
+from friso.views.drawing.figure import GREY, Axis, Figure, Map, Panel, Series
 from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
 from friso.views.drawing.thinning import BUCKETS, KEPT, thin
 
@@ -232,3 +232,28 @@ def test_a_figure_file_opens_as_an_image(tmp_path):
 
     matplotlib_renderer.save(small_figure(), tmp_path / "small.PNG")
     assert matplotlib.image.imread(io.BytesIO((tmp_path / "small.PNG").read_bytes()), format="png").ndim == 3
+
+
+@pytest.mark.parametrize(
+    ("limits", "readable"), [((0.6, 2.8), ["0.7", "1", "1.5", "2"]), ((2.0, 90.0), ["2", "5", "10", "20", "50"])]
+)
+def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(
+    limits: tuple[float, float], readable: list[str]
+) -> None:
+    panel = Panel(
+        "", Axis("Factor", "", limits, True), Axis("y", ""), (Series(np.arange(1.0, 3.0), np.zeros(2), "", GREY),)
+    )
+    axis = plotly_renderer.render(Figure("f", "", "", (panel,))).layout.xaxis
+    assert {*readable} <= {*axis.ticktext}
+    assert len(axis.ticktext) == len(axis.tickvals)
+
+
+def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
+    """The higher what stands above the axes, the higher the figure; no line is wider than the axes."""
+    lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"a line with a long name, {k}", GREY) for k in range(4))
+    panel = Panel("A title that is too long for the width of a telephone", Axis("x", ""), Axis("y", ""), lines)
+    figure = Figure("f", "", "", (panel, panel), columns=2)
+    narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
+    assert "<br>" in narrow["annotations"][0]["text"]
+    assert narrow["height"] > wide["height"]
+    assert narrow["annotations"][0]["yshift"] >= 4 * plotly_renderer.KEY_ROW
