@@ -69,7 +69,10 @@ def _pair(line: str) -> tuple[str, str] | None:
     line = line.lstrip(_BEFORE)
     if (separator := _SEPARATOR.search(line)) is None:
         return None
-    key, value = line[: separator.start()].rstrip().removesuffix('"').rstrip(), line[separator.end() :].strip().rstrip(_BEHIND)
+    key, value = (
+        line[: separator.start()].rstrip().removesuffix('"').rstrip(),
+        line[separator.end() :].strip().rstrip(_BEHIND),
+    )
     return (key, value) if key and value and '"' not in key else None
 
 
