@@ -54,6 +54,6 @@ class PiDLead(ControllerSection):
         damper = blocks.lead(rate, 1 / (3 * omega), 1 / (30 * omega), "rate")
         return {
             "p": measured.error * stiffness,
-            "i": blocks.integral(measured.error, stiffness * omega * Rational(1, 4), rule="sum"),
+            "i": blocks.integral(measured.error, stiffness * omega * Rational(1, 4), rule="backward_euler"),
             "d": -(damper * (2 * zeta * mass * omega)),
         }

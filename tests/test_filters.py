@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,6 @@ import friso
 from friso.equations.blocks import Loop
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
-from friso.frequency.drive import bilinear
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.stage import Stage, numeric_keys
@@ -102,7 +102,11 @@ def commanded(machine: Stage, sample_time: float, errors: np.ndarray) -> np.ndar
     force, held = sampled_controller(controller_form(flat), Loop(e, y, sp.S.Zero, sp.S.Zero), 1)
     parts = (force, *(number.update for number in held))
     keys = {symbol: flat[str(symbol)] for part in parts for symbol in part.free_symbols if str(symbol) in flat}
-    once = sp.lambdify([e, y, *keys, *(number.symbol for number in held)], parts, "math")
+    once = sp.lambdify(
+        [e, y, *keys, *(number.symbol for number in held)],
+        parts,
+        [{"sine": lambda turns: math.sin(2 * math.pi * turns)}, "math"],
+    )
     kept, forces = [0.0] * len(held), []
     for error in errors:
         now, *kept = once(error, 0.0, *keys.values(), *kept)
@@ -121,10 +125,31 @@ def test_a_drive_takes_a_filter_by_tustin(kind: str) -> None:
     assert commanded(machine, t, errors) == pytest.approx(
         signal.lfilter(*signal.bilinear(upper[0], lower, 1 / t), errors), rel=1e-6, abs=1e-7
     )
-    sampled = bilinear(system, t)
-    z = np.exp(1j * np.linspace(0.01, 3.0, 20))
-    s = 2 / t * (z - 1) / (z + 1)
-    assert sampled.at(z)[0, :, 0, 0] == pytest.approx(system.at(s)[0, :, 0, 0])
+
+
+@pytest.mark.parametrize("rule", ["backward_euler", "prewarped"])
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "sampled_biquad"])
+def test_a_drive_takes_a_filter_by_its_own_rule(kind: str, rule: str) -> None:
+    """The difference equation with what the rule puts in the place of s, by SciPy; the same by the drive's key."""
+    text, _ = KINDS[kind]
+    machine, t = filtered(text), 1e-3
+    errors = np.random.default_rng(1).normal(size=200)
+    system = compensator(machine.flat(), 1).take((REFERENCE,), (FORCE,))
+    upper, lower = (np.ravel(part) for part in signal.ss2tf(system.a[0], system.b[0], system.c[0], system.d[0]))
+    exact_at = np.abs(np.roots(lower)).max()
+    gain = 1 / t if rule == "backward_euler" else exact_at / np.tan(exact_at * t / 2)
+    over = np.poly1d([1, 0]) if rule == "backward_euler" else np.poly1d([1, 1])  # s = gain (z - 1)/over
+    parts = [
+        sum(
+            (np.poly1d([gain, -gain]) ** k * over ** (len(lower) - 1 - k) * float(c) for k, c in enumerate(part[::-1])),
+            start=np.poly1d([0.0]),
+        )
+        for part in (upper, lower)
+    ]
+    by_hand = signal.lfilter(*(part.coeffs for part in parts), errors)
+    ours = commanded(machine.replace({f"{PLACE}.1.discretisation": rule}), t, errors)
+    assert ours == pytest.approx(by_hand, rel=1e-6, abs=1e-7)
+    assert commanded(machine.replace({"drive.filter_discretisation": rule}), t, errors) == pytest.approx(ours)
 
 
 def test_a_sampled_biquad_is_its_difference_equation() -> None:

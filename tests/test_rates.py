@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import get_args
 
 import control
 import numpy as np
@@ -10,11 +11,12 @@ import pytest
 from variants import cascade, lugre, release, stage
 
 import friso
+from friso.frequency.cascaded import CascadeLoop, CascadeLoops, cascade_loops
 from friso.frequency.drive import DriveTiming, waited, zero_order_hold
 from friso.frequency.loops import poles, response
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import Members, limit_cases
-from friso.frequency.parts import plant
+from friso.frequency.parts import FORCE, RATED, STAGE, plant
 from friso.frequency.rates import cut_over_period, samples_controller
 from friso.stage import Stage
 
@@ -35,7 +37,7 @@ def member_of(case: Stage) -> Members:
     return limit_cases(case.flat())[CASE]
 
 
-def by_hand(case: Stage, gain: float = 1.0) -> np.ndarray:
+def by_hand(case: Stage, gain: float = 1.0, outer: float = 1.0) -> np.ndarray:
     """How four samples take position, velocity, the force before, and the drive's numbers along, sample by sample."""
     flat = case.flat()
     open_plant = friso.linear(case, CASE, "plant")
@@ -51,7 +53,7 @@ def by_hand(case: Stage, gain: float = 1.0) -> np.ndarray:
         for k in range(SLOW):
             y = float((open_plant.C[row] @ x).item())
             if k == 0:
-                command = -flat["controller.kv"] * y
+                command = -outer * flat["controller.kv"] * y
             velocity = (y - past) / FAST
             past = y
             wound += FAST * (command - velocity)
@@ -87,15 +89,78 @@ def test_gain_margins_are_where_it_becomes_unstable(of_machine: Margins, which: 
     assert (sizes[0] < sizes[1]) == (which == "gain_margin")
 
 
+@pytest.fixture(scope="module")
+def of_loops() -> CascadeLoops:
+    return cascade_loops(machine().flat(), member_of(machine()), np.array([10.0]))
+
+
+def test_each_loop_of_a_cascade_opened_is_on_the_edge_at_its_gain_margin(of_loops: CascadeLoops) -> None:
+    """Difference equations by hand: of the velocity loop with the position loop open, whose position is a pole at 1,
+    and of both where the gain of the position loop alone is raised."""
+    inner, outer = (of_loops.margins[loop].gain_margin for loop in get_args(CascadeLoop))
+    for factor, stable in ((0.999, True), (1.001, False)):
+        alone = np.linalg.eigvals(by_hand(machine(), inner * factor, 0.0))
+        assert (np.abs(alone[np.abs(alone - 1) > 1e-6]).max() < 1) == stable
+        assert (np.abs(np.linalg.eigvals(by_hand(machine(), 1.0, outer * factor))).max() < 1) == stable
+
+
+def test_loops_of_a_cascade_in_continuous_time_against_python_control() -> None:
+    case = machine().replace({"drive": None})
+    flat, omega = case.flat(), np.geomspace(1.0, 1e4, 40)
+    loops = cascade_loops(flat, member_of(case), omega)
+    s, moved = 1j * omega, friso.linear(case, CASE, "plant")
+    velocity = s * moved(s)[moved.find_output("stage"), 0]
+    inner = KP * (1 + 1 / (T_V * s)) * velocity
+    assert loops.plant == pytest.approx(velocity)
+    assert loops.loops["velocity"] == pytest.approx(inner)
+    assert loops.loops["position"] == pytest.approx(KV / s * inner / (1 + inner))
+    system = control.ss(moved.A, moved.B[:, :1], moved.C[[moved.find_output("stage")]], 0.0)
+    speed = control.tf([1, 0], [1]) * control.tf(system) * control.tf([KP * T_V, KP], [T_V, 0])
+    _, phase, *_ = control.stability_margins(
+        control.minreal(control.tf([KV], [1, 0]) * speed / (1 + speed), 1e-6, False)
+    )
+    assert loops.margins["position"].phase_margin == pytest.approx(phase, rel=1e-4)
+
+
+def test_two_encoders_at_several_rates() -> None:
+    """Poles are those of the loop sample by sample, by hand: position from the load, velocity from the motor."""
+    case = friso.load(friso.example("ball_screw_axis")).replace(
+        {
+            "controller": {"kind": "cascade", "kv": "60 1/s", "kp": "5500 N*s/m", "velocity_integral_time": "30 ms"},
+            "drive": {"sample_time": "250 us", "position_sample_time": "1 ms"},
+        }
+    )
+    one, step = member_of(case), 250e-6
+    machine_ = plant(case.flat(), one).take((FORCE,), (STAGE, RATED))
+    held = control.sample_system(control.ss(machine_.a[0], machine_.b[0], machine_.c[0], 0.0), step, "zoh")
+
+    def four(z: np.ndarray) -> np.ndarray:
+        x, (past, wound, command) = z[:-3], z[-3:]
+        for k in range(4):
+            load, motor = held.C @ x
+            command = -60 * load if k == 0 else command
+            velocity, past = (motor - past) / step, motor
+            wound += step * (command - velocity)
+            x = held.A @ x + held.B[:, 0] * 5500 * (command - velocity + wound / 0.03)
+        return np.array([*x, past, wound, command])
+
+    theirs = np.linalg.eigvals(np.array([four(unit) for unit in np.eye(len(held.A) + 3)]).T)
+    ours = poles(case.flat(), one, DriveTiming.of(case.flat())).closed[0]
+    theirs, ours = (np.sort(np.abs(z[np.abs(z) > 1e-6])) for z in (theirs, ours))
+    assert ours == pytest.approx(theirs, rel=1e-6)
+
+
 def test_with_all_loops_at_one_rate_the_loci_are_the_loop(of_machine: Margins) -> None:
     """A period of four samples of a controller that is the same at all of them, against python-control."""
     case = machine("1 ms")
     flat, omega = case.flat(), np.geomspace(1.0, 0.98 * np.pi / FAST, 60)
-    plant_sampled = waited(zero_order_hold(plant(flat, member_of(case)).take(("force",), ("stage",)), FAST, 0.4e-3), 0)
+    held = zero_order_hold(plant(flat, member_of(case)).take((FORCE,), (STAGE, RATED)), FAST, 0.4e-3)
+    plant_sampled = waited(held, 0)
     (same,) = samples_controller(flat, 1, 1)
     locus = cut_over_period(plant_sampled, (same,) * 4).locus(omega * FAST)[0]
-    one = control.ss(plant_sampled.a[0], plant_sampled.b[0], plant_sampled.c[0], 0.0, FAST)
-    law = control.ss(same.a[0], same.b[0], same.c[0], same.d[0], FAST)
+    one = control.ss(plant_sampled.a[0], plant_sampled.b[0], plant_sampled.c[0][:1], 0.0, FAST)
+    seen = same.a[0], same.b[0].sum(axis=1, keepdims=True), same.c[0], same.d[0].sum(axis=1, keepdims=True)
+    law = control.ss(*seen, FAST)  # of one encoder
     assert locus == pytest.approx(-np.asarray((one * law)(np.exp(1j * omega * FAST))), rel=1e-8)
 
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, read_stage, text_of, wrong
+from friso.answers.inputs import AS_BUILT, Changes, StageLike, read_stage, text_of, wrong
 from friso.errors import InputError
 from friso.frequency.bode import Bode
 from friso.progress import Progress, silent
@@ -104,8 +104,6 @@ def bode(
     ['sliding', 'sliding-touched', 'stuck', 'stuck-touched']
     """
     chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
-    if chosen.drive and chosen.drive.velocity_samples is not None:
-        LOGGER.warning("drive.velocity_samples is ignored: the derivative is that of the bilinear transform")
     band = None if frequencies is None else _band(frequencies, chosen)
     from friso.frequency.bode import bode as analysed
 

@@ -96,6 +96,9 @@ class ParameterFormat:
     suffix: str
 
 
+TOLD = ("machine_unit", "force_per_output", "velocity_per_output", "travel_per_turn")
+"""Names in [drive] of what friso init --from was told, or read, of a drive's units, and friso export asks for."""
+
 FORMATS: Registry[ParameterFormat] = Registry("friso.drives.formats", "FORMAT")
 
 

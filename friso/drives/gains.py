@@ -8,7 +8,7 @@ from typing import Any
 
 from friso.drives.conversions import MOTOR_CONSTANT, TRAVEL, Conversion, conversions
 from friso.drives.diagram import loop_diagram
-from friso.drives.format import FORMATS, ParameterFormat
+from friso.drives.format import FORMATS, TOLD, ParameterFormat
 from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError
 from friso.quantities import quoted
@@ -38,7 +38,7 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     """The gains of a stage, also as the parameters of the kind of drive `to`. Raises InputError for a controller that
     the drive does not have, and for all that is still to be said, together."""
     flat = stage.flat()
-    answers = UserAnswers(user_values)
+    answers = UserAnswers({**_told(stage), **user_values})
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
     askable = {TRAVEL, MOTOR_CONSTANT}
     if kind is not None:
@@ -51,6 +51,12 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     refuse_open(kind.questions_back(flat, answers), f"--to {to}")
     back = kind.parameters(flat, answers)
     return Gains(stage, loop_diagram(flat), conversions(flat, answers), kind, back.values, _not_held(flat, back.held))
+
+
+def _told(stage: Stage) -> dict[str, Any]:
+    """What the stage file keeps of what friso init --from was told."""
+    written = stage.drive.as_written() if stage.drive else {}
+    return {name: written[name] for name in TOLD if name in written}
 
 
 def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from friso.drives.format import FORMATS, AsStage, AxisParameters, ParameterFormat
+from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, ParameterFormat
 from friso.drives.questions import UserAnswers, refuse_open
 from friso.errors import InputError
 from friso.escapes import one_line
@@ -89,6 +89,8 @@ def _with_answers(
     tables |= {name: dict(table) for name, table in of_axis.tables.items()}
     for key, value in user_answers.items():
         table, dot, name = key.partition(".")
+        if not dot and key in TOLD:
+            table, dot, name = "drive", ".", key
         if dot:
             keys = tables.setdefault(table, {})
             if not isinstance(keys, dict):

@@ -11,7 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import sympy as sp
 
@@ -19,7 +19,8 @@ from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, Component, Held, key
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import ANTI_WINDUP_TIME, FILTERS_KEY, FORCE_LIMIT, ControllerSection
-from friso.stage.filters import FEEDBACK, FORWARD, Polynomial
+from friso.stage.filters import FEEDBACK, FORWARD, FilterRule, Polynomial
+from friso.stage.rig import IntegralRule
 from friso.stage.standstill import FrictionSettings
 
 
@@ -157,8 +158,8 @@ class Blocks(ABC):
         return self.form.settings if self.form else FrictionSettings()
 
     @abstractmethod
-    def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
-        """1/(1 + tau s), tau [s]."""
+    def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
+        """1/(1 + tau s), tau [s]; a drive takes it by a `rule`, None: by its own."""
 
     @abstractmethod
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
@@ -170,15 +171,17 @@ class Blocks(ABC):
         signal: Signal,
         gain: sp.Expr,
         name: str = "integral",
-        rule: Literal["bilinear", "sum"] = "bilinear",
+        rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
         """gain/s; the gain is positive, and the controller's force rises with the output. Where that force is at its
         limit, the integrator does what the anti-windup prescribes; where its own output is at a `limit`, it rests. A
-        drive integrates by trapezoids (`bilinear`) or sums up."""
+        drive integrates by the `rule`, if its own is not another one."""
 
     @abstractmethod
-    def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+    def biquad(
+        self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
+    ) -> Signal:
         """A transfer function of the second order, whose lower polynomial begins with 1: a notch, for one."""
 
     @abstractmethod
@@ -215,15 +218,17 @@ class Blocks(ABC):
             if part.path == path:
                 row = _Row(f"{FILTERS_KEY}.{number}")
                 upper, lower = part.section.transfer(row, part.variant)
-                signal = self.transfer(signal, upper, lower, f"filter_{number}")
+                signal = self.transfer(signal, upper, lower, f"filter_{number}", part.discretisation)
         return signal
 
-    def transfer(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+    def transfer(
+        self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
+    ) -> Signal:
         """A transfer function of the first or the second order, whose lower polynomial begins with 1."""
         if lower[2] != 0:
-            return self.biquad(signal, upper, lower, name)
+            return self.biquad(signal, upper, lower, name, rule)
         through = sp.sympify(upper[1]) / lower[1]
-        return self.low_pass(signal, lower[1], name) * (upper[0] - through) + signal * through
+        return self.low_pass(signal, lower[1], name, rule) * (upper[0] - through) + signal * through
 
     def lead(self, signal: Signal, zero: sp.Expr, pole: sp.Expr, name: str) -> Signal:
         """(1 + zero s)/(1 + pole s), both [s]: a lead where the zero is the longer one, else a lag."""

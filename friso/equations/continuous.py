@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import sympy as sp
 
@@ -24,7 +24,8 @@ from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, TIME, Component, Kink, Output, Role, State, Switch, sine, state
 from friso.equations.structure import ControllerForm, controller_form
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
-from friso.stage.filters import Polynomial
+from friso.stage.filters import FilterRule, Polynomial
+from friso.stage.rig import IntegralRule
 
 UNWINDING_BAND = sp.Rational(1, 1000)
 """Share of the force limit over which the integrator is brought to rest.
@@ -130,7 +131,7 @@ class Continuous(Blocks):
         """What the integrators integrate in a steady motion."""
         return {integral.symbol: integral.settled for integral in self._integrals}
 
-    def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
+    def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
         """By a state, the filtered signal; `tau` [s]."""
         low = state(f"filtered_{name}")
         slope = (signal.value - low) / tau
@@ -149,7 +150,7 @@ class Continuous(Blocks):
         signal: Signal,
         gain: sp.Expr,
         name: str = "integral",
-        rule: Literal["bilinear", "sum"] = "bilinear",
+        rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
         """By a state, which rests as the base class describes; `gain` in N per unit of the state."""
@@ -158,7 +159,9 @@ class Continuous(Blocks):
         self._integrals.append(_Integral(symbol, signal.value, signal.settled, signal.scale / self.rate, output, limit))
         return Signal(output, gain * signal.scale / self.rate, output, sp.S.Zero, rate=gain * signal.value)
 
-    def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+    def biquad(
+        self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
+    ) -> Signal:
         """By two states: the signal through the lower polynomial, and its rate."""
         low, slope = state(f"filtered_{name}"), state(f"filtered_{name}_rate")
         bend = (signal.value - low - lower[1] * slope) / lower[2]

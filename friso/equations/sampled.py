@@ -1,7 +1,8 @@
 """Controllers as a drive carries them out: a force computed at every sample and held until the next.
 
-Filters, and what they feed, are discretised by the bilinear transform (Tustin), as in `friso.frequency.drive`;
-integrals as their controller says. Without a filter a derivative is a difference over samples.
+Filters and integrals are discretised block by block, by the rules that the drive has (Franklin, Powell, Workman 1998,
+Digital Control of Dynamic Systems, chapter 6). Without a filter a derivative is a difference over samples. Bode plots
+of a drive with a sample time are of these very equations (`friso.frequency.rates`).
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import sympy as sp
 
@@ -28,7 +29,8 @@ from friso.equations.cases import Piecewise
 from friso.equations.component import STEADY, Held, Role, clipped, key, sine, state
 from friso.equations.structure import ControllerForm
 from friso.stage.controllers import BACK_CALCULATION, AntiWindup
-from friso.stage.filters import Polynomial
+from friso.stage.filters import FilterRule, Polynomial
+from friso.stage.rig import IntegralRule
 
 SAMPLE_TIME = key("drive.sample_time")
 
@@ -72,6 +74,34 @@ class _Integral:
     share: sp.Expr
     gain: sp.Expr
     limit: sp.Expr | None
+
+
+@dataclass(frozen=True)
+class Rate:
+    """What stands for s in discrete time: 2 (1 - 1/z)/(step (1 + weight/z)), step [s]."""
+
+    step: sp.Expr
+    weight: sp.Integer
+
+    @classmethod
+    def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> Rate:
+        """That of a rule with a period [s], prewarped to be exact at an angular frequency [rad/s]."""
+        if rule == "backward_euler":
+            return cls(2 * period, sp.S.Zero)
+        if rule == "prewarped":
+            turn = exact_at * period / (4 * sp.pi)
+            return cls(2 * sine(turn) / (exact_at * sine(turn + sp.Rational(1, 4))), sp.S.One)
+        return cls(period, sp.S.One)
+
+    def scale(self, period: sp.Expr) -> sp.Expr:
+        """By how much it is larger than s where all changes slowly: 1, if it is not prewarped."""
+        return 2 * period / (self.step * (1 + self.weight))
+
+    def polynomial(self, polynomial: Polynomial) -> Polynomial:
+        """The coefficients of 1, 1/z and 1/z^2 of a polynomial in s, times (1 + weight/z)^2."""
+        double, weight = 2 / self.step, self.weight
+        p0, p1, p2 = polynomial[0], polynomial[1] * double, polynomial[2] * double**2
+        return p0 + p1 + p2, 2 * weight * p0 + (weight - 1) * p1 - 2 * p2, weight**2 * p0 - weight * p1 + p2
 
 
 class Sampled(Blocks):
@@ -118,12 +148,21 @@ class Sampled(Blocks):
         self.held.append(Held(symbol, value, settled))
         return symbol
 
-    def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
-        """By the bilinear transform; `tau` [s]."""
+    def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
+        """By the rule; `tau` [s]."""
         before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
-        passed = ((2 * tau - self.period) * low + self.period * (signal.value + before)) / (2 * tau + self.period)
-        self.held += [Held(before, signal.value, signal.settled), Held(low, passed, signal.settled)]
+        rate = Rate.by(rule or self._own_rule, self.period, 1 / tau)
+        seen = signal.value + rate.weight * before
+        passed = ((2 * tau - rate.weight * rate.step) * low + rate.step * seen) / (2 * tau + rate.step)
+        if rate.weight:
+            self.held.append(Held(before, signal.value, signal.settled))
+        self.held.append(Held(low, passed, signal.settled))
         return replace(signal, value=passed, rate=None, before=low)
+
+    @property
+    def _own_rule(self) -> FilterRule:
+        """The rule for a low-pass of the controller's own."""
+        return "backward_euler" if self.form and self.form.filter_rule == "backward_euler" else "bilinear"
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
         """With a filter by the bilinear transform, else a difference over samples; `tau` [s]."""
@@ -141,26 +180,31 @@ class Sampled(Blocks):
         signal: Signal,
         gain: sp.Expr,
         name: str = "integral",
-        rule: Literal["bilinear", "sum"] = "bilinear",
+        rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
         """A number that a sample adds to; `gain` in N per unit of it."""
         symbol, following = state(name), state(f"next_{name}")
+        rule = (self.form.integral_rule if self.form else None) or rule
         share = self.period * signal.value
-        if rule == "bilinear":
+        if rule != "backward_euler":
             before = signal.before
             if before is None:
                 before = self._previous(f"{name}_signal_before", signal.value, signal.settled)
-            share = self.period / 2 * (signal.value + before)
+            share = self.period * before if rule == "forward_euler" else self.period / 2 * (signal.value + before)
         if self.due is not None:
             share = Piecewise((share, self.due), (0, True))
         self._integrals.append(_Integral(symbol, following, share, gain, limit))
         return Signal(gain * following, gain * signal.scale * self.period, gain * symbol, sp.S.Zero)
 
-    def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
-        """By the bilinear transform, from two samples back."""
-        (b0, b1, b2), (a0, a1, a2) = (_tustin(polynomial, self.period) for polynomial in (upper, lower))
-        settled = upper[0] * signal.settled + (upper[1] - upper[0] * lower[1]) * signal.settled_rate
+    def biquad(
+        self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
+    ) -> Signal:
+        """By the rule, from two samples back."""
+        rate = Rate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
+        (b0, b1, b2), (a0, a1, a2) = map(rate.polynomial, (upper, lower))
+        lag = (upper[1] - upper[0] * lower[1]) * rate.scale(self.period)
+        settled = upper[0] * signal.settled + lag * signal.settled_rate
         back = self.period * signal.settled_rate
         u1, u2 = state(f"signal_before_{name}"), state(f"signal_before_{name}_2")
         y1, y2 = state(f"filtered_{name}"), state(f"filtered_{name}_2")
@@ -273,11 +317,3 @@ class Sampled(Blocks):
         held += [Held(i.symbol, updates[i.next], steady[i.symbol], Role.INTEGRAL) for i in self._integrals]
         force: Any = demand.force.value
         return force.xreplace(updates), tuple(held)
-
-
-def _tustin(polynomial: Polynomial, period: sp.Expr) -> Polynomial:
-    """The coefficients of 1, 1/z and 1/z^2 of a polynomial in s by the bilinear transform with a period [s], times
-    (1 + 1/z)^2."""
-    double = 2 / period
-    p0, p1, p2 = polynomial[0], polynomial[1] * double, polynomial[2] * double**2
-    return p0 + p1 + p2, 2 * p0 - 2 * p2, p0 - p1 + p2

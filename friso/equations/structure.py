@@ -20,8 +20,8 @@ from friso.stage.controllers import (
     ControllerSection,
     controller_of,
 )
-from friso.stage.filters import FilterForm, filter_forms
-from friso.stage.rig import LOOPS
+from friso.stage.filters import FILTER_RULE, FilterForm, FilterRule, filter_forms
+from friso.stage.rig import LOOPS, IntegralRule
 from friso.stage.standstill import NO_SETTINGS, FrictionSettings, settings_of
 from friso.stage.tables import friction_law
 from friso.stage.transmission import BACKLASH, ENCODER, MOTOR_FRICTION, MOTOR_MASS, Side, as_friction
@@ -33,7 +33,8 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 class ControllerForm:
     """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
     it has integral action; what that does at the limit of the force (None: there is no limit); its filters; its
-    settings against friction; and which of its loops have sample times of their own."""
+    settings against friction; which of its loops have sample times of their own; and how a drive takes its integrals
+    (None: as the controller says) and the low-pass filters of its own."""
 
     kind: str
     form: str
@@ -43,6 +44,8 @@ class ControllerForm:
     filters: tuple[FilterForm, ...] = ()
     settings: FrictionSettings = NO_SETTINGS
     loops: tuple[str, ...] = ()
+    integral_rule: IntegralRule | None = None
+    filter_rule: FilterRule = "bilinear"
 
     @property
     def section(self) -> type[ControllerSection]:
@@ -179,4 +182,6 @@ def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
         filters=filter_forms(flat, FILTERS_KEY),
         settings=settings_of(flat),
         loops=tuple(name for name in LOOPS if f"drive.{name}_sample_time" in flat),
+        integral_rule=flat.get("drive.integral_discretisation"),
+        filter_rule=flat.get(FILTER_RULE, "bilinear"),
     )

@@ -9,7 +9,7 @@ from friso.errors import InputError
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
 from friso.frequency.members import Members, limit_cases, limiter_states
-from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, plant, reference_derivatives
+from friso.frequency.parts import FORCE, RATED, REFERENCE, STAGE, VELOCITY, compensator, plant, reference_derivatives
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
 from friso.quantities import quoted
@@ -36,10 +36,10 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
     - "closed": from "force", "reference", "disturbance on cart" and "sensor noise" [m] to "stage", "cart", "joint
       deflection" and "force".
 
-    All are in continuous time, without the sampling and delay of a drive. With `series`, a touched limiter acts by
-    the formula that Table 1 of the thesis prints, instead of in parallel with the joint. Where the cart is stuck, its
-    bristles follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor,
-    which has none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
+    All are in continuous time, without sampling, delay and current loop of a drive. With `series`, a touched limiter
+    acts by the formula that Table 1 of the thesis prints, instead of in parallel with the joint. Where the cart is
+    stuck, its bristles follow it and are no states; a derivative of the measured velocity does not see the noise of the
+    sensor, which has none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
 
     Examples
     --------
@@ -97,8 +97,8 @@ def _closed(flat: Mapping[str, Any], member: Members) -> System:
 
 
 def _at_axis(system: System) -> System:
-    """Without the velocity of the stage, which is the controller's business."""
-    return system.take(system.inputs, [name for name in system.outputs if name != VELOCITY])
+    """Without velocity and the position that it is of, which are the controller's business."""
+    return system.take(system.inputs, [name for name in system.outputs if name not in (VELOCITY, RATED)])
 
 
 _PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
+from friso.frequency.cascaded import CascadeLoops, cascade_loops, is_cascade
 from friso.frequency.crossover import Limits, limits
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import Scan, closed_loop_poles, loops, plant_poles, scan_stability, spectral_abscissa
@@ -72,7 +73,7 @@ class Bode:
     the thesis's formula for a touched limiter ("-series"); the `scan` of the family, and its loops over `omega`; its
     `worst` member, and the worst of the `settled` ones (limit cases, and stuck under any bias), each with its margins;
     the ranges of speed that are `unstable`; the loops at `prescribed` speeds of the cart, the limiter free; `limits` by
-    joint ("locked" and "free", or "given" without one).
+    joint ("locked" and "free", or "given" without one); and, of a cascade, each of its loops, `cascades` by limit case.
     """
 
     stage: Stage
@@ -85,6 +86,7 @@ class Bode:
     unstable: tuple[Unstable, ...]
     prescribed: tuple[Prescribed, ...]
     limits: Mapping[str, Limits]
+    cascades: Mapping[str, CascadeLoops]
 
     @property
     def stable(self) -> bool:
@@ -130,6 +132,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
         limits={
             name: limits(member.flat()) for name, member in variants.items() if name != "given" or len(variants) == 1
         },
+        cascades={name: cascade_loops(*state, omega) for name, state in states.items()} if is_cascade(flat) else {},
     )
 
 

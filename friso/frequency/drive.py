@@ -1,4 +1,4 @@
-"""The drive that carries out the controller: hold and delay of the plant, and the controller in discrete time."""
+"""The drive that carries out the controller: hold, delay and current loop before the plant."""
 
 from __future__ import annotations
 
@@ -39,12 +39,13 @@ SCALED = 0.5
 
 @dataclass(frozen=True)
 class DriveTiming:
-    """Sample time [s], 0 for a controller in continuous time, delay between measurement and force [s], and the samples
-    after which all its loops are due again."""
+    """Sample time [s], 0 for a controller in continuous time, delay between measurement and force [s], the samples
+    after which all its loops are due again, and the time constant of the current loop [s], 0 without one."""
 
     sample_time: float
     delay: float
     period: int = 1
+    lag: float = 0.0
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
@@ -57,7 +58,8 @@ class DriveTiming:
         if period > MOST_SAMPLES:
             text = f"{slow[key]:g} s, {period} samples of {sample_time:g} s"
             raise InputError(key, text, f"at most {MOST_SAMPLES} samples", 'position_sample_time = "1 ms"')
-        drive = cls(sample_time, flat.get("drive.delay", 0.0), period)
+        lag = 1 / (2 * np.pi * flat["drive.current_bandwidth"]) if "drive.current_bandwidth" in flat else 0.0
+        drive = cls(sample_time, flat.get("drive.delay", 0.0), period, lag)
         if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
             text = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
             raise InputError("drive.delay", text, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
@@ -75,15 +77,9 @@ class DriveTiming:
         return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
-        """What hold and delay do to angular frequencies [rad/s], all but their aliases."""
+        """What hold, delay and current loop do to angular frequencies [rad/s], all but their aliases."""
         half = omega * self.sample_time / 2
-        return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay))
-
-    def controller_s(self, omega: np.ndarray) -> np.ndarray:
-        """The s [rad/s] of the continuous controller at which the sampled one answers (bilinear transform)."""
-        if not self.sample_time:
-            return 1j * omega
-        return 2j / self.sample_time * np.tan(omega * self.sample_time / 2)
+        return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay)) / (1 + 1j * omega * self.lag)
 
     def to_s(self, poles: Complex) -> Complex:
         """Poles of the loop as s [rad/s]: of a sampled one, those whose exponential over its period they are, as slow
@@ -100,14 +96,12 @@ def resonances(poles: Complex) -> Complex:
     return poles[np.abs(poles.real) < LIGHT * np.abs(poles.imag)]
 
 
-def bilinear(control: System, sample_time: float) -> System:
-    """A controller in discrete time [s], by the bilinear transform."""
-    half = control.a * sample_time / 2
-    identity = np.eye(len(control.states))
-    inverse = np.linalg.inv(identity - half)
-    b = inverse @ control.b * sample_time
-    d = control.d + control.c @ b / 2
-    return replace(control, a=inverse @ (identity + half), b=b, c=control.c @ inverse, d=d)
+def behind_current_loop(machine: System, lag: float) -> System:
+    """A plant with one input whose force follows with a first-order lag [s], 0 for none."""
+    if not lag:
+        return machine
+    pole = np.full((1, 1), 1 / lag)
+    return _behind(machine, (-pole, pole, np.eye(1), np.zeros((1, 1))), "motor_force")
 
 
 def zero_order_hold(machine: System, sample_time: float, late: float) -> System:

@@ -20,7 +20,7 @@ from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
 from friso.frequency.members import Members, concatenate_families, limit_cases
-from friso.frequency.parts import FORCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
+from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.system import Complex, System
 from friso.system import usable_cores
@@ -173,8 +173,8 @@ def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Compl
 
 
 def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Callable[[Mapping[str, Any]], Complex]:
-    """L without hold and delay at angular frequencies (k,) [rad/s], for the keys of any controller: shape (members, k);
-    what it moves is computed once."""
+    """L without hold, delay and current loop at angular frequencies (k,) [rad/s], for the keys of any controller: shape
+    (members, k); what it moves is computed once."""
     if shared_structure(flat).transmission is None:
         bare = plants(flat, members, omega)
         return lambda keys: bare * controller_response(keys, omega)
@@ -183,12 +183,13 @@ def bare_loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> 
 
 
 def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """Position and velocity measured over the force [m/N, m/(N s)], shape (members, k, 2): by the whole plant, whose
-    encoders may be on different sides of a transmission."""
+    """Position measured over the force [m/N], and velocity [m/(N s)] or, sampled, the position that it is of, shape
+    (members, k, 2): by the whole plant, whose encoders may be on different sides of a transmission."""
+    second = RATED if DriveTiming.of(flat).sample_time else VELOCITY
     answers = np.empty((len(members), len(omega), 2), complex)
     for mask in (members.stuck, ~members.stuck):
         for part in np.array_split(np.flatnonzero(mask), -(-int(mask.sum()) // FEW) or 1):
-            machine = plant(flat, members[part]).take((FORCE,), (STAGE, VELOCITY)) if len(part) else None
+            machine = plant(flat, members[part]).take((FORCE,), (STAGE, second)) if len(part) else None
             if machine is not None:
                 answers[part] = machine.at(1j * omega)[..., 0]
     return answers
@@ -196,20 +197,21 @@ def _measured_compliance(flat: Mapping[str, Any], members: Members, omega: np.nd
 
 def controller_response(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
     """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
-    position, velocity = _channels(flat, omega).T
-    return position + 1j * omega * velocity
+    position, second = _channels(flat, omega).T
+    return position + (second if DriveTiming.of(flat).sample_time else 1j * omega * second)
 
 
 def _channels(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
-    """Force over position and velocity measured [N/m, N s/m], its sign reversed, shape (k, 2); with loops at several
-    rates, the part of it that has the frequency of the position, of which the velocity is a difference."""
+    """Force over position [N/m] and velocity measured [N s/m], or, sampled, over the two positions, its sign reversed,
+    shape (k, 2); with loops at several rates, the part of it that has the frequency of what is measured."""
     drive = DriveTiming.of(flat)
-    if drive.period > 1:
-        lifted = controller_over_period(samples_controller(flat, 1, drive.period))
-        position = -lifted.fundamental(omega * drive.sample_time)[0]
-        return np.stack([position, np.zeros_like(position)], axis=1)
-    s = drive.controller_s(omega)
-    return -compensator(flat, 1).take((STAGE, VELOCITY), (FORCE,)).at(s)[0, :, 0]
+    if drive.sample_time:
+        controls, turn = samples_controller(flat, 1, drive.period), omega * drive.sample_time
+        if drive.period == 1:
+            return -controls[0].at(np.exp(1j * turn))[0, :, 0]
+        lifted = (controller_over_period(controls, measured) for measured in (STAGE, RATED))
+        return -np.stack([channel.fundamental(turn)[0] for channel in lifted], axis=1)
+    return -compensator(flat, 1).take((STAGE, VELOCITY), (FORCE,)).at(1j * omega)[0, :, 0]
 
 
 def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Complex:

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.frequency.drive import DriveTiming, bilinear, delayed, fastest, waited, zero_order_hold
+from friso.frequency.drive import DriveTiming, behind_current_loop, delayed, fastest, waited, zero_order_hold
 from friso.frequency.members import Members
 from friso.frequency.parts import (
     DISTURBANCE,
     FORCE,
     NOISE,
+    RATED,
     REFERENCE,
     STAGE,
     VELOCITY,
@@ -21,7 +22,7 @@ from friso.frequency.parts import (
     plant,
     reference_derivatives,
 )
-from friso.frequency.rates import closed_over_period, cut_over_period, samples_controller
+from friso.frequency.rates import Lifted, closed_over_period, cut_over_period, samples_controller, unseen
 from friso.frequency.system import Complex, System
 
 ROUNDING = 50 * float(np.finfo(float).eps)
@@ -110,53 +111,65 @@ class Poles:
         return distance
 
 
-def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> Poles:
+def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming, cut: str = "") -> Poles:
     """Poles of the loop, of members all of which are stuck or none; those of a delay in continuous time are of rational
-    functions that stand for it. Raises InputError for a delay that is too long for these."""
-    machine, control = plant(flat, members).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, len(members))
-    bare = _cut(machine, control)
+    functions that stand for it. The way of what is measured on one `cut` channel, STAGE or VELOCITY, is left open.
+    Raises InputError for a delay that is too long for these."""
+    machine = _driven(flat, members, drive)
+    bare = _cut(machine, _continuous(flat, len(members), cut))
     if drive.sample_time:
-        samples, late = drive.samples_late
-        machine = waited(zero_order_hold(machine, drive.sample_time, late), samples)
-        if drive.period > 1:
-            return _over_period(flat, machine.take((FORCE,), (STAGE,)), drive, _shut(bare))
-        control = bilinear(control, drive.sample_time)
-    elif drive.delay:
-        machine = delayed(machine, drive.delay, fastest(_shut(bare)))
-    loop = _cut(machine, control) if drive.sample_time or drive.delay else bare
+        sampled, controls = _held(machine, drive), _controls(flat, len(members), drive, cut)
+        matrices = closed_over_period(sampled, controls), cut_over_period(sampled, controls).a
+        closed, opened = (np.linalg.eigvals(matrix).astype(complex) for matrix in matrices)
+        return Poles(closed, opened, _shut(bare), drive)
+    loop = bare
+    if drive.delay:
+        late = delayed(machine, drive.delay, fastest(_shut(bare)))
+        loop = _cut(late, _continuous(flat, len(members), cut))
     closed = _shut(loop)
-    cut = np.linalg.eigvals(loop.a).astype(complex)
-    return Poles(closed, cut, closed if loop is bare else _shut(bare), drive)
+    return Poles(closed, np.linalg.eigvals(loop.a).astype(complex), closed if loop is bare else _shut(bare), drive)
 
 
-def _over_period(flat: Mapping[str, Any], machine: System, drive: DriveTiming, bare: Complex) -> Poles:
-    """Poles of a loop of several rates, over its period; `bare` are those in continuous time."""
-    controls = samples_controller(flat, len(machine.a), drive.period)
-    closed, cut = closed_over_period(machine, controls), cut_over_period(machine, controls).a
-    closed, cut = (np.linalg.eigvals(matrix).astype(complex) for matrix in (closed, cut))
-    return Poles(closed, cut, bare, drive)
-
-
-def response(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
+def response(
+    flat: Mapping[str, Any], member: Members, drive: DriveTiming, cut: str = ""
+) -> Callable[[np.ndarray], Complex]:
     """L over angular frequencies [rad/s], exactly, of a stage in one state; with loops at several rates its
-    characteristic locus (see `friso.frequency.rates`)."""
-    if not drive.sample_time:
-        loop = open_loop(flat, member)
-        return lambda omega: loop.at(1j * omega)[0, :, 0, 0] * np.exp(-1j * omega * drive.delay)
-    machine, control = plant(flat, member).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, 1)
-    samples, late = drive.samples_late
-    held = zero_order_hold(machine, drive.sample_time, late)
-    if drive.period > 1:
-        machine = waited(held, samples).take((FORCE,), (STAGE,))
-        lifted = cut_over_period(machine, samples_controller(flat, 1, drive.period))
+    characteristic locus (see `friso.frequency.rates`). One channel of what is measured may be `cut`."""
+    if drive.sample_time:
+        lifted = lifted_loop(flat, member, drive, cut)
         return lambda omega: lifted.locus(omega * drive.sample_time)[0]
-    sampled = _cut(held, bilinear(control, drive.sample_time))
+    loop = _cut(_driven(flat, member, drive), _continuous(flat, 1, cut))
+    return lambda omega: loop.at(1j * omega)[0, :, 0, 0] * np.exp(-1j * omega * drive.delay)
 
-    def at(omega: np.ndarray) -> Complex:
-        z = np.exp(1j * omega * drive.sample_time)
-        return sampled.at(z)[0, :, 0, 0] * z ** -float(samples)
 
-    return at
+def lifted_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming, cut: str = "") -> Lifted:
+    """The loop of a sampled drive over its period, cut at the actuator."""
+    return cut_over_period(_held(_driven(flat, member, drive), drive), _controls(flat, len(member), drive, cut))
+
+
+def _driven(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> System:
+    """From the force that is commanded to all that is measured."""
+    machine = plant(flat, members).take((FORCE,), (STAGE, VELOCITY, RATED))
+    return behind_current_loop(machine, drive.lag)
+
+
+def _held(machine: System, drive: DriveTiming) -> System:
+    """From the force at a sample to the positions at the next, behind hold and delay."""
+    samples, late = drive.samples_late
+    return waited(zero_order_hold(machine, drive.sample_time, late), samples).take((FORCE,), (STAGE, RATED))
+
+
+def _continuous(flat: Mapping[str, Any], members: int, cut: str) -> System:
+    """The controller in continuous time, a channel cut."""
+    control = compensator(flat, members)
+    return unseen(control, cut) if cut else control
+
+
+def _controls(flat: Mapping[str, Any], members: int, drive: DriveTiming, cut: str) -> tuple[System, ...]:
+    """The controller at the samples of a period, a channel cut."""
+    controls = samples_controller({**flat, "drive.sample_time": drive.sample_time}, members, drive.period)
+    sampled = {VELOCITY: RATED}.get(cut, cut)
+    return tuple(unseen(control, sampled) for control in controls) if cut else controls
 
 
 def _cut(machine: System, control: System) -> System:

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from friso.frequency.drive import DriveTiming, resonances
-from friso.frequency.loops import poles, response
+from friso.frequency.loops import Poles, poles, response
 from friso.frequency.members import Members
 from friso.frequency.system import Complex
 
@@ -35,6 +35,12 @@ magnitude by which it may still change, or be off the real axis."""
 
 REAL = 1e-9
 """Share of the real part below which the imaginary one may be rounding."""
+
+OF_ALIAS = 1e-3
+"""Share of the rate of the slowest loop within which the aliases of rest drown a locus in rounding."""
+
+JUMP = 1e-3
+"""Share of the values on both sides that a function still has where it jumps through zero."""
 
 LoopResponse = Callable[[np.ndarray], Complex]
 
@@ -79,12 +85,19 @@ class Margins:
 def margins(flat: Mapping[str, Any], member: Members) -> Margins:
     """The margins of a stage in one of its states. Raises InputError for too long a delay (see `DriveTiming`)."""
     drive = DriveTiming.of(flat)
-    closed_poles, at = poles(flat, member, drive), response(flat, member, drive)
-    closed = closed_poles.in_s[0]
-    resonant = [closed, drive.to_s(closed_poles.cut[0]), *([closed_poles.continuous] if drive.period > 1 else [])]
-    omega = frequencies(flat, member, drive, DENSITY, resonant)
-    ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest]))[0]] if drive.sample_time else [])]
-    return of_loop(at, closed[np.isfinite(closed)], float(closed_poles.abscissa[0]), omega, np.array(ends, complex))
+    return margins_of(response(flat, member, drive), flat, member, poles(flat, member, drive))
+
+
+def margins_of(at: LoopResponse, flat: Mapping[str, Any], member: Members, loop_poles: Poles) -> Margins:
+    """The margins of one loop of a stage from its response and its poles."""
+    drive, closed = loop_poles.drive, loop_poles.in_s[0]
+    resonant = [closed, drive.to_s(loop_poles.cut[0]), *([loop_poles.continuous] if drive.period > 1 else [])]
+    omega, aside = frequencies(flat, member, drive, DENSITY, resonant), 1.0
+    if drive.period > 1:
+        apart = 2 * np.pi / (drive.sample_time * drive.period)
+        omega, aside = omega[np.abs(omega / apart - np.maximum(np.round(omega / apart), 1)) > OF_ALIAS], 1 - OF_ALIAS
+    ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest * aside]))[0]] if drive.sample_time else [])]
+    return of_loop(at, closed[np.isfinite(closed)], float(loop_poles.abscissa[0]), omega, np.array(ends, complex))
 
 
 def frequencies(
@@ -146,13 +159,15 @@ def _decades(loop: Complex) -> np.ndarray:
 
 
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Where a function of the frequency, known at some, passes zero."""
+    """Where a function of the frequency, known at some, passes zero; not where it jumps, as a locus does that goes over
+    to an alias."""
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)
-    crossings = [
-        brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)) for k in passes
-    ]
-    return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
+    crossings = {
+        brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)): k for k in passes
+    }
+    jumps = [at for at, k in crossings.items() if abs(function(at)) > JUMP * np.abs(values[k : k + 2]).max()]
+    return np.array(sorted({*crossings, *omega[values == 0].tolist()}.difference(jumps)))
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:

@@ -29,6 +29,8 @@ from friso.stage.transmission import MOTOR_STATES
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
 REFERENCE_VELOCITY, REFERENCE_ACCELERATION = FEEDFORWARD = "reference velocity", "reference acceleration"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
+RATED = "velocity's encoder"
+"""The position of which the velocity is the rate."""
 
 _REFERENCE, _POSITION, _VELOCITY, _SPEED, _ACCELERATION = (
     sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v", "r_rate", "r_bend")
@@ -43,8 +45,8 @@ _CONTROLLER_INPUTS = {
 
 
 def plant(flat: Mapping[str, Any], members: Members) -> System:
-    """From the forces on stage and cart [N] to position of stage and cart, joint deflection [m] and velocity of the
-    stage [m/s], of members all of which are stuck or none; `flat` may hold arrays of shape (members,)."""
+    """From the forces on stage and cart [N] to position of stage and cart, at the velocity's encoder, joint deflection
+    [m] and velocity of the stage [m/s], of members all of which are stuck or none; `flat` may hold arrays of shape (members,)."""
     form = _plant(shared_structure(flat))
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
@@ -125,7 +127,8 @@ def _plant(form: Structure) -> _Plant:
     model = assemble(replace(form, controller=None, biased=("cart",)), control=control)
     (loop,) = seen
     expressions = {name: output.expression for name, output in model.outputs.items()}
-    outputs = {STAGE: loop.position, CART: expressions["cart_position"], VELOCITY: loop.velocity}
+    rated = loop.position if loop.rated is None else loop.rated
+    outputs = {STAGE: loop.position, CART: expressions["cart_position"], VELOCITY: loop.velocity, RATED: rated}
     if "joint_deflection" in expressions:
         outputs[DEFLECTION] = expressions["joint_deflection"]
     inputs = {FORCE: push, DISTURBANCE: sp.Symbol("bias.cart", real=True)}

@@ -1,6 +1,6 @@
-"""Loops carried out at several rates: a controller sample by sample, and what repeats after a period lifted to it.
+"""Sampled loops, at one rate or several: a controller sample by sample, and what repeats after a period lifted to it.
 
-Over a period of N samples the loop is a system with N inputs and outputs that does not change (lifting: Chen, Francis
+The controller is that of `friso.equations.sampled`, as a drive carries it out. Over a period of N samples the loop is a system with N inputs and outputs that does not change (lifting: Chen, Francis
 1995, Optimal Sampled-Data Control Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles
 decide on stability. Cut at the actuator it has N characteristic loci; a gain or a phase that is the same at all samples
 takes the loop to the edge where one of them passes -1 (MacFarlane, Postlethwaite 1977,
@@ -22,13 +22,11 @@ from friso.equations.blocks import Loop
 from friso.equations.component import Held
 from friso.equations.sampled import counter, sampled_controller
 from friso.equations.structure import ControllerForm, shared_structure
-from friso.errors import InputError
 from friso.frequency.declared import Declared
+from friso.frequency.parts import FORCE, RATED, STAGE
 from friso.frequency.system import Complex, System
 from friso.stage.rig import LOOPS
 from friso.stage.standstill import FrictionSettings
-
-POSITION, FORCE = "position", "force"
 
 
 @dataclass(frozen=True)
@@ -47,36 +45,53 @@ class Lifted:
         states = np.linalg.solve(shifted, self.b[:, None].astype(complex)).astype(complex)
         return self.c[:, None].astype(complex) @ states + self.d[:, None]
 
+    def over(self, turn: np.ndarray) -> Complex:
+        """The matrices where a signal turns by an angle (k,) [rad] in a sample."""
+        return self.at(np.exp(1j * turn * self.d.shape[-1]))
+
     def fundamental(self, turn: np.ndarray) -> Complex:
         """The part of the answer to a harmonic signal that has its frequency, shape (members, k), for the angle (k,)
         [rad] by which it turns in a sample."""
-        turns = np.exp(1j * turn[:, None] * np.arange(self.d.shape[-1]))  # (k, N)
-        answers = (self.at(turns[:, 1] ** self.d.shape[-1]) @ turns[..., None])[..., 0]
-        return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
+        return _fundamental(self.over(turn), turn)
 
     def locus(self, turn: np.ndarray) -> Complex:
-        """The characteristic locus that is the loop at that frequency, shape (members, k): the eigenvalue that is
-        closest to the fundamental."""
-        eigenvalues = np.linalg.eigvals(self.at(np.exp(1j * turn * self.d.shape[-1])))
-        near = np.abs(eigenvalues - self.fundamental(turn)[..., None]).argmin(axis=-1)
-        return np.take_along_axis(eigenvalues, near[..., None], axis=-1)[..., 0].astype(complex)
+        """The characteristic locus that is the loop at that frequency, shape (members, k)."""
+        return locus_of(self.over(turn), turn)
+
+
+def _fundamental(matrices: Complex, turn: np.ndarray) -> Complex:
+    """What lifted matrices (members, k, N, N) leave of a harmonic signal at its own frequency."""
+    turns = np.exp(1j * turn[:, None] * np.arange(matrices.shape[-1]))  # (k, N)
+    answers = (matrices @ turns[..., None])[..., 0]
+    return np.asarray((answers * turns.conj()).mean(axis=-1), dtype=complex)
+
+
+def locus_of(matrices: Complex, turn: np.ndarray) -> Complex:
+    """The eigenvalue of lifted matrices (members, k, N, N) that is closest to the fundamental, shape (members, k)."""
+    if matrices.shape[-1] == 1:
+        return matrices[..., 0, 0]
+    eigenvalues = np.linalg.eigvals(matrices)
+    near = np.abs(eigenvalues - _fundamental(matrices, turn)[..., None]).argmin(axis=-1)
+    return np.take_along_axis(eigenvalues, near[..., None], axis=-1)[..., 0].astype(complex)
 
 
 def samples_controller(flat: Mapping[str, Any], members: int, period: int) -> tuple[System, ...]:
-    """The controller at each sample of a period: from the position measured [m] to the force [N], and what is held for
-    the next sample. Raises InputError for encoders on both sides of a transmission."""
+    """The controller at each sample of a period: from the position measured, and that of which the velocity is the rate
+    [m], to the force [N], and what is held for the next sample. A controller that feeds back a position alone, of one
+    encoder, does not see the second."""
     form = shared_structure(flat)
-    if form.transmission is not None and form.transmission.position != form.transmission.velocity:
-        actual = "position and velocity from different encoders, with loops at several rates"
-        raise InputError("encoder", actual, "one of the two", 'velocity = "load", or no position_sample_time')
     assert form.controller is not None
+    both = form.controller.section.feeds_back == "velocity"
+    if form.transmission is not None:
+        both |= form.transmission.position != form.transmission.velocity
+    over = round(float(flat.get("drive.velocity_samples", 1.0)))
     ratios = {name: _samples(flat, name) for name in form.controller.loops}
     kinds: dict[tuple[bool, ...], System] = {}
     systems = []
     for k in range(period):
         due = tuple(name not in ratios or k % ratios[name] == 0 for name in LOOPS)
         if due not in kinds:
-            kinds[due] = _declared(form.controller, due).at(flat, members)
+            kinds[due] = _declared(form.controller, due, both, over).at(flat, members)
         systems.append(kinds[due])
     return tuple(systems)
 
@@ -88,16 +103,18 @@ def _samples(flat: Mapping[str, Any], name: str) -> int:
 
 
 @cache
-def _declared(form: ControllerForm, due: tuple[bool, ...]) -> Declared:
-    """The controller at a sample at which some loops are due, of small motions away from the reference."""
+def _declared(form: ControllerForm, due: tuple[bool, ...], both: bool, velocity_samples: int) -> Declared:
+    """The controller at a sample at which some loops are due, of small motions away from the reference; with `both`
+    positions told apart."""
     bare = replace(form, anti_windup=None, settings=FrictionSettings(leak=form.settings.leak))
-    y = sp.Symbol("measured_position", real=True)
-    force, held = sampled_controller(bare, Loop(-y, y, sp.S.Zero, sp.S.Zero), 1)
+    y, rated = sp.symbols("measured_position measured_rated", real=True)
+    seen = Loop(-y, y, sp.S.Zero, sp.S.Zero, rated=rated if both else None)
+    force, held = sampled_controller(bare, seen, velocity_samples)
     passed: dict[Any, Any] = {counter(name): sp.Integer(not now) for name, now in zip(LOOPS, due, strict=True)}
     numbers: list[Held] = [number for number in held if number.symbol not in passed]
     following = tuple(sp.sympify(number.update).subs(passed) for number in numbers)
     symbols = tuple(number.symbol for number in numbers)
-    return Declared(symbols, following, {POSITION: y}, {FORCE: sp.sympify(force).subs(passed)})
+    return Declared(symbols, following, {STAGE: y, RATED: rated}, {FORCE: sp.sympify(force).subs(passed)})
 
 
 def closed_over_period(machine: System, controls: tuple[System, ...]) -> np.ndarray:
@@ -117,14 +134,22 @@ def cut_over_period(machine: System, controls: tuple[System, ...]) -> Lifted:
     return _lifted(steps, [push] * len(steps), answers)
 
 
-def controller_over_period(controls: tuple[System, ...]) -> Lifted:
-    """The controller alone: from the positions of a period to the forces."""
-    steps, pushes = ([getattr(control, part) for control in controls] for part in ("a", "b"))
-    lifted = _lifted(steps, pushes, [control.c for control in controls])
+def controller_over_period(controls: tuple[System, ...], measured: str) -> Lifted:
+    """The controller alone: from what is measured, STAGE or RATED, over a period to the forces."""
+    seen = [control.take((measured,), (FORCE,)) for control in controls]
+    lifted = _lifted([control.a for control in seen], [control.b for control in seen], [control.c for control in seen])
     direct = np.zeros_like(lifted.d)
-    for k, control in enumerate(controls):
+    for k, control in enumerate(seen):
         direct[:, k, k] = control.d[:, 0, 0]
     return replace(lifted, d=lifted.d + direct)
+
+
+def unseen(control: System, measured: str) -> System:
+    """The controller of which one of its inputs is cut."""
+    column = control.inputs.index(measured)
+    b, d = control.b.copy(), control.d.copy()
+    b[..., column] = d[..., column] = 0.0
+    return replace(control, b=b, d=d)
 
 
 def _lifted(steps: list[np.ndarray], pushes: list[np.ndarray], answers: list[np.ndarray]) -> Lifted:

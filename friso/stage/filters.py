@@ -13,8 +13,15 @@ from friso.stage.section import Rule, TableArray, UncertainSection, Variants, ke
 FORWARD, FEEDBACK = "forward", "feedback"
 """What a filter acts on: the force that is demanded, or what is measured."""
 
+FILTER_RULE = "drive.filter_discretisation"
+"""The key that says how a drive takes filters which do not say it themselves."""
+
 MOST = 12
 """Filters of a controller at most."""
+
+FilterRule = Literal["bilinear", "prewarped", "backward_euler"]
+"""How a drive takes a filter in discrete time: by the bilinear transform (Tustin), as it is or such that the filter is
+exact at the frequency of its poles; or by differences to the sample before."""
 
 Polynomial = tuple[Any, Any, Any]
 """Coefficients of 1, s [s] and s^2 [s^2]."""
@@ -44,12 +51,19 @@ class FilterSection(UncertainSection):
         raise NotImplementedError
 
 
+class ContinuousFilter(FilterSection):
+    """Base of the filters that are given in continuous time."""
+
+    discretisation: FilterRule | None = None
+    """How the drive takes it; default: drive.filter_discretisation, bilinear."""
+
+
 FILTERS = Variants("kind")
 FILTER_ARRAY = TableArray(FILTERS, '[[controller.filters]] kind = "notch", frequency = "300 Hz" ...', MOST)
 
 
 @FILTERS.register
-class NotchFilter(FilterSection):
+class NotchFilter(ContinuousFilter):
     """(s^2 + (1 - depth) w s + w_0^2)/(s^2 + w s + w_0^2), w being the width between the points at -3 dB of a notch
     that is as deep as can be."""
 
@@ -72,7 +86,7 @@ class NotchFilter(FilterSection):
 
 
 @FILTERS.register
-class LowPassFilter(FilterSection):
+class LowPassFilter(ContinuousFilter):
     """1/(1 + s/w_0), or of the second order 1/(1 + 2 zeta s/w_0 + s^2/w_0^2)."""
 
     kind: Literal["low_pass"]
@@ -95,7 +109,7 @@ class LowPassFilter(FilterSection):
 
 
 @FILTERS.register
-class LeadLagFilter(FilterSection):
+class LeadLagFilter(ContinuousFilter):
     """(1 + s/w_z)/(1 + s/w_p): a lead where the zero is the slower one."""
 
     kind: Literal["lead_lag"]
@@ -110,7 +124,7 @@ class LeadLagFilter(FilterSection):
 
 
 @FILTERS.register
-class BiquadFilter(FilterSection):
+class BiquadFilter(ContinuousFilter):
     """(1 + 2 zeta_z s/w_z + s^2/w_z^2)/(1 + 2 zeta_p s/w_p + s^2/w_p^2), by its zeros and poles."""
 
     kind: Literal["biquad"]
@@ -141,7 +155,8 @@ class BiquadFilter(FilterSection):
 class SampledBiquadFilter(FilterSection):
     """y = b0 u + b1 u' + b2 u'' - a1 y' - a2 y'', primes for samples before, as drives take it.
 
-    In continuous time it is the filter of which these are the coefficients by the bilinear transform at `sample_time`.
+    In continuous time it is the filter of which these are the coefficients by the bilinear transform at `sample_time`;
+    a drive with that sample time takes them as they are.
     """
 
     kind: Literal["sampled_biquad"]
@@ -185,11 +200,12 @@ def _second_order(omega: Any, damping: Any) -> Polynomial:
 
 
 class FilterForm(NamedTuple):
-    """A filter by its kind, where it acts, and what else its equations depend on."""
+    """A filter by its kind, where it acts, what else its equations depend on, and how a drive takes it."""
 
     kind: str
     path: str
     variant: Hashable
+    discretisation: FilterRule = "bilinear"
 
     @property
     def section(self) -> type[FilterSection]:
@@ -203,5 +219,7 @@ def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
     for place in row_keys(flat, key):
         row = keys_below(flat, place)
         law: Any = FILTERS.classes[row["kind"]]
-        forms.append(FilterForm(row["kind"], row["path"], law.variant(row)))
+        own = "bilinear" if not issubclass(law, ContinuousFilter) else flat.get(FILTER_RULE, "bilinear")
+        rule = row.get("discretisation", own)
+        forms.append(FilterForm(row["kind"], row["path"], law.variant(row), rule))
     return tuple(forms)

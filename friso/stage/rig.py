@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -20,7 +20,8 @@ from friso.quantities import (
     positive,
     quoted,
 )
-from friso.stage.lists import Several, Values
+from friso.stage.filters import FILTER_RULE, FilterRule
+from friso.stage.lists import Several, Values, row_keys
 from friso.stage.section import Rule, Section, UncertainSection
 
 share = Bound("0 or greater, below 1", lambda value: (value >= 0) & (value < 1))
@@ -30,6 +31,9 @@ seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & 
 
 AS_BUILT = ("drive", "rail", "cable", "floor")
 """The tables of the machine as built, which the analyses of the ideal one leave out."""
+
+IntegralRule = Literal["bilinear", "backward_euler", "forward_euler"]
+"""How a drive integrates: by trapezoids, or by a sum that ends with the present sample or with the one before."""
 
 LOOPS = ("velocity", "position")
 """The loops that may have a sample time of their own, drive.<loop>_sample_time."""
@@ -51,6 +55,26 @@ def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
     return Rule((slow, fast), holds, "a whole multiple of the faster sample time, which is given too", example)
 
 
+def _one_travel(flat: Mapping[str, Any]) -> Any:
+    """Whether what a turn moves is told once, or twice the same."""
+    told, lead, ratio = (flat.get(key) for key in ("drive.travel_per_turn", "transmission.lead", "transmission.ratio"))
+    travel = 2 * np.pi / ratio if ratio is not None else lead
+    return True if told is None or travel is None else abs(told / travel - 1) < 1e-6
+
+
+def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
+    """Whether the filters that are exact at a frequency, which sampling allows below half its own, keep to that."""
+    fine: Any = True
+    for place in row_keys(flat, "controller.filters") if "drive.sample_time" in flat else ():
+        coefficients = flat[f"{place}.kind"] == "sampled_biquad"
+        if not coefficients and flat.get(f"{place}.discretisation", flat.get(FILTER_RULE)) == "prewarped":
+            loop = "velocity_" if flat[f"{place}.path"] == "feedback" else ""
+            period = flat.get(f"drive.{loop}sample_time", flat["drive.sample_time"])
+            exact_at = flat.get(f"{place}.frequency", flat.get(f"{place}.pole_frequency", 0.0))
+            fine = fine & (exact_at * period < 1 / 2)
+    return fine
+
+
 class Drive(UncertainSection):
     """How the controller is carried out: friso bode reads sample_time and delay, friso rig all of it."""
 
@@ -60,7 +84,11 @@ class Drive(UncertainSection):
     position_sample_time: Annotated[Value | None, Quantity("s", positive, "1 ms")] = None
     """Of the loops of a cascade that are slower than sample_time, a whole number of samples each."""
     velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
-    """Over how many samples the position's difference is taken for its velocity; only a log's simulation reads it."""
+    """Over how many samples the position's difference is taken for its velocity."""
+    integral_discretisation: IntegralRule | None = None
+    """Default: a sum that ends with the present sample, by trapezoids for van Dijk's rules."""
+    filter_discretisation: FilterRule | None = None
+    """Of the filters, and of the controller's own low-pass (which prewarping leaves as it is); default: bilinear."""
     current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
     """Bandwidth of the current loop, a first-order lag between the controller's force and the actuator's."""
     encoder_resolution: Annotated[Value | None, Quantity("m", positive, "1 nm")] = None
@@ -81,6 +109,12 @@ class Drive(UncertainSection):
     integrator_reset: bool = False
     """Whether the integrator is reset to 0 where the error changes sign."""
 
+    machine_unit: Literal["mm", "cm", "m", "inch", "deg", "rad"] | None = None
+    force_per_output: Annotated[Value | None, Quantity("N", positive, "20 N")] = None
+    velocity_per_output: Annotated[Value | None, Quantity("m/s", positive, "5 mm/s")] = None
+    travel_per_turn: Annotated[Value | None, Quantity("m", positive, "10 mm")] = None
+    """What friso export needs to write parameters of a drive, as it was told to friso init --from."""
+
     rules: ClassVar[tuple[Rule, ...]] = (
         _multiple("drive.velocity_sample_time", "drive.sample_time", '"125 us"', '"62.5 us"'),
         _multiple("drive.position_sample_time", "drive.sample_time", '"1 ms"', '"125 us"'),
@@ -90,6 +124,18 @@ class Drive(UncertainSection):
             lambda f: f.get("drive.velocity_samples", 1.0) % 1 == 0,
             "a whole number of samples",
             "velocity_samples = 2",
+        ),
+        Rule(
+            ("drive.travel_per_turn", "transmission.lead", "transmission.ratio"),
+            _one_travel,
+            "one travel of a turn: that of the transmission is enough",
+            '[transmission] lead = "10 mm", without travel_per_turn',
+        ),
+        Rule(
+            ("drive.sample_time",),
+            _below_half_the_rate,
+            "a sample time of less than half the period of each prewarped filter",
+            'sample_time = "125 us" with frequency = "300 Hz"',
         ),
         Rule(
             ("drive.ripple", "drive.ripple_pitch"),

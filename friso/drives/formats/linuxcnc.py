@@ -147,12 +147,12 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
     if axis.is_set("DEADBAND"):
         controller["error_deadband"] = si(axis.number("DEADBAND") * unit, kind.unit("m"))
-    drive = {}
+    drive = {UNIT: next(name for name, size in (LENGTHS if kind == LINEAR else ANGLES).items() if size == unit)}
+    if not in_torque and VELOCITY not in answers:
+        drive[VELOCITY] = si(unit, kind.unit("m/s"))
     if "SERVO_PERIOD" in axis.machine:
         drive["sample_time"] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
-    tables: dict[str, Mapping[str, object]] = {"controller": controller}
-    if drive:
-        tables["drive"] = drive
+    tables: dict[str, Mapping[str, object]] = {"controller": controller, "drive": drive}
     if kind != LINEAR:
         tables["axis"] = {"kind": kind.name}
     if axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY"):

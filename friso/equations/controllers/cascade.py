@@ -187,7 +187,7 @@ class Cascade(ControllerSection):
             command = measured.error * kv
             if variant.position_integral:
                 gain = kv / blocks.key("position_integral_time")
-                command += blocks.integral(measured.error, gain, "position_integral", "sum")
+                command += blocks.integral(measured.error, gain, "position_integral", "backward_euler")
             command += measured.reference_velocity * ahead.get("velocity_feedforward", 0)
             command = blocks.handed_on(command, "command")
         integral = blocks.nothing
@@ -198,7 +198,7 @@ class Cascade(ControllerSection):
             velocity = blocks.fed_back(velocity)
             if variant.velocity_integral:
                 gain = kp / blocks.key("velocity_integral_time")
-                integral = blocks.integral(command - velocity, gain, "velocity_integral", "sum")
+                integral = blocks.integral(command - velocity, gain, "velocity_integral", "backward_euler")
             wanted, velocity = blocks.handed_on(command, "wanted"), blocks.handed_on(velocity, "velocity")
         feedforward = measured.reference_acceleration * ahead.get("acceleration_feedforward", 0)
         feedforward += measured.reference_velocity * ahead.get("viscous_feedforward", 0)

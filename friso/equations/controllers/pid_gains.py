@@ -161,7 +161,7 @@ class PidGains(Pid):
         shares = {
             "p": measured.error * kp,
             "d": derivative[variant.derivative_on](),
-            "i": blocks.integral(measured.error, ki, rule="sum") if variant.integral else blocks.nothing,
+            "i": blocks.integral(measured.error, ki, rule="backward_euler") if variant.integral else blocks.nothing,
         }
         references = (measured.reference_velocity, measured.reference_acceleration, measured.reference_direction)
         ahead = [

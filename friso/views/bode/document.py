@@ -22,6 +22,10 @@ def bode_document(bode: Bode) -> dict[str, Any]:
         "conclusion": stability(bode)[0],
         "stage": bode.stage.name,
         "cases": {name: _margins(case.margins) for name, case in bode.cases.items()},
+        "cascade_loops": {
+            name: {loop: _margins(margins) for loop, margins in cascade.margins.items()}
+            for name, cascade in bode.cascades.items()
+        },
         "worst": _at(bode, *bode.worst),
         "worst_settled": _at(bode, *bode.settled),
         "unstable_speeds_m_per_s": [

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friso.frequency.bode import Bode, BodeCase
+from friso.frequency.cascaded import CascadeLoop
 from friso.frequency.crossover import WANTED
 from friso.stage.transmission import moving_mass
 from friso.views.bode.states import SERIES, colour, dash, has_family, has_limiter, label
@@ -60,7 +61,7 @@ LOST = "#eeb48f"
 
 def bode_figures(bode: Bode) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
-    figures = (_plant(bode), _loop(bode), _speeds(bode), _nyquist(bode), _sensitivity(bode))
+    figures = (_plant(bode), *_cascade(bode), _loop(bode), _speeds(bode), _nyquist(bode), _sensitivity(bode))
     return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
 
 
@@ -121,6 +122,32 @@ def _loop(bode: Bode) -> Figure:
     )
     panels = loop_panels(_hertz(bode), [_loop_of(name, case) for name, case in bode.cases.items()])
     return Figure("bode_loop", "Open loop, limit cases", caption, panels)
+
+
+def _cascade(bode: Bode) -> Iterator[Figure]:
+    """What a drive's own Bode plots show of a cascade: the plant of its velocity loop, and each loop."""
+    if not bode.cascades:
+        return
+    from_sliding = sorted(bode.cascades, key=lambda name: name.startswith("stuck"))  # whose phase begins at 0
+    moved = [_curve(name, bode.cascades[name].plant) for name in from_sliding]
+    sizes = np.concatenate([np.abs(curve.response) for curve in moved])
+    axis = Axis("Magnitude", "m/(N*s)", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
+    panels = (_magnitudes(_hertz(bode), moved, axis, np.abs), _phases(_hertz(bode), moved))
+    caption = (
+        "Velocity at its encoder over the force that is commanded, with hold, delay and current loop of the drive."
+    )
+    yield Figure("bode_velocity_plant", "Current command to velocity", caption, panels)
+    opened: dict[CascadeLoop, str] = {
+        "velocity": "The velocity loop, cut where the velocity is fed back; the position loop is open.",
+        "position": "The position loop, cut where the position is fed back; the velocity loop is closed.",
+    }
+    for loop, caption in opened.items():
+        curves = [
+            _marked(_curve(name, loops.loops[loop]), loops.margins[loop].stable)
+            for name, loops in bode.cascades.items()
+        ]
+        panels = loop_panels(_hertz(bode), curves)
+        yield Figure(f"bode_{loop}_loop", f"{loop.capitalize()} loop, opened", caption, panels)
 
 
 def _speeds(bode: Bode) -> Figure:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from friso.frequency.bode import Bode
+from friso.frequency.cascaded import CascadeLoop
 from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.views.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
@@ -22,18 +24,20 @@ _ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
 @dataclass(frozen=True)
 class ShownState:
     """A state with its margins, always under this label, in this colour; `where` says which state it is, if the label
-    does not."""
+    does not; and, of a cascade in a limit case, the margins of each of its `loops`."""
 
     label: str
     colour: str
     where: str
     margins: Margins
+    loops: Mapping[CascadeLoop, Margins] = field(default_factory=dict)
 
 
 def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
     cases = [
-        ShownState(label(name), colour(name), _speed(case.members), case.margins) for name, case in bode.cases.items()
+        ShownState(label(name), colour(name), _speed(case.members), case.margins, _loops(bode, name))
+        for name, case in bode.cases.items()
     ]
     if not has_family(bode):
         return tuple(cases)
@@ -42,6 +46,11 @@ def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     if worst != settled:
         cases.append(ShownState("Worst of the family", GREY, place(worst, bode), worst_margins))
     return tuple(cases)
+
+
+def _loops(bode: Bode, name: str) -> Mapping[CascadeLoop, Margins]:
+    """The margins of the loops of a cascade in a limit case."""
+    return bode.cascades[name].margins if name in bode.cascades else {}
 
 
 def label(name: str) -> str:

@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import get_args
 
 import numpy as np
 
+from friso.frequency.cascaded import CascadeLoop
 from friso.frequency.margins import Margins
 from friso.views.bode.states import ShownState
 from friso.views.drawing.prefixes import NOTHING, with_unit
+
+OF_LOOPS = ("Stable", "0 dB crossings", "Phase margin", "Gain margin", "Modulus margin")
+"""The rows of each loop of a cascade."""
 
 ANY = "no limit"
 """Stands where nothing takes a loop to the edge of its stability."""
@@ -19,7 +24,17 @@ def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some state has something to say."""
     texts = [("State", [item.where or NOTHING for item in states])]
     texts += [(name, [text(item.margins) for item in states]) for name, text in _ROWS.items()]
+    for loop in get_args(CascadeLoop):
+        texts += [
+            (f"{loop.capitalize()} loop: {name[0].lower()}{name[1:]}", [_of_loop(item, loop, name) for item in states])
+            for name in OF_LOOPS
+        ]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
+
+
+def _of_loop(item: ShownState, loop: CascadeLoop, name: str) -> str:
+    """A row of one loop of a cascade."""
+    return _ROWS[name](item.loops[loop]) if loop in item.loops else NOTHING
 
 
 def decibels(factor: float) -> float:

@@ -1,0 +1,89 @@
+"""The loops of a cascade one by one, each opened where a drive's Bode plot opens it.
+
+The plant is what a drive records from the force that it commands to the velocity at its encoder. The velocity loop is
+cut where the velocity is fed back, the position loop being open; the position loop where the position is fed back, the
+velocity loop being closed (Gross, Hamann, Wiegaertner 2001, Electrical Feed Drives, chapters 3 and 4). With loops at
+several rates both are characteristic loci (`friso.frequency.rates`), which do not depend on where in its way a loop is
+cut.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from friso.frequency.drive import DriveTiming
+from friso.frequency.loops import lifted_loop, poles, response
+from friso.frequency.margins import Margins, margins_of
+from friso.frequency.members import Members
+from friso.frequency.parts import FORCE, STAGE, VELOCITY, plant
+from friso.frequency.rates import locus_of
+from friso.frequency.system import Complex
+from friso.stage.controllers import controller_of
+
+POSITION_TIME = "drive.position_sample_time"
+
+CascadeLoop = Literal["velocity", "position"]
+
+UNSEEN = 1e-7
+"""Share of the fastest pole below which a pole of the velocity loop is a position, or the integral of one, that it does
+not see."""
+
+
+@dataclass(frozen=True)
+class CascadeLoops:
+    """A cascade in one state, all over `Bode.omega`, complex: the `plant` from the commanded force to the velocity
+    [m/(N s)], with hold, delay and current loop; and its loops by name, each with its margins."""
+
+    plant: np.ndarray
+    loops: Mapping[CascadeLoop, np.ndarray]
+    margins: Mapping[CascadeLoop, Margins]
+
+
+def is_cascade(flat: Mapping[str, Any]) -> bool:
+    """Whether the controller of a stage given as flat keys closes a velocity loop within its position loop."""
+    return controller_of(flat).feeds_back == "velocity"
+
+
+def cascade_loops(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> CascadeLoops:
+    """The loops of a cascade in one state at angular frequencies [rad/s]."""
+    drive = DriveTiming.of(flat)
+    moved = plant(flat, member).take((FORCE,), (VELOCITY,)).at(1j * omega)[0, :, 0, 0]
+    alone = {key: value for key, value in flat.items() if key != POSITION_TIME}  # the position loop is open
+    timing = DriveTiming.of(alone)
+    inner, outer = response(alone, member, timing, cut=STAGE), _position_loop(flat, member, drive)
+    of_inner = poles(alone, member, timing, cut=STAGE)
+    closed, continuous = of_inner.closed[:, _seen(of_inner.in_s)], of_inner.continuous[:, _seen(of_inner.continuous)]
+    of_inner = replace(of_inner, closed=closed, continuous=continuous)
+    return CascadeLoops(
+        plant=moved * drive.transfer(omega),
+        loops={"velocity": inner(omega), "position": outer(omega)},
+        margins={
+            "velocity": margins_of(inner, alone, member, of_inner),
+            "position": margins_of(outer, flat, member, poles(flat, member, drive)),
+        },
+    )
+
+
+def _seen(rates: Complex) -> np.ndarray:
+    """Which of the poles [rad/s] of a velocity loop (1, n) it sees, shape (n,)."""
+    sizes = np.abs(rates[0])
+    return sizes > UNSEEN * sizes[np.isfinite(sizes)].max(initial=0.0)
+
+
+def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
+    """The position loop over angular frequencies [rad/s], the velocity loop within it closed."""
+    if not drive.sample_time:
+        outer, inner = (response(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
+        return lambda omega: outer(omega) / (1 + inner(omega))
+    by_position, by_velocity = (lifted_loop(flat, member, drive, cut=channel) for channel in (VELOCITY, STAGE))
+
+    def at(omega: np.ndarray) -> Complex:
+        turn = omega * drive.sample_time
+        inner = by_velocity.over(turn)
+        return locus_of(np.linalg.solve(np.eye(inner.shape[-1]) + inner, by_position.over(turn)), turn)[0]
+
+    return at
