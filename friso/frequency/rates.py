@@ -1,11 +1,11 @@
 """Sampled loops, at one rate or several: a controller sample by sample, and what repeats after a period lifted to it.
 
-The controller is that of `friso.equations.sampled`, as a drive carries it out. Over a period of N samples the loop is a system with N inputs and outputs that does not change (lifting: Chen, Francis
-1995, Optimal Sampled-Data Control Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles
-decide on stability. Cut at the actuator it has N characteristic loci; a gain or a phase that is the same at all samples
-takes the loop to the edge where one of them passes -1 (MacFarlane, Postlethwaite 1977,
-doi:10.1080/00207177708922217), so that margins are those of a locus. With all loops at one rate the loci are the
-loop's response at a frequency and at its aliases.
+The controller is that of `friso.equations.sampled`, as a drive carries it out. Over a period of N samples the loop is
+a system with N inputs and outputs that does not change (lifting: Chen, Francis 1995, Optimal Sampled-Data Control
+Systems, chapter 8; Bittanti, Colaneri 2009, Periodic Systems, chapter 6). Its poles decide on stability. Cut at
+the actuator it has N characteristic loci; a gain or a phase that is the same at all samples takes it to the edge where
+one of them passes -1 (MacFarlane, Postlethwaite 1977, doi:10.1080/00207177708922217), so that margins are those of a
+locus. With all loops at one rate the loci are the loop's response at a frequency and at its aliases.
 """
 
 from __future__ import annotations
