@@ -105,7 +105,7 @@ def test_the_document_has_the_agreed_keys(written: tuple[dict, Path]) -> None:
     document, _ = written
     assert document.keys() == {
         *("conclusion", "stage", "cases", "worst", "worst_settled", "unstable_speeds_m_per_s", "limits"),
-        *("files", "plug_ins"),
+        *("files", "plug_ins", "cascade_loops"),
         *("highest_stable_crossover_hz", "still_stable_there"),
     }
     assert document["stage"] == "Thesis rig"
