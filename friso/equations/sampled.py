@@ -77,14 +77,14 @@ class _Integral:
 
 
 @dataclass(frozen=True)
-class Rate:
+class DiscreteRate:
     """What stands for s in discrete time: 2 (1 - 1/z)/(step (1 + weight/z)), step [s]."""
 
     step: sp.Expr
     weight: sp.Integer
 
     @classmethod
-    def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> Rate:
+    def by(cls, rule: FilterRule, period: sp.Expr, exact_at: sp.Expr) -> DiscreteRate:
         """That of a rule with a period [s], prewarped to be exact at an angular frequency [rad/s]."""
         if rule == "backward_euler":
             return cls(2 * period, sp.S.Zero)
@@ -151,7 +151,7 @@ class Sampled(Blocks):
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str, rule: FilterRule | None = None) -> Signal:
         """By the rule; `tau` [s]."""
         before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
-        rate = Rate.by(rule or self._own_rule, self.period, 1 / tau)
+        rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / tau)
         seen = signal.value + rate.weight * before
         passed = ((2 * tau - rate.weight * rate.step) * low + rate.step * seen) / (2 * tau + rate.step)
         if rate.weight:
@@ -201,7 +201,7 @@ class Sampled(Blocks):
         self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str, rule: FilterRule | None = None
     ) -> Signal:
         """By the rule, from two samples back."""
-        rate = Rate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
+        rate = DiscreteRate.by(rule or self._own_rule, self.period, 1 / sp.sqrt(lower[2]))
         (b0, b1, b2), (a0, a1, a2) = map(rate.polynomial, (upper, lower))
         lag = (upper[1] - upper[0] * lower[1]) * rate.scale(self.period)
         settled = upper[0] * signal.settled + lag * signal.settled_rate

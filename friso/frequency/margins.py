@@ -36,6 +36,9 @@ magnitude by which it may still change, or be off the real axis."""
 REAL = 1e-9
 """Share of the real part below which the imaginary one may be rounding."""
 
+VANISHING = 1e-8
+"""Size of a loop that is nothing but rounding: a mass behind a hold does not answer at half the sampling frequency."""
+
 OF_ALIAS = 1e-3
 """Share of the rate of the slowest loop within which the aliases of rest drown a locus in rounding."""
 
@@ -175,7 +178,7 @@ def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Comp
     clear = np.where(np.abs(gains.imag) > REAL * np.abs(gains.real), gains.imag, np.nan)  # not rounding
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
     at = np.concatenate([response(real) if real.size else np.empty(0), ends])
-    return -1 / at.real[at.real < 0]
+    return -1 / at.real[at.real < -VANISHING]
 
 
 def _closest(response: LoopResponse, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:

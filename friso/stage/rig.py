@@ -20,6 +20,7 @@ from friso.quantities import (
     positive,
     quoted,
 )
+from friso.stage.controllers import FILTERS_KEY
 from friso.stage.filters import FILTER_RULE, FilterRule
 from friso.stage.lists import Several, Values, row_keys
 from friso.stage.section import Rule, Section, UncertainSection
@@ -57,15 +58,17 @@ def _multiple(slow: str, fast: str, longer: str, shorter: str) -> Rule:
 
 def _one_travel(flat: Mapping[str, Any]) -> Any:
     """Whether what a turn moves is told once, or twice the same."""
-    told, lead, ratio = (flat.get(key) for key in ("drive.travel_per_turn", "transmission.lead", "transmission.ratio"))
+    of_drive, lead, ratio = (
+        flat.get(key) for key in ("drive.travel_per_turn", "transmission.lead", "transmission.ratio")
+    )
     travel = 2 * np.pi / ratio if ratio is not None else lead
-    return True if told is None or travel is None else abs(told / travel - 1) < 1e-6
+    return True if of_drive is None or travel is None else abs(of_drive / travel - 1) < 1e-6
 
 
 def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
     """Whether the filters that are exact at a frequency, which sampling allows below half its own, keep to that."""
     fine: Any = True
-    for place in row_keys(flat, "controller.filters") if "drive.sample_time" in flat else ():
+    for place in row_keys(flat, FILTERS_KEY) if "drive.sample_time" in flat else ():
         coefficients = flat[f"{place}.kind"] == "sampled_biquad"
         if not coefficients and flat.get(f"{place}.discretisation", flat.get(FILTER_RULE)) == "prewarped":
             loop = "velocity_" if flat[f"{place}.path"] == "feedback" else ""
