@@ -90,7 +90,8 @@ class DiscreteRate:
             return cls(2 * period, sp.S.Zero)
         if rule == "prewarped":
             turn = exact_at * period / (4 * sp.pi)
-            return cls(2 * sine(turn) / (exact_at * sine(turn + sp.Rational(1, 4))), sp.S.One)
+            tangent: Any = sine(turn) / sine(turn + sp.Rational(1, 4))  # type: ignore[operator]
+            return cls(2 * tangent / exact_at, sp.S.One)
         return cls(period, sp.S.One)
 
     def scale(self, period: sp.Expr) -> sp.Expr:

@@ -84,6 +84,7 @@ def _position_loop(flat: Mapping[str, Any], member: Members, drive: DriveTiming)
     def at(omega: np.ndarray) -> Complex:
         turn = omega * drive.sample_time
         inner = by_velocity.over(turn)
-        return locus_of(np.linalg.solve(np.eye(inner.shape[-1]) + inner, by_position.over(turn)), turn)[0]
+        matrices = np.linalg.solve(np.eye(inner.shape[-1]) + inner, by_position.over(turn))
+        return locus_of(matrices.astype(complex), turn)[0]
 
     return at

@@ -166,11 +166,12 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
     to an alias."""
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)
-    crossings = {
-        brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)): k for k in passes
-    }
-    jumps = [at for at, k in crossings.items() if abs(function(at)) > JUMP * np.abs(values[k : k + 2]).max()]
-    return np.array(sorted({*crossings, *omega[values == 0].tolist()}.difference(jumps)))
+    zeros: list[Any] = [
+        brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)) for k in passes
+    ]
+    sizes = np.maximum(np.abs(values[passes]), np.abs(values[passes + 1]))
+    crossings = {at for at, size in zip(zeros, sizes, strict=True) if abs(function(at)) <= JUMP * size}
+    return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
 
 
 def _gains(response: LoopResponse, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
