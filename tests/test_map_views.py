@@ -149,7 +149,7 @@ def test_cells_without_number_are_told_apart_and_never_zero():
     assert all(category is None for row in categories_shown(field) for category in row[1:])
     everything = [
         QUIET,
-        *ramp(11),
+        *ramp(11)[::-1],
         *(
             category.colour
             for category in {*field.categories, *CATEGORIES["outcome"].values()}
@@ -190,7 +190,7 @@ def test_peaks_have_one_colour_per_count():
     assert drawn.colours[0] == QUIET
     assert len(set(drawn.colours)) == 31
     mesh = matplotlib_renderer.render(map_figure(plain(), "peaks")).axes[0].collections[0]
-    assert [to_hex(mesh.to_rgba(float(count))) for count in range(4)] == [QUIET, *ramp(3)]
+    assert [to_hex(mesh.to_rgba(float(count))) for count in range(4)] == [QUIET, *ramp(3)[::-1]]
 
 
 def test_amplitudes_over_many_decades_are_logarithmic_and_end_above_the_noise():

@@ -201,7 +201,7 @@ def metrics(runs: xr.Dataset) -> list[str]:
 
 
 def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
-    """Limits, whether they are logarithmic, and the colours of counted peaks (0 in the colour of rest).
+    """Limits, whether they are logarithmic, and the colours of counted peaks (0 in the colour of rest, 1 next to it).
 
     Positive numbers over more than three decades show on a logarithmic scale, of at most six decades: what a stage
     at rest still moves is the noise of the solver.
@@ -213,7 +213,7 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
     if metric == "multiplier":
         return (-1.0, 1.0), False, ()
     if metric in ("peaks", "distinct_peaks"):
-        return None, False, (QUIET, *ramp(max(1, int(high))))
+        return None, False, (QUIET, *ramp(max(1, int(high)))[::-1])
     positive = finite[finite > 0]
     if low >= 0 and positive.size and high > 1e3 * float(positive.min()):
         return (max(float(positive.min()), 1e-6 * high), high), True, ()
