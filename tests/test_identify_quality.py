@@ -203,6 +203,8 @@ def test_intervals_hold_only_values_that_keys_may_have() -> None:
     stiffness = Estimate("friction.bristle_stiffness", "N/m", 1e5, -1e4, 3e5, "")
     viscous = Estimate("friction.viscous", "N*s/m", 2.0, -1.0, 5.0, "")
     mass = Estimate("masses.stage", "kg", 2.0, 1.0, 3.0, "")
+    asymmetry = Estimate("friction.viscous_asymmetry", "", -0.5, -1.2, 0.2, "")
+    assert with_possible_values([asymmetry], np.eye(1), flat)[0] == (asymmetry,)
     correlation = np.array([[1.0, 0.2, 0.3], [0.2, 1.0, 0.4], [0.3, 0.4, 1.0]])
     (bounded, cut, same), left = with_possible_values([stiffness, viscous, mass], correlation, flat)
     assert (bounded.determined, bounded.low, bounded.high) == (False, 0.0, 3e5)

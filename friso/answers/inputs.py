@@ -77,7 +77,7 @@ def read_stage(
     left = [name for name in leaves_out if getattr(stage, name) and not (name == "rail" and placed)]
     if left:
         tables = ", ".join(f"[{name}]" for name in left)
-        bode = "; friso bode takes sampling and delay into account" if "drive" in left else ""
+        bode = "; friso bode takes sampling, delay and current loop into account" if "drive" in left else ""
         verb = "are" if len(left) > 1 else "is"
         LOGGER.warning(f"{tables} {verb} left out: friso rig simulates the machine as built{bode}")
     return stage

@@ -89,13 +89,13 @@ def _with_answers(
     tables |= {name: dict(table) for name, table in of_axis.tables.items()}
     for key, value in user_answers.items():
         table, dot, name = key.partition(".")
-        if not dot and key in TOLD:
-            table, dot, name = "drive", ".", key
         if dot:
             keys = tables.setdefault(table, {})
             if not isinstance(keys, dict):
                 raise InputError(key, quoted(str(value)), "a key of a table of the stage", 'masses.stage="3 kg"')
             keys[name] = value
+        elif key in TOLD:
+            tables.setdefault("drive", {}).setdefault(key, value)  # a unit that the format has read has its own name
     friction: dict[str, Any] = tables.get("friction", {})
     if friction.get("model") == "none":
         tables.pop("friction")

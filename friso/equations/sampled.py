@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, get_args
 
 import sympy as sp
 
@@ -166,7 +166,7 @@ class Sampled(Blocks):
         return "backward_euler" if self.form and self.form.filter_rule == "backward_euler" else "bilinear"
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
-        """With a filter by the bilinear transform, else a difference over samples; `tau` [s]."""
+        """With a low-pass by the drive's rule, else a difference over samples; `tau` [s]."""
         scale = signal.scale / self.period
         if tau is not None:
             slope = (signal.value - self.low_pass(signal, tau, name).value) / tau
@@ -184,7 +184,9 @@ class Sampled(Blocks):
         rule: IntegralRule = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
-        """A number that a sample adds to; `gain` in N per unit of it."""
+        """A number that a sample adds to; `gain` in N per unit of it. Raises ValueError for an unknown rule."""
+        if rule not in get_args(IntegralRule):
+            raise ValueError(f"rule: {rule!r}; expected one of {', '.join(get_args(IntegralRule))}")
         symbol, following = state(name), state(f"next_{name}")
         rule = (self.form.integral_rule if self.form else None) or rule
         share = self.period * signal.value

@@ -85,7 +85,7 @@ class Poles:
 
     @property
     def in_s(self) -> Complex:
-        """Closed-loop poles as s [rad/s] (see `Drive.to_s`)."""
+        """Closed-loop poles as s [rad/s] (see `DriveTiming.to_s`)."""
         return self.drive.to_s(self.closed)
 
     @property

@@ -12,7 +12,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.parameters import is_free
 from friso.identification.quality import Quality
-from friso.quantities import any_sign
+from friso.quantities import non_negative, positive
 from friso.stage import numeric_keys
 
 
@@ -115,13 +115,15 @@ def with_possible_values(
     estimates: Sequence[Estimate], correlation: np.ndarray, flat: Mapping[str, Any]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The estimates with intervals of values that their keys may have, and the correlation of the shown ones: what
-    cannot be zero, but by its interval might, is bounded from above alone."""
+    cannot be negative is not, and what cannot be zero, but by its interval might, is bounded from above alone."""
     bounds = {key: declared.bound for key, declared in numeric_keys(flat).items()}
     answers, kept = [], []
     for estimate in estimates:
-        bound, answer = bounds.get(estimate.name, any_sign), estimate
-        if estimate.determined and not bound.holds(estimate.low):
-            answer = replace(estimate, low=0.0) if bound.holds(0.0) else _at_most(estimate)
+        bound, answer = bounds.get(estimate.name), estimate
+        if estimate.determined and estimate.low < 0 and bound is non_negative:
+            answer = replace(estimate, value=max(estimate.value, 0.0), low=0.0)
+        elif estimate.determined and estimate.low <= 0 and bound is positive:
+            answer = _at_most(estimate)
         kept += [answer.determined] if estimate.determined else []
         answers.append(answer)
     return tuple(answers), correlation[np.ix_(kept, kept)]

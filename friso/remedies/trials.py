@@ -72,7 +72,7 @@ def moves_of_points(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: G
 
 
 def timing(drive: Stage) -> dict[str, float]:
-    """Sampling and delay of a stage, as flat keys."""
+    """Sampling, delay and current loop of a stage, as flat keys."""
     return {key: value for key, value in drive.flat().items() if key.startswith("drive.")}
 
 

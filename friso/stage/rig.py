@@ -79,7 +79,7 @@ def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
 
 
 class Drive(UncertainSection):
-    """How the controller is carried out: friso bode reads its timing and discretisation, friso rig all of it."""
+    """How the controller is carried out: friso bode reads timing, discretisation, current loop; friso rig all of it."""
 
     sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None

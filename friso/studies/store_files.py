@@ -56,7 +56,7 @@ def keep_arrays(file: Path, arrays: Mapping[str, Any]) -> None:
     """Keep arrays in an archive with the name of its file, which tells of one that is exchanged. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(file) as stream:
-        np.savez_compressed(stream, allow_pickle=False, **{**arrays, _ABOUT: np.array(file.name)})
+        np.savez_compressed(stream, **{**arrays, _ABOUT: np.array(file.name)})
 
 
 _ABOUT = "about"

@@ -59,7 +59,10 @@ TINY = 1e-6
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
 """Keys that follow the preload together, and their correlation, where neither is uncertain in the file: our choice."""
 
-HELD = (f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.delay", "drive.velocity_samples")
+HELD = (
+    *(f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.velocity_sample_time", "drive.position_sample_time"),
+    *("drive.delay", "drive.velocity_samples"),
+)
 """What is set, not identified: the same on all machines, even where the file calls it uncertain."""
 
 SIGNS = int.from_bytes(b"signs")

@@ -72,17 +72,14 @@ class CompareOptions:
 
 
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys for the linear loop: the lag of the current loop counts as a delay, as it acts well below its bandwidth, and
-    the motor's constant over the one believed is part of the controller's gains. The cable is left out."""
-    machine = stage.flat()
-    late = machine.get("drive.delay", 0.0)
-    if "drive.current_bandwidth" in machine:
-        late += 1 / (2 * np.pi * machine["drive.current_bandwidth"])
+    """Keys for the linear loop: the current loop is that of the stage for all machines, and the motor's constant over
+    the one believed is part of the controller's gains. The cable is left out."""
+    current_loop = {key: value for key, value in stage.flat().items() if key == "drive.current_bandwidth"}
     ratio, controller = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
     return {
         **flat,
         **{key: ratio * flat[key] for key in map(controller.key, controller.loop_gain)},
-        "drive.delay": late,
+        **current_loop,
     }
 
 
