@@ -16,6 +16,8 @@ import json
 import resource
 import subprocess
 import sys
+import tempfile
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from datetime import date
@@ -24,6 +26,7 @@ from typing import Any
 
 from benchmarks.canonical import differ, reference_numbers
 from benchmarks.code import code_digest
+from benchmarks.ode23s import thesis_solver
 from benchmarks.report import print_table
 from friso import evidence
 from friso.evidence import Entry, Equations
@@ -209,6 +212,42 @@ def hunting_supercritical() -> Values:
     return dict(entry.values)
 
 
+def design_thesis() -> Values:
+    with tempfile.TemporaryDirectory() as folder:
+        document = friso("design", "examples/thesis_rig.toml", "examples/specs/thesis.toml", "--out", folder)
+    joint, leaves, controller = document["joint"], document["leaves"], document["controller"]
+    free, locked = document["verification"], document["verification"]["locked"]
+    return {
+        "limit_hz": document["machine_limit_hz"],
+        "without_edge_hz": document["without"]["highest_edge_hz"],
+        "needed": float(document["needed"]),
+        "stiffness_n_per_m": joint["stiffness_n_per_m"],
+        "stroke_m": joint["stroke_m"],
+        "force_n": joint["force_at_stroke_n"],
+        "least_static_n": joint["least_static_friction_n"],
+        "edge_hz": joint["highest_edge_hz"],
+        "interfering_hz": leaves["first_interfering_hz"],
+        "crossover_hz": controller["crossover_hz"],
+        "margin": controller["least_modulus_margin"],
+        "kp_n_per_m": controller["kp_n_per_m"],
+        "ki_n_per_m_s": controller["ki_n_per_m_s"],
+        "kd_n_s_per_m": controller["kd_n_s_per_m"],
+        "moves": free["moves"],
+        "not_at_rest": free["not_at_rest"],
+        "settling_s": free["settling_95_s"],
+        "locked_settling_s": locked["settling_95_s"],
+    }
+
+
+def hunting_adrc() -> Values:
+    from friso.equations.controllers.adrc import crossing_ratio
+
+    keys = ("--set", "joint.locked=true", "--set", 'controller={kind="adrc", bandwidth="3 Hz", observer_ratio=5}')
+    points = friso("boundary", "examples/thesis_rig.toml", *keys, "--x", "controller.bandwidth=0.5 Hz..15 Hz")["points"]
+    edge = min(point["value"] for point in points if (point["cycle"], point["kind"]) == ("symmetric", "flip"))
+    return {"edge_hz": edge, "crossing_hz": crossing_ratio(5.0) * edge}
+
+
 def minutes(*arguments: str) -> float:
     """CPU time of a command and the processes it starts [min]: other work on the machine hardly changes it."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -227,12 +266,15 @@ QUICK: Mapping[str, Callable[[], Values]] = {
     "hunting.locked-rig": hunting_locked_rig,
     "hunting.limiter": hunting_limiter,
     "hunting.supercritical": hunting_supercritical,
+    "hunting.adrc": hunting_adrc,
+    "thesis.solver": thesis_solver,
 }
 
 LONG: Mapping[str, Callable[[], Values]] = {
     "rig.constant-speed": rig_constant_speed,
     "rig.slow-cycles": rig_slow_cycles,
     "compare.thesis-rig": compare_thesis_rig,
+    "design.thesis": design_thesis,
     "guideline.minutes": lambda: {"rough": minutes("guideline", "--samples", "64")},
 }
 

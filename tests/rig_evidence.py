@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
-from friso.studies.rig.experiments.frf import MeasuredLoop
+from friso.studies.rig.experiments.frf import MeasuredLoop, Plant
 from friso.studies.rig.experiments.in_position import InPosition, Standstill
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.moves_on_rails import RailRuns
@@ -93,4 +93,7 @@ def loops(
     apparent = np.array([[1.7, weak[0], 1.2], [0.5, weak[1], 0.3]])
     settings = np.array([20.0, 35.0, 50.0, 75.0])
     held = tuple(loop(tuned, *item) for tuned, item in zip((8.0, 48.0), locked, strict=True))
-    return RigLoops(held, loop(8.0, *free), settings, np.arange(4) < stable, apparent)
+    first = loop(8.0, *free)
+    mass = Estimate.normal("mass", "kg", 0.5, 0.01, "")
+    plant = Plant((first.response,), first.response, 11.0, mass, (33.0, 100.0))
+    return RigLoops(held, first, plant, settings, np.arange(4) < stable, apparent)

@@ -125,7 +125,7 @@ def test_machines_as_uncertain_as_the_file(built: Stage) -> None:
     assert machines.keys["masses.cart"] == pytest.approx(1.2, rel=1e-7)
     assert not {*held} & {*machines.keys}
     assert all(key in machines.notes[0] for key in held)
-    assert machines.changes({})["controller.tuned_mass"] == 1.7
+    assert machines.changes(machines.stage, {})["controller.tuned_mass"] == 1.7
 
 
 def test_same_seed_same_machines(built: Stage, machines: Machines) -> None:

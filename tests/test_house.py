@@ -31,11 +31,13 @@ ABOUT_TUNING = (
         "studies/thesis/",
         "studies/guideline/",
         "studies/rig/experiments/measured_cycles.py",
+        "studies/compare/disturbance_rejection.py",
     ),
     *("frequency/tuning.py", "identification/stage_file.py", "identification/output_error/problem.py"),
 )
 """Modules that import a form of the PID controller: the design method, the studies of the thesis and the guideline are
-about van Dijk's rules (Eq. 7, 8); identify makes controllers of its own."""
+about van Dijk's rules (Eq. 7, 8); identify makes controllers of its own,
+and compare one with an observer."""
 
 RECIPES = {
     "controller": "equations/controllers",

@@ -12,6 +12,7 @@ from friso.studies.thesis.claims import registered
 from friso.studies.thesis.evidence import RESPONSES
 from friso.studies.thesis.judges import arguments
 from friso.studies.thesis.judges.arguments import HEAVY, LIGHT
+from friso.studies.thesis.judges.solver import judged_runs
 from friso.studies.thesis.space import draw
 from friso.studies.thesis.ways import by_attraction, by_peak_count
 
@@ -122,3 +123,13 @@ def test_by_what_attracts_the_decided_cells_count() -> None:
     decided = attracts.copy()
     assert judged("S5", {"control": by_attraction(runs, attracts, decided)}).pattern == (Y,)
     assert judged("S5", {"control": by_attraction(runs, attracts, np.ones(shape, bool))}).pattern == (N,)
+
+
+def test_the_solver_is_accurate_where_it_counts_and_swings_alike() -> None:
+    runs = {"still": (0, 0.0, 1000.0), "swinging": (6, 1.0e-3, 2000.0)}
+    assert judged_runs(runs, runs, runs).judgement == "holds"
+    other_count = judged_runs({**runs, "still": (1, 0.0, 200_000.0)}, runs, runs)
+    assert other_count.pattern == (False, True)
+    assert "still" in other_count.parts[0].number
+    other_swing = judged_runs({**runs, "swinging": (6, 1.2e-3, 200_000.0)}, runs, runs)
+    assert other_swing.pattern == (True, False)

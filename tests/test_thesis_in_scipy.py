@@ -8,6 +8,8 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
+from benchmarks.ode23s import ATOL, LARGEST, RTOL, ode23s, parameters
+from friso.engine.simulate import simulate
 from friso.studies.thesis import Evidence, Finding, thesis_rig
 from friso.studies.thesis.claims import registered
 from friso.studies.thesis.evidence import run_response
@@ -152,3 +154,13 @@ def test_f5_the_locked_rig_hunts() -> None:
     response = run_response(LOCKED, {}, 1e-6)
     assert amplitude == pytest.approx(float(response.cell["peak_to_peak"]) / 2, rel=0.15)
     assert 1e-4 < amplitude < 3.2e-3
+
+
+def test_s323_the_solver_of_the_thesis_follows_a_move_as_friso_does() -> None:
+    """ode23s and the equations of the rig by hand, out of the limiters and back onto them."""
+    end, sample = 0.1, 1e-3
+    position, steps, _ = ode23s.py_func(parameters(thesis_rig().flat()), end, RTOL, ATOL, LARGEST, sample)
+    own = simulate(thesis_rig(), sample_time=sample)["position"].values[: len(position)]
+    assert steps >= end / LARGEST
+    assert position == pytest.approx(own, abs=1e-4)
+    assert own.max() > 0.09

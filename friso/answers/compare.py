@@ -96,7 +96,8 @@ def compare(
     within : str or float, optional
         Deviation that counts as in position, "1 um" or a number [m].
     also : list of str, optional
-        Also settings of drives against friction: "limit", "leak", "hysteresis", "standstill", "push", "dither", "all".
+        Also settings of drives against friction, "limit", "leak", "hysteresis", "standstill", "push", "dither"; active
+        disturbance rejection, "adrc"; or "all".
     set : dict, optional
         Keys to override.
     progress : Progress

@@ -154,9 +154,11 @@ tolerances; a push of four fifths of Coulomb friction outside the tolerance; a d
 bandwidth, or with twenty samples a period."""
 
 
-def settings_named(names: tuple[str, ...]) -> tuple[Setting, ...]:
-    """Settings by their names, "all" for all of them. Raises InputError for an unknown one."""
+def settings_named(names: tuple[str, ...], others: tuple[str, ...] = ()) -> tuple[Setting, ...]:
+    """Settings by their names, "all" for all of them, those of `others` being none. Raises InputError for an unknown
+    one."""
+    names_of_all = (*SETTINGS, *others)
     for name in names:
-        if name != "all" and name not in SETTINGS:
-            raise InputError("--also", quoted(name), f"one of {', '.join(SETTINGS)}, or all", "--also leak")
+        if name not in (*names_of_all, "all"):
+            raise InputError("--also", quoted(name), f"one of {', '.join(names_of_all)}, or all", "--also leak")
     return tuple(setting for name, setting in SETTINGS.items() if name in names or "all" in names)

@@ -27,7 +27,8 @@ Also = Annotated[
     typer.Option(
         "--also",
         metavar="SETTING",
-        help="Also a setting of drives against friction: limit, leak, hysteresis, standstill, push, dither, or all.",
+        help="Also a setting of drives against friction (limit, leak, hysteresis, standstill, push, dither), active "
+        "disturbance rejection (adrc), or all.",
     ),
 ]
 

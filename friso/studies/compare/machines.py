@@ -94,11 +94,11 @@ class Machines:
     def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
         """Keys of all machines as an option has them, its stage and changes being given; the controller is tuned as it
         is and does not know the masses that were drawn."""
-        return stage.flat(self.changes(changes))
+        return stage.flat(self.changes(stage, changes))
 
-    def changes(self, changes: Mapping[str, Any]) -> dict[str, Any]:
-        """What an option changes, and what the machines do, of the keys of the stage."""
-        return {**as_tuned(self.stage.flat()), **self.keys, **changes}
+    def changes(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """What an option changes, and what the machines do, of the keys of its stage."""
+        return {**as_tuned(stage.flat()), **self.keys, **changes}
 
 
 def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:

@@ -11,9 +11,13 @@ import numpy as np
 from friso.equations.bandwidth import bandwidth, sped_up
 from friso.equations.conditions import anywhere, level_under_conditions
 from friso.equations.settings import SETTINGS, Setting
+from friso.errors import InputError
 from friso.frequency.crossover import WANTED, limits
+from friso.frequency.margins import margins
+from friso.frequency.members import limit_cases
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
+from friso.studies.compare.disturbance_rejection import rejecting
 from friso.studies.compare.machines import Machines
 
 DEADBAND = 0.5
@@ -35,6 +39,7 @@ NAMES = {
     "f": "feedforward",
     "g": "isolator, faster",
     **{setting.letter: setting.name for setting in SETTINGS.values()},
+    "n": "disturbance rejection",
 }
 
 JOINT: tuple[str, ...] = ("c", "g")
@@ -59,7 +64,7 @@ class Option:
     @property
     def loop(self) -> str:
         """The option whose linear loop it has: rests of the integrator and feedforward are no part of that."""
-        return self.letter if self.letter in "abcg" else "a"
+        return self.letter if self.letter in "abcgn" else "a"
 
 
 @dataclass(frozen=True)
@@ -83,8 +88,11 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def options(machines: Machines, within: float, also: tuple[Setting, ...] = ()) -> CompareOptions:
-    """The options of machines that are to be in position `within` a tolerance [m], and some settings `also`."""
+def options(
+    machines: Machines, within: float, also: tuple[Setting, ...] = (), with_adrc: bool = False
+) -> CompareOptions:
+    """The options of machines that are to be in position `within` a tolerance [m], some settings `also`, and active
+    disturbance rejection if that is asked for."""
     stage = machines.stage
     variants = stage.variants()
     locked, free = variants.get("locked", stage), variants.get("free")
@@ -111,6 +119,13 @@ def options(machines: Machines, within: float, also: tuple[Setting, ...] = ()) -
         else:
             numbers = setting.numbers(locked.flat(), within)
             listed.append(Option(setting.letter, locked.with_numbers(numbers), setting=setting))
+    if with_adrc:
+        flat = locked.flat()
+        crossings = margins(linear_flat(locked, flat), limit_cases(flat)["sliding"]).crossovers
+        try:
+            listed.append(Option("n", rejecting(locked, crossings)))
+        except InputError as error:
+            left_out["n"] = str(error)
     return CompareOptions(tuple(listed), dict(sorted(left_out.items())), deadband)
 
 

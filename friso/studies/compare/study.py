@@ -14,6 +14,7 @@ from friso.progress import Progress, silent
 from friso.shares import Share, share
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
+from friso.studies.compare.disturbance_rejection import ADRC
 from friso.studies.compare.machines import Machines, draw_machines
 from friso.studies.compare.measures import (
     Later,
@@ -176,17 +177,17 @@ def compare(
     also: tuple[str, ...] = (),
 ) -> Comparison:
     """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
-    named `also` of the settings against friction (`friso.equations.settings`).
+    named `also`: settings against friction (`friso.equations.settings`), or "adrc".
 
     Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
     """
     if not 0 < within < np.inf:
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
-    settings = settings_named(also)
+    settings = settings_named(also, (ADRC,))
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     corner = _corner(machines.stage)
     progress(0, 1, "how fast the controller may be")
-    tried = options(machines, within, settings)
+    tried = options(machines, within, settings, bool({ADRC, "all"} & {*also}))
     work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(tried.options))
     results: list[OptionResult] = []
     for option in tried.options:
@@ -245,7 +246,7 @@ class _Work:
         """The runs of the first machines, chunk by chunk."""
         sample = self.machines.stage.flat()["drive.sample_time"]
         interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
-        drawn = self.machines.changes(option.changes)
+        drawn = self.machines.changes(option.stage, option.changes)
         changes = {key: value[:count] if np.ndim(value) else value for key, value in drawn.items()}
         return run(option.stage, task, self.machines.seeds[:count].tolist(), interval, changes)
 

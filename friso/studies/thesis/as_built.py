@@ -19,7 +19,9 @@ from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.frf import (
     SETTINGS,
     MeasuredLoop,
+    Plant,
     apparent_masses,
+    free_plant,
     measured_loop,
     open_loops,
     stable_settings,
@@ -201,11 +203,13 @@ def traces(stage: Stage, rail: int) -> RailTraces:
 
 @dataclass(frozen=True)
 class RigLoops:
-    """Open loops locked at several settings, and free at the lowest of these; settings [Hz] tried free, shape (n,),
-    and which were stable; apparent masses [kg], shape (2, ratios), locked and free, for the motor constants RATIOS."""
+    """Open loops locked at several settings, and free at the lowest of these, with the plant of the free joint;
+    settings [Hz] tried free, shape (n,), and which were stable; apparent masses [kg], shape (2, ratios), locked and
+    free, for the motor constants RATIOS."""
 
     locked: tuple[MeasuredLoop, ...]
     free: MeasuredLoop
+    plant: Plant
     settings: np.ndarray
     stable: np.ndarray
     apparent: np.ndarray
@@ -219,4 +223,4 @@ def rig_loops(stage: Stage) -> RigLoops:
     settings, stable = stable_settings(free, place, SEED)
     apparent = np.array([apparent_masses(machine, place, SEED) for machine in (fixed, free)])
     _, loops = open_loops(fixed, place, SEED, SETTINGS)
-    return RigLoops(loops, measured_loop(log, pace(built)), settings, stable, apparent)
+    return RigLoops(loops, measured_loop(log, pace(built)), free_plant([log]), settings, stable, apparent)

@@ -16,6 +16,7 @@ from friso.quantities import percent
 from friso.stage import ControllerSection
 from friso.stage.section import numeric_fields
 from friso.stage.standstill import AgainstFriction
+from friso.studies.compare.disturbance_rejection import rejection
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
@@ -55,6 +56,7 @@ PROSE = {
     "f": "feedforward",
     "g": "isolator and faster controller",
     **{setting.letter: f"the {setting.name}" for setting in SETTINGS.values()},
+    "n": "disturbance rejection",
 }
 
 
@@ -84,9 +86,21 @@ def _about(option: Option, comparison: Comparison) -> str:
         "f": f"feedforward of Coulomb and viscous friction, both {percent(MODEL_ERROR)} too large or both too small, "
         "drawn for each machine",
         "g": _bandwidth(option, comparison),
+        "n": _disturbance_rejection(option.stage.flat()),
     }
     setting = option.setting
     return f"{joint}; {_setting(setting, option.stage.flat()) if setting else meanings[option.letter]}"
+
+
+def _disturbance_rejection(flat: Mapping[str, Any]) -> str:
+    """The controller of an option that has it; empty of others."""
+    numbers = rejection(flat)
+    if numbers is None:
+        return ""
+    return (
+        f"linear active disturbance rejection with a bandwidth of {with_unit(numbers.bandwidth, 'Hz')}, at which the "
+        f"loop crosses 0 dB where it does in a, and an observer {numbers.observer_ratio:g} times as fast"
+    )
 
 
 def _setting(setting: Setting, flat: Mapping[str, Any]) -> str:

@@ -70,6 +70,7 @@ def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None
 
 
 def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
+    table = verdict.finding.table if verdict.finding else None
     return {
         "id": verdict.claim.id,
         "where": verdict.claim.where,
@@ -80,10 +81,12 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
         "criterion": "; ".join(part.criterion for part in verdict.finding.judged) if verdict.finding else None,
         "section": verdict.claim.section,
         "parts": [_part(part) for part in verdict.finding.judged] if verdict.finding else [],
+        "table": {"columns": table.columns, "rows": table.rows} if table else None,
         "self_tests": [_part(part) for part in verdict.finding.parts if part.self_test] if verdict.finding else [],
         "ways": {way: finding.judgement for way, finding in verdict.ways.items()},
         "reason": verdict.reason or None,
         "contradiction": verdict.contradiction or None,
+        "hangs_on_undrawn": verdict.undrawn or None,
         "method": list(verdict.turned),
         "space": _space(verdict.space) if verdict.space else None,
     }

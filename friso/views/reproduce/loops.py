@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.studies.thesis.experiments import BUILT
 from friso.views.bode.figures import ResponseCurve, bode_figures, phases, size
 from friso.views.drawing.colours import ramp
 from friso.views.drawing.figure import INK, Axis, Figure, Limit, Panel, Series
 
 if TYPE_CHECKING:
+    from friso.studies.rig.experiments.frf import MeasuredLoop
     from friso.studies.thesis import Reproduction
     from friso.studies.thesis.linear import CrossoverLoops
 
@@ -43,36 +45,60 @@ def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
         )
         for number, (name, title, caption) in _SHOWN.items()
     }
-    return figures | {"22": _locked_loops(reproduction.linear.locked), "23": _free(reproduction.linear.free)}
+    built = reproduction.experiments.rig_loops if _built(reproduction) else None
+    return figures | {
+        "22": _locked_loops(reproduction.linear.locked, built.locked if built else ()),
+        "23": _free(reproduction.linear.free, (built.free,) if built else ()),
+    }
 
 
-def _locked_loops(loops: CrossoverLoops) -> Figure:
+def _locked_loops(loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]) -> Figure:
     caption = "The loop of the model with its joint locked, sliding, at the crossovers at which the thesis measured it."
-    return _of_loops("22", "open loop, joint locked, at several crossovers", caption, loops)
+    return _of_loops("22", "open loop, joint locked, at several crossovers", caption, loops, measured)
 
 
-def _free(loops: CrossoverLoops) -> Figure:
+def _free(loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]) -> Figure:
     caption = "The loop of the model with its joint free, sliding, the controller tuned for the whole mass."
-    return _of_loops("23", "open loop, joint free, tuned to 8 Hz", caption, loops)
+    return _of_loops("23", "open loop, joint free, tuned to 8 Hz", caption, loops, measured)
 
 
-def _of_loops(number: str, title: str, caption: str, loops: CrossoverLoops) -> Figure:
-    """Magnitude and phase of the loops at every crossover."""
-    shades = ramp(len(loops.curves) + 1)  # its last shade is light
-    curves = [
-        ResponseCurve(response, f"tuned to {crossover:g} Hz", shade)
-        for (crossover, response), shade in zip(loops.curves.items(), shades, strict=False)
+def _of_loops(
+    number: str, title: str, caption: str, loops: CrossoverLoops, measured: tuple[MeasuredLoop, ...]
+) -> Figure:
+    """Magnitude and phase of the loops at every crossover, and beside them as the rig as built shows them."""
+    ends = loops.omega[0] / (2 * np.pi), loops.omega[-1] / (2 * np.pi)
+    of_model = [ResponseCurve(response, f"tuned to {tuned:g} Hz", "") for tuned, response in loops.curves.items()]
+    columns = [_panels("model", ends, [(loops.omega / (2 * np.pi), curve) for curve in of_model])]
+    seen = [loop for loop in measured if loop.measured]
+    if seen:
+        caption += MEASURED_CAPTION
+        of_rig = [ResponseCurve(loop.response.response, f"tuned to {loop.tuned:.3g} Hz", "") for loop in seen]
+        lines = [loop.response.frequency for loop in seen]
+        columns.append(_panels("rig as built", ends, list(zip(lines, of_rig, strict=True))))
+    panels = tuple(panel for row in zip(*columns, strict=True) for panel in row)
+    return Figure(f"figure-{number}", f"Figure {number}: {title}", caption, panels, len(columns))
+
+
+MEASURED_CAPTION = (
+    " Beside it as measured on the virtual rig as built, with sampling, delay, noise and friction: a multisine is "
+    "added to the force while the loop is closed."
+)
+
+
+def _panels(title: str, ends: tuple[float, float], curves: Sequence[tuple[np.ndarray, ResponseCurve]]) -> list[Panel]:
+    """Magnitude and phase of curves, all over as many frequencies [Hz], between the `ends` [Hz]."""
+    x = Axis("Frequency", "Hz", (float(ends[0]), float(ends[1])), log=True)
+    shades = ramp(len(curves) + 1)  # its last shade is light
+    responses = [curve.response for _, curve in curves]
+    above, below = [], []
+    for (hertz, curve), turn, shade in zip(curves, phases(responses), shades, strict=False):
+        above.append(Series(hertz, size(curve.response), curve.label, shade))
+        below.append(Series(hertz, turn, "", shade))
+    return [
+        Panel(title, x, Axis("Magnitude", "dB", step=30.0), tuple(above), limits=(Limit((0.0,), "", INK),)),
+        Panel("", x, Axis("Phase", "°", step=90.0), tuple(below), limits=(Limit((-180.0,), "", INK),)),
     ]
-    panels = _panels(loops.omega / (2 * np.pi), curves)
-    return Figure(f"figure-{number}", f"Figure {number}: {title}", caption, panels)
 
 
-def _panels(hertz: np.ndarray, curves: Sequence[ResponseCurve]) -> tuple[Panel, Panel]:
-    x = Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
-    above = tuple(Series(hertz, size(curve.response), curve.label, curve.colour) for curve in curves)
-    turns = zip(curves, phases([curve.response for curve in curves]), strict=True)
-    below = tuple(Series(hertz, turn, "", curve.colour) for curve, turn in turns)
-    return (
-        Panel("", x, Axis("Magnitude", "dB", step=30.0), above, limits=(Limit((0.0,), "", INK),)),
-        Panel("", x, Axis("Phase", "°", step=90.0), below, limits=(Limit((-180.0,), "", INK),)),
-    )
+def _built(reproduction: Reproduction) -> bool:
+    return reproduction.experiments is not None and BUILT in reproduction.experimented

@@ -20,7 +20,7 @@ from friso.views.reproduce import words
 from friso.views.reproduce.document import conclusion, reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
 from friso.views.reproduce.laws import laws_rows, laws_sentences
-from friso.views.reproduce.questions import QUESTIONS, method_rows
+from friso.views.reproduce.questions import method_rows, question_rows
 from friso.views.reproduce.summary import save_summary
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "open_rows": words.open_rows(),
             "fit_sentence": words.fit_sentence(reproduction.plausible),
             "fit_rows": words.fit_rows(reproduction.plausible),
-            "questions": QUESTIONS,
+            "questions": question_rows(),
             "method_rows": method_rows(reproduction),
             "draws": len(reproduction.plausible.draws),
             "points": reproduction.points,

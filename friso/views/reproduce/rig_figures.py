@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.studies.thesis.experiments import (
+    BUILT,
     FREQUENCIES,
     GRID,
     LINE,
@@ -80,6 +81,30 @@ def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
             (Panel("", *axes, single),),
         ),
     }
+
+
+def _free_plant(experiments: Experiments) -> dict[str, Figure]:
+    plant = experiments.rig_loops.plant
+    response = plant.averaged
+    hertz = response.frequency
+    between = np.geomspace(*plant.band, 2)
+    lines = (
+        Series(hertz, np.abs(response.response), "position over force", BLUE),
+        Series(
+            between,
+            1 / (plant.mass.value * (2 * np.pi * between) ** 2),
+            f"mass line, {plant.mass.value:.2g} kg",
+            VERMILLION,
+            "dashed",
+        ),
+    )
+    axes = Axis.of_frequency(hertz), Axis("Magnitude", "m/N", log=True, prefixed=False)
+    caption = (
+        "Position over force of the virtual rig as built, joint free, from one excitation of the closed loop; its "
+        f"first mode is at {plant.first_mode:.3g} Hz, the mass line is read between its modes."
+    )
+    panel = Panel("", *axes, lines)
+    return {"18": Figure("figure-18", "Figure 18: plant, joint free", caption, (panel,))}
 
 
 def _steps(experiments: Experiments) -> dict[str, Figure]:
@@ -205,6 +230,7 @@ def _standstill(experiments: Experiments) -> dict[str, Figure]:
 
 _DRAWN: Mapping[str, Callable[[Experiments], dict[str, Figure]]] = {
     LINE: _mass_lines,
+    BUILT: _free_plant,
     STEPPED: _steps,
     SLIPS: _slow,
     SPEEDY: _speeds,

@@ -20,6 +20,7 @@ from friso.studies.thesis.judges import (
     rig_hunting,
     series_stiffness,
     shares,
+    solver,
     stiffness_and_damping,
 )
 
@@ -39,5 +40,6 @@ __all__ = [
     "rig_hunting",
     "series_stiffness",
     "shares",
+    "solver",
     "stiffness_and_damping",
 ]

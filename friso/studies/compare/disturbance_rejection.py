@@ -1,0 +1,49 @@
+"""The machine with active disturbance rejection in place of its controller, and the numbers of that."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+from friso.equations.controllers.adrc import BANDWIDTH, OBSERVER_RATIO, crossing_ratio
+from friso.equations.controllers.van_dijk import TUNED_MASS
+from friso.errors import InputError
+from friso.stage import ControllerSection, Stage
+from friso.stage.controllers import CONTROLLER, KIND
+from friso.stage.transmission import moving_mass
+
+ADRC = "adrc"
+"""The name by which it is asked for, and the kind of the controller."""
+
+
+class Rejection(NamedTuple):
+    """Bandwidth of the feedback [Hz], and that of the observer over it."""
+
+    bandwidth: float
+    observer_ratio: float
+
+
+def rejecting(stage: Stage, crossings: Sequence[float]) -> Stage:
+    """The stage with active disturbance rejection, its limit of the force and its filters kept: as fast, in that the
+    loop of the sliding machine crosses 0 dB at the first of the present `crossings` [Hz], and for the mass believed
+    now. Raises InputError where there is none, or the drive is too slow for it."""
+    if not crossings:
+        raise InputError(CONTROLLER, "a loop that crosses 0 dB nowhere", "one that does", 'crossover = "8 Hz"')
+    kept = {
+        name: value
+        for name, value in stage.as_written()[CONTROLLER].items()
+        if name in ControllerSection.model_fields and name != "kind"
+    }
+    slow = stage.replace({CONTROLLER: {**kept, "kind": ADRC, "bandwidth": "1 mHz"}})
+    flat = stage.flat()
+    return slow.with_numbers(
+        {
+            BANDWIDTH: min(crossings) / crossing_ratio(slow.flat()[OBSERVER_RATIO]),
+            TUNED_MASS: flat.get(TUNED_MASS, moving_mass(flat)),
+        }
+    )
+
+
+def rejection(flat: Mapping[str, Any]) -> Rejection | None:
+    """Its numbers in a stage given as flat keys; None with another controller."""
+    return Rejection(flat[BANDWIDTH], flat[OBSERVER_RATIO]) if flat[KIND] == ADRC else None
