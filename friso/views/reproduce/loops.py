@@ -45,7 +45,8 @@ def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
         )
         for number, (name, title, caption) in _SHOWN.items()
     }
-    built = reproduction.experiments.rig_loops if _built(reproduction) else None
+    experiments = reproduction.experiments
+    built = experiments.rig_loops if experiments and BUILT in reproduction.experimented else None
     return figures | {
         "22": _locked_loops(reproduction.linear.locked, built.locked if built else ()),
         "23": _free(reproduction.linear.free, (built.free,) if built else ()),
@@ -98,7 +99,3 @@ def _panels(title: str, ends: tuple[float, float], curves: Sequence[tuple[np.nda
         Panel(title, x, Axis("Magnitude", "dB", step=30.0), tuple(above), limits=(Limit((0.0,), "", INK),)),
         Panel("", x, Axis("Phase", "°", step=90.0), tuple(below), limits=(Limit((-180.0,), "", INK),)),
     ]
-
-
-def _built(reproduction: Reproduction) -> bool:
-    return reproduction.experiments is not None and BUILT in reproduction.experimented
