@@ -380,8 +380,8 @@ def assumptions(tuning: Advice) -> list[str]:
     lines += _without_friction(stage.flat(), tuning.goal)
     lines.append(
         "Margins include sampling, delay and current loop of the file; hunting and moves are those of a controller in "
-        f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), each with a "
-        "move of a quarter of the travel or more."
+        f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
+        "each with a move of a quarter of the travel or more."
     )
     if machines.from_file:
         lines.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
