@@ -150,12 +150,12 @@ def test_compare(whole: Stage, tmp_path: Path) -> None:
 
 
 def test_tune(locked: Stage, tmp_path: Path) -> None:
-    """Its cycles are known and its bandwidth is tuned, with the margins of the loop that its drive carries out."""
+    """Its cycles are known and its bandwidth is tuned; so few machines let nothing be sure to work."""
     tiny = Budget(points=2, generations=2, machines=3, surveyed=1, fresh=3)
     with patched({method: {"Budget": lambda: tiny, "remedies": lambda *goal: remedies(*goal)[:1]}}):
-        document = answer(tmp_path, locked, "tune", "--only", "controller", "--within", "5 um")
+        document = answer(tmp_path, locked, "tune", "--only", "controller", "--within", "5 um", status=2)
     way = document["ways"]["bandwidth"]
-    assert (way["works"], way["verdict"]) == ("works", "settles")
+    assert (way["works"], way["verdict"]) == ("unsure", None)
     assert document["as_is"]["verdict"] == "bistable"
     (change,) = way["changes"]
     assert change.startswith(BANDWIDTH)
