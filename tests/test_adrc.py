@@ -23,8 +23,9 @@ from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.disturbance_rejection import ADRC
 from friso.studies.compare.machines import draw_machines
-from friso.studies.compare.options import Option, linear_flat, options
-from friso.views.compare.words import _disturbance_rejection
+from friso.studies.compare.options import NAMES, Option, linear_flat, options
+from friso.views.compare.figures import LINES
+from friso.views.compare.words import PROSE, _disturbance_rejection
 
 MASS, RATIO = 1.7, 5.0
 STATIC, COULOMB, STRIBECK, SIGMA_0, SIGMA_1, SIGMA_2 = 3.0, 1.0, 1.6e-3, 1e5, 1e5**0.5, 0.5
@@ -118,6 +119,10 @@ def test_as_an_option_it_is_as_fast_as_what_it_replaces(present: Stage) -> None:
     )
     assert f"{RATIO:g} times" in _disturbance_rejection(with_observer.stage.flat())
     assert not settings_named((ADRC,), (ADRC,))
+
+
+def test_every_option_has_its_line_and_its_words() -> None:
+    assert NAMES.keys() == LINES.keys() == PROSE.keys()
 
 
 def crossing(machine: Stage) -> float:

@@ -40,6 +40,7 @@ LINES: dict[str, tuple[str, Dash]] = {
     "k": (PINK, "dotted"),
     "l": (SKY, "dotted"),
     "m": (GREEN, "dotted"),
+    "n": (INK, "dashed"),
 }
 """Colour and dash of the options."""
 
