@@ -181,7 +181,11 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         ('name = "Thesis rig"', "name = 3", ("name", "3", "a text in quotes", 'name = "Thesis rig"')),
         ("locked = false", 'locked = "no"', ("joint.locked", '"no"', "true or false", "locked = true")),
         ("locked = false", "locked = 0", ("joint.locked", "0", "true or false", "locked = true")),
-        ('kind = "pid"', 'kind = "PID"', ("controller.kind", '"PID"', 'one of "adrc", "cascade", "pid"', 'kind = "pid"')),
+        (
+            'kind = "pid"',
+            'kind = "PID"',
+            ("controller.kind", '"PID"', 'one of "adrc", "cascade", "pid"', 'kind = "pid"'),
+        ),
         ('kind = "pid"', "", ("controller.kind", "nothing", 'one of "adrc", "cascade", "pid"', 'kind = "adrc"')),
         (
             'kind = "pid"',
