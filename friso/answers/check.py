@@ -144,7 +144,7 @@ def check(
     laws : bool
         Whether the verdict is wanted under every friction law, too, that shows the same in measurements.
     progress : Progress
-        Called as work is done.
+        Called as work is done, also from worker threads.
 
     Returns
     -------

@@ -97,7 +97,8 @@ LONG = 1e-6
 def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
-    With `traces`, each case has its time response; `progress` is called as work is done. Raises InputError for an
+    With `traces`, each case has its time response; `progress` is called as work is done, also from worker
+    threads. Raises InputError for an
     `rtol` that is not usable.
     """
     checked_rtol(rtol)
