@@ -25,7 +25,7 @@ import pytest
 import uvicorn
 
 import friso
-from friso.app import uploads
+from friso.app import gate, uploads
 from friso.app.gate import Access
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
@@ -136,14 +136,25 @@ def test_a_rebound_name_is_refused(served: Served, host: str | None) -> None:
         assert served.request("GET", path, Host=host)[0] in (403, 400)
 
 
-def test_a_token_for_once_is_taken_once_and_whoever_was_faster_than_the_browser_is_shut_out(served: Served) -> None:
+def test_a_token_for_once_is_taken_once_and_whoever_was_faster_than_the_browser_is_shut_out(
+    served: Served, caplog: pytest.LogCaptureFixture
+) -> None:
     path = f"/?token={served.access.token_for_once()}"
     status, headers, _ = served.request("GET", path, Cookie=None)
     cookie = headers["Set-Cookie"].partition(";")[0]
     assert (status, served.request("GET", "/begin", Cookie=cookie)[0]) == (303, 200)
-    assert served.request("GET", path, Cookie=None)[0] == 403
+    assert [served.request("GET", path, Cookie=None)[0] for _ in range(2)] == [403, 403]
+    assert [record.name for record in caplog.records].count("friso") == 1
     assert [served.request("GET", "/begin", Cookie=value)[0] for value in (cookie, None)] == [403, 403]
     assert served.request("GET", "/begin")[0] == 200
+
+
+def test_a_token_for_once_that_comes_again_later_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    access = Access.at("127.0.0.1", 8000)
+    query = f"token={access.token_for_once()}".encode()
+    cookie = f"{access.cookie}={access.session_of(query)}"
+    monkeypatch.setattr(gate, "ALARM", 0.0)
+    assert (access.session_of(query), access.has_cookie(cookie)) == ("", True)
 
 
 def test_the_port_takes_connections_before_the_browser_opens_and_is_free_again_at_once() -> None:

@@ -91,6 +91,19 @@ def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> 
     assert page.input_value('[data-path="controller.crossover"] input[type=text]') == "9.7 Hz"
 
 
+def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browsed: Browsed) -> None:
+    page = browsed.page
+    page.route("**/ask/run", lambda _: None)
+    with page.expect_request(re.compile("ask/verdict")) as verdict:
+        with page.expect_request(re.compile("ask/run")):
+            browsed.type("controller.crossover", "11 Hz")
+        page.click("#tab-bode")
+    assert "11 Hz" in (verdict.value.post_data or "")
+    page.unroute("**/ask/run")
+    page.click("#undo")
+    page.click("#tab-run")
+
+
 def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
     page = browsed.page
     last = "Array.from(document.querySelector('.plot').data.find((line) => line.name === 'position').y.slice(-40))"

@@ -116,6 +116,7 @@ def test_words_are_linked_where_they_first_stand_on_a_page() -> None:
     assert text.count("<a ") == 2
     assert text.startswith('<a class="word" href="#word-fold"')
     assert text.endswith("; a fold, &lt;b&gt;")
+    assert "<a " not in glossary.linked("in the 95 % band; free to shift, it does not move")
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import secrets
+import time
 from dataclasses import dataclass, field
 from http.cookies import CookieError, SimpleCookie
 from urllib.parse import parse_qs
@@ -35,9 +36,13 @@ REFUSED = (
 
 
 TWICE = (
-    "the address with which the browser was started was opened twice, once perhaps by another user of this machine; "
-    "whoever was first is shut out: open the address printed above"
+    "the address with which friso started the browser was opened a second time: another user of this machine may have "
+    "been first. Whoever was first is shut out: open the address printed above"
 )
+
+ALARM = 60.0
+"""Time [s] after the first use of a token that is taken once in which a second one ends the session: the browser that
+friso started is slower only by seconds. Later it is someone who finds the address in a history."""
 
 LOGGER = logging.getLogger("friso")
 
@@ -50,8 +55,8 @@ class Access:
     cookie: str
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
-    once: dict[str, str] = field(default_factory=dict)
-    """Tokens that are taken once, with the session that each began; "" before that."""
+    once: dict[str, tuple[str, float] | None] = field(default_factory=dict)
+    """Tokens that are taken once, with the session that each began, and when [s]; None before that."""
     ended: set[str] = field(default_factory=set)
     """Sessions that are over."""
 
@@ -66,7 +71,7 @@ class Access:
     def token_for_once(self) -> str:
         """A token that is taken once: commands that are running, and the addresses in them, can be seen by others."""
         token = secrets.token_urlsafe(32)
-        self.once[token] = ""
+        self.once[token] = None
         return token
 
     def is_host(self, host: str) -> bool:
@@ -78,18 +83,22 @@ class Access:
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
     def session_of(self, query: bytes) -> str:
-        """The session that an address with a token begins, "" without one. A token that is taken once and comes again
-        was seen by two: what it began is over."""
+        """The session that an address with a token begins, "" without one. A token that is taken once and soon comes
+        again was seen by two: what it began is over."""
         tokens = parse_qs(query.decode("latin-1")).get("token", [])
         if len(tokens) != 1:
             return ""
-        for token, session in self.once.items():
-            if _same(tokens[0], token) and session:
+        for token, begun in self.once.items():
+            if not _same(tokens[0], token):
+                continue
+            if begun is None:
+                session = secrets.token_urlsafe(32)
+                self.once[token] = session, time.monotonic()
+                return session
+            session, since = begun
+            if session not in self.ended and time.monotonic() - since < ALARM:
                 self.ended.add(session)
                 LOGGER.warning(TWICE)
-            elif _same(tokens[0], token):
-                self.once[token] = secrets.token_urlsafe(32)
-                return self.once[token]
         return self.session if _same(tokens[0], self.token) else ""
 
     def has_cookie(self, header: str) -> bool:
@@ -98,7 +107,7 @@ class Access:
             cookies = SimpleCookie(header)
         except CookieError:
             return False
-        sessions = {self.session, *self.once.values()} - self.ended - {""}
+        sessions = {self.session, *(begun[0] for begun in self.once.values() if begun)} - self.ended
         return self.cookie in cookies and any(_same(cookies[self.cookie].value, session) for session in sessions)
 
 

@@ -13,10 +13,10 @@ const NARROW = 640;
 export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
   constructor(sent, tell) {
-    Object.assign(this, { sent, tell, shown: "run", machine: null, answer: null, timer: 0, kept: new Map() });
+    Object.assign(this, { sent, tell, shown: "run", then: null, machine: null, answer: null, timer: 0, kept: new Map() });
     this.live = new Live("run", "picture", 3000, (answer, then) => {
       this.arrived(answer);
-      if (answer.kind !== "message") then();
+      if (answer.kind !== "message") this.goOn(then);
     });
     this.tabs = [
       { id: "run", label: "Run" },
@@ -61,6 +61,7 @@ export class Pictures {
   show(id) {
     if (id === this.shown) return;
     this.shown = id;
+    this.goOn();
     this.live.stop();
     const place = $("picture");
     if (this.plots) clear(this.plots);
@@ -84,7 +85,8 @@ export class Pictures {
   /** The machine has changed; `dragged`: not yet for good. `then` is called once a picture that follows is drawn. */
   changed(dragged, then) {
     if (!dragged) this.bar();
-    if (this.shown !== "run") then();
+    this.then = then;
+    if (this.shown !== "run") this.goOn();
     if (this.own[this.shown]) return;
     if (!this.plots) this.begin($("picture"));
     if (this.shown === "run") this.live.ask(this.body(), then);
@@ -95,10 +97,17 @@ export class Pictures {
     }
   }
 
+  /** What waits for the picture of a machine goes on, by default that of the newest; nothing waits once the check is there. */
+  goOn(then = this.then) {
+    if (!this.then) return;
+    if (then === this.then) this.then = null;
+    then?.();
+  }
+
   async ask() {
     const { shown } = this;
     if (!this.machine || this.own[shown]) return;
-    if (shown === "run") return this.live.ask(this.body(), () => {});
+    if (shown === "run") return this.live.ask(this.body(), this.then);
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
@@ -107,8 +116,9 @@ export class Pictures {
     if (answer && this.shown === shown) this.arrived(answer);
   }
 
-  /** The check is there, whose figures are one of the pictures. */
+  /** The check is there, whose figures are one of the pictures: what waits would tell less. */
   checked(answer) {
+    this.then = null;
     if (this.shown === "check") this.arrived(answer);
   }
 

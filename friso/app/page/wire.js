@@ -115,7 +115,7 @@ let looking = null;
 export const onReach = (listener) => listeners.push(listener);
 
 const GONE = "The server does not answer. What is on this page is kept; it goes on when the server is back.";
-const ANEW = "The server was started anew: open the address that it printed. What is on this page is kept.";
+const ANEW = "This page is no longer let in: open the address that the server printed. What is on this page is kept.";
 
 function reached(now, text = GONE) {
   if (now === there && now) return;

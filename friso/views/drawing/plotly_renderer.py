@@ -229,14 +229,20 @@ def _axis(axis: Axis) -> dict[str, Any]:
 
 
 def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
-    """Decades; between them 2 and 5, or more, where they are too few: plotly alone writes 0.5 as "5"."""
+    """Decades; between them 2 and 5, or more, where they are too few: plotly alone writes 0.5 as "5". Where even these
+    are too few, about five round numbers."""
     decades = math.log10(limits[1] / limits[0]) if limits else math.inf
     if limits is None or decades >= 2:
         return {"dtick": 1}
     steps = (1, 2, 5) if decades >= 1 else (1, 1.5, 2, 3, 4, 5, 7)
     exponents = range(math.floor(math.log10(limits[0])), math.ceil(math.log10(limits[1])) + 1)
     values = [step * 10.0**exponent for exponent in exponents for step in steps]
-    return {"tickmode": "array", "tickvals": values, "ticktext": [f"{value:.4g}" for value in values]}
+    low, high = limits
+    if low < high and sum(low <= value <= high for value in values) < 2:
+        unit = 10.0 ** math.floor(math.log10((high - low) / 4))
+        step = unit * next((size for size in (5, 2) if size * unit <= (high - low) / 4), 1)
+        values = [number * step for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
+    return {"tickmode": "array", "tickvals": values, "ticktext": [f"{value:.10g}" for value in values]}
 
 
 def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:

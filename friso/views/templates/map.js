@@ -42,14 +42,23 @@
 
   // ------------------------------------------------------------------ drawing
 
-  // Decades; between them 2 and 5, or more, where they are too few.
+  const span = (values) => values.reduce(([a, b], value) => [Math.min(a, value), Math.max(b, value)], [Infinity, -Infinity]);
+
+  // Decades; between them 2 and 5, or more, where they are too few; where even these are, about five round numbers.
   function logTicks(values) {
-    const [low, high] = [Math.log10(Math.min(...values)), Math.log10(Math.max(...values))];
+    const [least, most] = span(values);
+    const [low, high] = [Math.log10(least), Math.log10(most)];
     if (high - low >= 2) return { dtick: 1 };
     const steps = high - low >= 1 ? [1, 2, 5] : [1, 1.5, 2, 3, 4, 5, 7];
     const exponents = Array.from({ length: Math.ceil(high) - Math.floor(low) + 1 }, (_, i) => Math.floor(low) + i);
-    const ticks = exponents.flatMap((exponent) => steps.map((step) => step * 10 ** exponent));
-    return { tickmode: "array", tickvals: ticks, ticktext: ticks.map((value) => rounded(value)) };
+    let ticks = exponents.flatMap((exponent) => steps.map((step) => step * 10 ** exponent));
+    if (most > least && ticks.filter((value) => value >= least && value <= most).length < 2) {
+      const unit = 10 ** Math.floor(Math.log10((most - least) / 4));
+      const step = unit * ([5, 2].find((size) => size * unit <= (most - least) / 4) ?? 1);
+      const first = Math.ceil(least / step);
+      ticks = Array.from({ length: Math.floor(most / step) - first + 1 }, (_, i) => (first + i) * step);
+    }
+    return { tickmode: "array", tickvals: ticks, ticktext: ticks.map((value) => String(Number(value.toPrecision(10)))) };
   }
 
   function plotAxis(axis) {
@@ -119,7 +128,7 @@
     const x = data.axes[across].values;
     const numbers = Array.from(shown.numbers);
     const finite = numbers.filter((value, cell) => shown.codes[cell] === NONE);
-    const [low, high] = finite.length ? finite.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]) : [0, 0];
+    const [low, high] = finite.length ? span(finite) : [0, 0];
     const under = shown.log ? low / 2 : low - 0.08 * (high - low || Math.abs(high) || 1);
     const height = (cell) => {
       if (data.sampled) return data.axes[up].values[cell];
@@ -200,6 +209,7 @@
 
   function describe() {
     const section = document.getElementById("cell");
+    section.querySelectorAll(".js-plotly-plot").forEach((old) => Plotly.purge(old));
     section.replaceChildren();
     const cell = data.sampled ? at[0] : cellOf(at);
     const indices = data.indices.map((places, i) => places[at[i]]);
