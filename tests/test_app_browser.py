@@ -102,6 +102,7 @@ def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browse
     page.unroute("**/ask/run")
     page.click("#undo")
     page.click("#tab-run")
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
 
 
 def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:

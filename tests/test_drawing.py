@@ -236,7 +236,12 @@ def test_a_figure_file_opens_as_an_image(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("limits", "readable"), [((0.6, 2.8), ["0.7", "1", "1.5", "2"]), ((2.0, 90.0), ["2", "5", "10", "20", "50"]), ((4.1, 4.9), ["4.2", "4.8"])]
+    ("limits", "readable"),
+    [
+        ((0.6, 2.8), ["0.7", "1", "1.5", "2"]),
+        ((2.0, 90.0), ["2", "5", "10", "20", "50"]),
+        ((4.1, 4.9), ["4.2", "4.8"]),
+    ],
 )
 def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(
     limits: tuple[float, float], readable: list[str]

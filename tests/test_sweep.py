@@ -45,6 +45,8 @@ def test_a_run_that_is_drawn_has_the_extremes_of_the_run_alone(rig: Stage) -> No
     axes = {"joint.locked": [True, False], "joint.stroke": (np.array([-1e-3, 1e-3]), "m")}
     study = Request(rig, axes, None, {}, False).study(USUAL)
     drawn = traces(study)
+    skipped = traces(study, np.array([False, True, False, False]))
+    assert np.isnan(skipped.deviations).all(axis=1).tolist() == [True, True, True, False]
     assert np.isnan(drawn.deviations).all(axis=1).tolist() == [True, False, True, False]
     cell, interval = 3, drawn.duration / (BINS * IN_BIN)
     alone = friso.simulate(study.cell_stage((1, 1)), study.rtol, interval).data

@@ -15,10 +15,11 @@ import numpy as np
 from friso.answers.inputs import Changes, axes_of, pairs_of, wrong
 from friso.answers.output_folder import check_file, check_store_folder, refuse_place
 from friso.errors import InputError, StoreError
+from friso.progress import Progress, silent
 from friso.quantities import quoted
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
+from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, INFERRED, METRICS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
@@ -154,19 +155,24 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
 
 
-def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content]:
+def view_files(runs: xr.Dataset, store: Path, metric: str, progress: Progress = silent) -> dict[Path, Content]:
     """The figure and the page of a map, beside its store."""
     from friso.views.map.page import map_files
 
-    files = map_files(runs, metric, f"friso simulate --cell {store} {{indices}}", drawn_runs(study_of(runs)))
+    files = map_files(
+        runs, metric, f"friso simulate --cell {store} {{indices}}", drawn_runs(study_of(runs), runs, progress)
+    )
     return {_path_beside(store, form): content for form, content in files.items()}
 
 
-def drawn_runs(study: Study) -> Traces | None:
-    """The runs of the cells, for the page to draw; None of more than DRAWN."""
+def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
+    """The runs of the cells that were not inferred, for the page to draw; None of more than DRAWN cells."""
     from friso.studies.traces import traces
 
-    return traces(study) if study.cells <= DRAWN else None
+    if study.cells > DRAWN:
+        return None
+    inferred = np.array([str(status).startswith(INFERRED) for status in runs["status"].values.ravel()])
+    return traces(study, inferred, progress)
 
 
 def place_of_store(folder: str | os.PathLike[str]) -> Path:

@@ -107,14 +107,17 @@ class SweepAnswer(Answer):
         from friso.views.map.page import map_files
 
         repeated = 'friso.simulate(runs.cell("{indices}"))'
-        files = map_files(self.result, self.metric, repeated, drawn_runs(self.study)) if self.drawable else {}
+        if not self.drawable:
+            return {}
+        files = map_files(self.result, self.metric, repeated, drawn_runs(self.study, self.result))
         return {f"map.{form}": content for form, content in files.items()}
 
-    def files_beside(self) -> Mapping[Path, Content]:
-        """The figure and the page beside the store, unless there are too many cells for them, and the exports."""
+    def files_beside(self, progress: Progress = silent) -> Mapping[Path, Content]:
+        """The figure and the page beside the store, unless there are too many cells for them, and the exports. The runs
+        that the page draws are made here, which `progress` is told."""
         views: dict[Path, Content] = {}
         if self.store is not None and self.drawable:
-            views = view_files(self.result, self.store, self.metric)
+            views = view_files(self.result, self.store, self.metric, progress)
         return {**views, **export_files(self.result, [*self.exports])}
 
 

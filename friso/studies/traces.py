@@ -12,6 +12,7 @@ from friso.engine.batch import run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations import motion
 from friso.hunting.measures import measuring_options
+from friso.progress import Progress, Tally, silent
 from friso.studies.cells import allowed_cells, by_equations, by_words
 from friso.studies.study import Study
 
@@ -20,6 +21,9 @@ BINS = 150
 
 IN_BIN = 20
 """Samples of each of them."""
+
+DRAWING = "drawing runs"
+"""What a progress is told."""
 
 CHUNK = 128
 """Runs whose samples are held at once."""
@@ -36,11 +40,15 @@ class Traces:
     duration: float
 
 
-def traces(study: Study) -> Traces:
-    """The runs of all cells of a study once more, at its tolerance. Cells that no stage may have are NaN throughout."""
+def traces(study: Study, skipped: np.ndarray | None = None, progress: Progress = silent) -> Traces:
+    """The runs of all cells of a study once more, at its tolerance. Cells that no stage may have, and those `skipped`,
+    shape (cells,), are NaN throughout."""
     columns = study.columns(np.arange(study.cells))
     parts = list(by_words(study.stage, study.links, columns))
     allowed = allowed_cells(study.stage, study.links, columns)
+    allowed = allowed if skipped is None else allowed & ~skipped
+    tally = Tally(progress, int(np.count_nonzero(allowed)))
+    tally.add(0, DRAWING)
     duration = max(float(np.max(flat["motion.duration"])) for flat, _ in parts)
     interval = duration / (BINS * IN_BIN)
     options = replace(measuring_options(study.rtol), interval=interval, chunk=CHUNK)
@@ -54,6 +62,7 @@ def traces(study: Study) -> Traces:
                 drawn.deviations[cells[number]] = _extremes(_deviation(form, one, states, time))
                 end, corner = float(one["motion.duration"]), float(motion.last_corner(one))
                 drawn.late[cells[number]] = (end + (corner if corner < 0.9 * end else 0.0)) / 2
+            tally.add(len(runs.numbers), DRAWING)
     return drawn
 
 

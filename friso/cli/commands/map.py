@@ -83,8 +83,9 @@ def map_cells(
     with ProgressBar() as progress, named_as_options(options):
         # The exports are written together with the figure and the page, all of them or none.
         answer = sweep(source, **options, keep=lambda exports: None, progress=progress)
-    speak_of(answer.axis_kind)
-    show(answer, write(answer.files_beside(), progress), as_json)
+        speak_of(answer.axis_kind)
+        files = write(answer.files_beside(progress), progress)
+    show(answer, files, as_json)
 
 
 def _check(store: Path, as_json: bool) -> None:

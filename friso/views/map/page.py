@@ -57,6 +57,7 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = N
             "verification": verification(runs),
             "facts": _facts(runs, metric),
             "thinned": _thinned(runs),
+            "undrawn": drawn is None,
             "data": packed_json(page_data(runs, metric, rerun, drawn)),
             "figure": figure,
             "printed": print_image(replace(figure, note="")),
