@@ -469,11 +469,21 @@ def sealed_again(stored: Path) -> Iterator[dict[str, Any]]:
         {"compressor": {"id": "pickle"}},
         {"dtype": "|S8"},
         {"chunks": [10**12]},
+        {"chunks": [-1]},
+        {"dtype": "<U9999", "chunks": [10**5]},
     ],
 )
 def test_arrays_that_friso_does_not_write_are_not_decoded(stored: Path, name: str, change: dict[str, Any]) -> None:
     with sealed_again(stored) as metadata:
         metadata[f"{name}/.zarray"] |= change
+    with pytest.raises(StoreError, match=r"\.zmetadata is damaged"):
+        read_store(stored)
+
+
+def test_an_array_is_a_measure_as_large_as_its_axes(stored: Path) -> None:
+    with sealed_again(stored) as metadata:
+        metadata["extra/.zarray"] = metadata["peaks/.zarray"] | {"shape": [10**13], "chunks": [10**6]}
+        metadata["extra/.zattrs"] = {"_ARRAY_DIMENSIONS": ["y"]}
     with pytest.raises(StoreError, match=r"\.zmetadata is damaged"):
         read_store(stored)
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.errors import StoreError
+from friso.studies.cells import METRICS
 from friso.studies.store_files import digest_of, put, stored
 
 FORMAT = 2
@@ -29,7 +30,7 @@ _FILE, _OWN, _ATTRIBUTES = ".zmetadata", "friso", ".zattrs"
 _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w[\w.-]*/\d+")
 """Names of files beside the arrays and of those of axes: all of them in the store, whatever metadata of others say."""
 
-_KIND, _CODECS = re.compile(r"[<>|][bfiuU]([0-9]{1,4})"), {"blosc", "crc32"}
+_KIND, _CODECS = re.compile(r"[<>|](?P<letter>[bfiuU])(?P<size>[0-9]{1,4})"), {"blosc", "crc32"}
 """Types of numbers and texts, with their size; codecs that only decode."""
 _CHUNK = 1 << 30
 """Size of a chunk in memory at most: the longest axis has no larger one."""
@@ -168,8 +169,15 @@ def _are_of_a_store(files: Mapping[str, Any], axes: Mapping[str, Any]) -> bool:
         arrays = {name.rpartition("/")[0]: content for name, content in files.items() if name.endswith("/.zarray")}
         indices = {name for name in arrays if files[f"{name}/.zattrs"]["_ARRAY_DIMENSIONS"] == [name]}
         chunks = Counter(file.rpartition("/")[0] for file in axes)
-        return all(map(_is_plain, arrays.values())) and all(
-            chunks[name] == _chunks(arrays[name]) for name in indices | chunks.keys()
+        lengths = {name: arrays[name]["shape"][0] for name in indices}
+        return (
+            arrays.keys() <= {*METRICS, *chunks}
+            and all(_is_plain(array) for array in arrays.values())
+            and all(
+                array["shape"] == [lengths[dimension] for dimension in files[f"{name}/.zattrs"]["_ARRAY_DIMENSIONS"]]
+                for name, array in arrays.items()
+            )
+            and all(chunks[name] == _chunks(arrays[name]) for name in indices | chunks.keys())
         )
     except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
         return False
@@ -179,7 +187,10 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
     """Whether chunks decode to numbers or texts, compressed and checked as friso does, of a size that it writes."""
     kind = _KIND.fullmatch(array["dtype"])
     codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
-    return kind is not None and codecs <= _CODECS and int(kind[1]) * math.prod(array["chunks"]) <= _CHUNK
+    if kind is None or not codecs <= _CODECS or min(*array["shape"], *array["chunks"]) < 1:
+        return False
+    size = int(kind["size"]) * (4 if kind["letter"] == "U" else 1)  # a character takes 4 bytes
+    return 0 < size and size * math.prod(array["chunks"]) <= _CHUNK
 
 
 def _chunks(array: Mapping[str, Any]) -> int:
