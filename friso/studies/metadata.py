@@ -190,7 +190,7 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
     if kind is None or not codecs <= _CODECS or min(*array["shape"], *array["chunks"]) < 1:
         return False
     size = int(kind["size"]) * (4 if kind["letter"] == "U" else 1)  # a character takes 4 bytes
-    return 0 < size and size * math.prod(array["chunks"]) <= _CHUNK
+    return size > 0 and size * math.prod(array["chunks"]) <= _CHUNK
 
 
 def _chunks(array: Mapping[str, Any]) -> int:
