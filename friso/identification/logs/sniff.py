@@ -183,6 +183,7 @@ def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
     """The headings in a line; between spaces also names of several words, where each ends with its unit in brackets."""
     cells = split_line(line, delimiter)
     if delimiter == " " and len(cells) != columns:
-        named = re.findall(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\])]*[\])]", line)
+        closed = line[: max(map(line.rfind, ")]")) + 1]  # no bracket is looked for an end that is not there
+        named = re.findall(r"(?<![^\[\]()])[^\[\]()]+[\[(][^\])]*[\])]", closed)
         return [name.strip() for name in named] if len(named) == columns else cells
     return cells
