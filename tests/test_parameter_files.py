@@ -156,6 +156,8 @@ def test_an_output_in_volts_has_a_scale(tmp_path: Path) -> None:
     back = gains_of(friso.loads(drawn.text()), {}, "linuxcnc").parameters  # it was told, and is not asked for again
     assert back is not None
     assert [back[name] for name in ("P", "I", "FF1")] == pytest.approx([50.0, 10.0, 0.2])
+    uncertain = drawn.stage.replace({"drive.velocity_per_output": "5 mm/s +/- 1 mm/s"})
+    assert gains_of(uncertain, {}, "linuxcnc").parameters == pytest.approx(back)
     with pytest.raises(InputError, match="velocity_per_output"):
         gains_of(drawn.stage.replace({"drive.velocity_per_output": None}), {}, "linuxcnc")
 

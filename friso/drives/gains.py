@@ -38,7 +38,7 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     """The gains of a stage, also as the parameters of the kind of drive `to`. Raises InputError for a controller that
     the drive does not have, and for all that is still to be said, together."""
     flat = stage.flat()
-    answers = UserAnswers({**_told(stage), **user_values})
+    answers = UserAnswers({**_told(stage, flat), **user_values})
     kind = None if to is None else FORMATS[FORMATS.checked(to, "--to", "--to {}")]
     askable = {TRAVEL, MOTOR_CONSTANT}
     if kind is not None:
@@ -53,10 +53,14 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
     return Gains(stage, loop_diagram(flat), conversions(flat, answers), kind, back.values, _not_held(flat, back.held))
 
 
-def _told(stage: Stage) -> dict[str, Any]:
-    """What the stage file keeps of what friso init --from was told."""
-    written = stage.drive.as_written() if stage.drive else {}
-    return {name: written[name] for name in TOLD if name in written}
+def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """What the stage file keeps of what friso init --from was told; the centre of what is uncertain."""
+    fields = stage.numeric_keys()
+    told = {name: flat[key] for name in TOLD if (key := f"drive.{name}") in flat}
+    return {
+        name: value if isinstance(value, str) else f"{value!r} {fields[f'drive.{name}'].unit}"
+        for name, value in told.items()
+    }
 
 
 def _not_held(flat: Mapping[str, Any], held: frozenset[str]) -> tuple[str, ...]:
