@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -19,6 +19,7 @@ from friso.equations.structure import controller_form
 from friso.frequency.members import limit_cases
 from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator
 from friso.stage import Stage, numeric_keys
+from friso.stage.filters import FILTER_RULE, FILTERS, FilterSection, filter_forms
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.links import check_links, linked
 
@@ -150,6 +151,19 @@ def test_a_drive_takes_a_filter_by_its_own_rule(kind: str, rule: str) -> None:
     ours = commanded(machine.replace({f"{PLACE}.1.discretisation": rule}), t, errors)
     assert ours == pytest.approx(by_hand, rel=1e-6, abs=1e-7)
     assert commanded(machine.replace({"drive.filter_discretisation": rule}), t, errors) == pytest.approx(ours)
+
+
+def test_a_drive_takes_a_filter_of_a_plug_in_by_its_rule(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only coefficients for samples are taken as they are."""
+
+    class PlainFilter(FilterSection):
+        kind: Literal["plain"]
+
+    monkeypatch.setattr(FILTERS, "_classes", {**FILTERS.classes, "plain": PlainFilter})
+    flat = {FILTER_RULE: "backward_euler"}
+    for number, kind in enumerate(("plain", "sampled_biquad"), start=1):
+        flat |= {f"{PLACE}.{number}.kind": kind, f"{PLACE}.{number}.path": "forward"}
+    assert [form.discretisation for form in filter_forms(flat, PLACE)] == ["backward_euler", "bilinear"]
 
 
 def test_a_sampled_biquad_is_its_difference_equation() -> None:

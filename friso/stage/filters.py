@@ -40,6 +40,9 @@ class FilterSection(UncertainSection):
     kind: Any
     path: Literal["forward", "feedback"] = FORWARD
 
+    sampled: ClassVar[bool] = False
+    """Whether it is given by coefficients for samples, which no rule of a drive changes."""
+
     @classmethod
     def variant(cls, row: Mapping[str, Any]) -> Hashable:
         """What else its equations depend on, such as its order; `row` are its keys."""
@@ -165,6 +168,7 @@ class SampledBiquadFilter(FilterSection):
     """a1 and a2."""
     sample_time: Annotated[Value, Quantity("s", positive, "125 us")]
 
+    sampled: ClassVar[bool] = True
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             ("denominator",),
@@ -219,7 +223,7 @@ def filter_forms(flat: Mapping[str, Any], key: str) -> tuple[FilterForm, ...]:
     for place in row_keys(flat, key):
         row = keys_below(flat, place)
         law: Any = FILTERS.classes[row["kind"]]
-        own = "bilinear" if not issubclass(law, ContinuousFilter) else flat.get(FILTER_RULE, "bilinear")
+        own = "bilinear" if law.sampled else flat.get(FILTER_RULE, "bilinear")
         rule = row.get("discretisation", own)
         forms.append(FilterForm(row["kind"], row["path"], law.variant(row), rule))
     return tuple(forms)

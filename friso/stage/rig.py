@@ -21,7 +21,7 @@ from friso.quantities import (
     quoted,
 )
 from friso.stage.controllers import FILTERS_KEY
-from friso.stage.filters import FILTER_RULE, FilterRule
+from friso.stage.filters import FILTER_RULE, FILTERS, FilterRule
 from friso.stage.lists import Several, Values, row_keys
 from friso.stage.section import Rule, Section, UncertainSection
 
@@ -69,8 +69,8 @@ def _below_half_the_rate(flat: Mapping[str, Any]) -> Any:
     """Whether the filters that are exact at a frequency, which sampling allows below half its own, keep to that."""
     fine: Any = True
     for place in row_keys(flat, FILTERS_KEY) if "drive.sample_time" in flat else ():
-        coefficients = flat[f"{place}.kind"] == "sampled_biquad"
-        if not coefficients and flat.get(f"{place}.discretisation", flat.get(FILTER_RULE)) == "prewarped":
+        law: Any = FILTERS.classes[flat[f"{place}.kind"]]
+        if not law.sampled and flat.get(f"{place}.discretisation", flat.get(FILTER_RULE)) == "prewarped":
             loop = "velocity_" if flat[f"{place}.path"] == "feedback" else ""
             period = flat.get(f"drive.{loop}sample_time", flat["drive.sample_time"])
             exact_at = flat.get(f"{place}.frequency", flat.get(f"{place}.pole_frequency", 0.0))
