@@ -98,8 +98,7 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
     With `traces`, each case has its time response; `progress` is called as work is done, also from worker
-    threads. Raises InputError for an
-    `rtol` that is not usable.
+    threads. Raises InputError for an `rtol` that is not usable.
     """
     checked_rtol(rtol)
     variants = stage.variants()
