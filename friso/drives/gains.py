@@ -56,10 +56,10 @@ def gains_of(stage: Stage, user_values: Mapping[str, Any], to: str | None = None
 def _told(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """What the stage file keeps of what friso init --from was told; the centre of what is uncertain."""
     fields = stage.numeric_keys()
-    told = {name: flat[key] for name in TOLD if (key := f"drive.{name}") in flat}
+    kept = {name: flat[key] for name in TOLD if (key := f"drive.{name}") in flat}
     return {
         name: value if isinstance(value, str) else f"{value!r} {fields[f'drive.{name}'].unit}"
-        for name, value in told.items()
+        for name, value in kept.items()
     }
 
 
