@@ -7,7 +7,7 @@ import pytest
 
 from friso.engine import side_by_side as module
 from friso.engine.overtaken import Overtaken, ended_by, go_on
-from friso.engine.side_by_side import side_by_side
+from friso.engine.side_by_side import cores_to_use, side_by_side
 
 
 @pytest.mark.parametrize("cores", [1, 2])
@@ -48,3 +48,21 @@ def test_all_end_where_nobody_waits_any_more(monkeypatch: pytest.MonkeyPatch) ->
     with ended_by(flag), pytest.raises(Overtaken):
         side_by_side([lambda: _until_ended(ended)] * 2)
     assert ended == [True, True]
+
+
+def test_a_task_takes_the_cores_of_those_that_have_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "usable_cores", lambda: 4)
+    asked, seen = Event(), []
+
+    def first() -> None:
+        asked.wait(10)
+
+    def second() -> None:
+        seen.append(cores_to_use())
+        asked.set()
+        while cores_to_use() == 2:
+            go_on()
+        seen.append(cores_to_use())
+
+    side_by_side([first, second])
+    assert [*seen, cores_to_use()] == [2, 4, 4]

@@ -14,9 +14,9 @@ from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, ne
 from friso.engine.kernel import Kernel, empty_results
 from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
+from friso.engine.side_by_side import cores_to_use
 from friso.equations import motion
 from friso.equations.roles import Steady
-from friso.system import usable_cores
 
 LONGEST_SHARE = 1 / 200
 """Longest step as share of the run: what the step does not look at, it may not pass over."""
@@ -237,7 +237,7 @@ def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results
     """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock. Raises
     Overtaken where nobody waits for them any more."""
     go_on()
-    workers = min(threads or usable_cores(), -(-len(batch.starts) // LANES))
+    workers = min(threads or cores_to_use(), -(-len(batch.starts) // LANES))
     arguments = (new_queue(), batch, settings, results)
     if workers == 1:
         kernel.run(*arguments)

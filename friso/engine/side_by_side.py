@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import FIRST_EXCEPTION, ThreadPoolExecutor, wait
-from contextvars import copy_context
+from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
+from contextvars import ContextVar, copy_context
 from typing import TypeVar
 
 import numpy as np
@@ -18,15 +18,33 @@ _PATIENCE = 0.1
 """How long [s] is waited before it is looked again whether anybody waits for all of it still."""
 
 
+_BESIDE: ContextVar[tuple[int, Sequence[Future]]] = ContextVar("beside", default=(1, ()))
+"""Among how many tasks the present one is, and those of them that have begun."""
+
+
+def cores_to_use() -> int:
+    """How many cores a batch of runs may take now: all, or its share beside the other tasks that still run. Fewer
+    threads keep more of their lanes busy."""
+    tasks, begun = _BESIDE.get()
+    ended = sum(job.done() for job in begun)
+    return max(1, usable_cores() // (tasks - ended))
+
+
 def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
     """What the tasks return, in their order. What ends one of them early ends the others, too, at their next batch of
     runs, and is raised. On a single core they are done one after the other."""
     if len(tasks) < 2 or usable_cores() < 2:
         return [task() for task in tasks]
     flag = np.zeros(1, np.int64)
+    jobs: list[Future[_T]] = []
+
+    def beside_others(task: Callable[[], _T]) -> _T:
+        _BESIDE.set((len(tasks), jobs))
+        return task()
+
     with ThreadPoolExecutor(len(tasks)) as pool:
         with ended_by(flag):
-            jobs = [pool.submit(copy_context().run, task) for task in tasks]
+            jobs += [pool.submit(copy_context().run, beside_others, task) for task in tasks]
         try:
             while any(not job.done() for job in jobs):
                 for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from friso.equations.cases import Piecewise
 from friso.equations.conditions import LEVELS, anywhere
 from friso.equations.structure import Structure, structure
 
@@ -164,6 +163,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
 
     import sympy as sp
 
+    from friso.equations.cases import Piecewise
     from friso.equations.component import STEADY, TICK, Held, gaussian, key, quantised, state
     from friso.equations.model import REFERENCE
     from friso.equations.sampled import Rest, sampled_controller

@@ -7,7 +7,6 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import brentq
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 
@@ -84,6 +83,8 @@ def _enclosed(
 ) -> dict[float, Point] | None:
     """The points between two neighbours that the search for where it happens has met, by their places along the branch;
     None if one of them cannot be reached."""
+    from scipy.optimize import brentq  # 0.4 s to import
+
     direction, length = _towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
 
