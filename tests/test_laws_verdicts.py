@@ -10,9 +10,10 @@ from inside import friso_inside
 from refusals import Wording
 from variants import VARIANTS, gains, lugre, release, stage
 
+from friso.stage import violations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
-from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, verdicts_by_law
+from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw, frictions_that_keep, verdicts_by_law
 from friso.views.check.laws import laws_document, laws_rows, laws_sentences
 from friso.views.drawing.prefixes import NOTHING
 
@@ -59,7 +60,9 @@ def test_one_verdict_under_all_laws(wording: Wording) -> None:
 
 
 def test_laws_that_disagree(wording: Wording) -> None:
-    """What tells the fewer from the others decides."""
+    """What tells the fewer from the others decides; nothing tells LuGre's from all others."""
+    alone = across(under("lugre", ("hunts", 9.7)), under("elasto_plastic", ("settles", 9.1)))
+    assert alone.deciding("given") == [friction_law("elasto_plastic").decided_by[""]]
     laws = across(
         under("lugre", ("hunts", 9.7)),
         under("gms", ("hunts", 9.1)),
@@ -74,10 +77,17 @@ def test_laws_that_disagree(wording: Wording) -> None:
     assert document["laws"]["rolling"]["verdicts"] == ["settles"]
 
 
-def test_a_verdict_that_hangs_on_what_is_open_in_a_law() -> None:
+def test_a_stage_that_can_hunt_but_settles_after_this_move_does_not_hunt_for_sure(wording: Wording) -> None:
+    laws = across(under("lugre", ("bistable", 9.7)), under("elasto_plastic", ("hunts", 9.1)))
+    assert laws.hunts("given") is True
+    wording(" ".join(laws_sentences(laws)))
+
+
+def test_a_verdict_that_hangs_on_what_is_open_in_a_law(wording: Wording) -> None:
     laws = across(under("lugre", ("hunts", 9.7)), under("gms", ("hunts", 9.1), ("settles", 7.0)))
     assert laws.verdicts[1].hunts("given") is None
     assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
+    wording(laws_sentences(laws)[0])
 
 
 def test_failed_runs_leave_it_open(wording: Wording) -> None:
@@ -93,7 +103,7 @@ def test_a_law_whose_verdict_is_not_certain_counts_neither_way(verdict: tuple, w
     laws = across(under("lugre", ("settles", 6.0)), under("rolling", ("settles", 6.1)), under("gms", verdict))
     assert laws.hunts("given") is None
     assert laws.uncertain("given") == ["gms"]
-    assert laws.deciding("given") == []
+    assert laws.deciding("given") == [friction_law("gms").decided_by[""]]
     wording(laws_sentences(laws)[0])
     assert dict(laws_rows(laws))["As given: verdict"] == ["settles", "settles", f"{verdict[0]} (not certain)"]
     document = laws_document(laws)["cases"]["given"]
@@ -115,8 +125,10 @@ def test_no_law_is_certain(wording: Wording) -> None:
 
 
 def test_a_law_that_is_certain_with_some_of_what_is_open(wording: Wording) -> None:
+    """Measuring what is open in it may leave the values with which it is not certain out."""
     laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0), ("settles", 7.1, False)))
     assert laws.hunts("given") is None
+    assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
     wording(laws_sentences(laws)[0])
 
 
@@ -137,6 +149,20 @@ def test_an_edge_that_is_not_certain_says_so(wording: Wording) -> None:
     assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 Hz (not certain)"]
     trial = laws_document(laws)["cases"]["given"]["laws"]["gms"]["trials"][0]
     assert not trial["edge_certain"]
+
+
+def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
+    """What a law leaves open follows the friction: bristles that hold 1 N elastically would be too much for 0.15 N."""
+    machines = [
+        RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))
+    ]
+    frictions = frictions_that_keep(machines)
+    assert {name.split(",")[0] for name in frictions} == {"elasto_plastic", "gms", "rolling"}
+    for friction in frictions.values():
+        assert not violations({**RIGID.flat(), **friction})
+        assert friction["friction.static"] == pytest.approx([3.0, 1.0])
+    most = frictions["elasto_plastic, most breakaway_deflection"]["friction.breakaway_deflection"]
+    assert most[1] < most[0]
 
 
 def test_nothing_hunts_without_an_integrator() -> None:

@@ -124,10 +124,10 @@ def design(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"
         )
     from friso.design_method.method import design as designed
+    from friso.design_method.method import own_law
     from friso.studies.laws.verdicts import frictions_that_keep
 
-    others = frictions_that_keep(chosen) if laws else {}
-    return DesignAnswer(designed(chosen, specification, progress, others))
+    return DesignAnswer(designed(chosen, specification, progress, frictions_that_keep if laws else own_law))
 
 
 def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -> Spec:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -30,11 +29,10 @@ from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.errors import InputError
 from friso.frequency.crossover import Limits, limits
 from friso.progress import Progress, silent
 from friso.quantities import percent
-from friso.stage import Stage, violations
+from friso.stage import Stage
 
 STROKES = 4
 """Strokes that are tried where the specification leaves a range, the largest first."""
@@ -55,9 +53,16 @@ ALIKE = 0.98
 """Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
 
 
-Frictions = Mapping[str, Mapping[str, Any]]
+Frictions = Callable[[Sequence[Stage]], Mapping[str, Mapping[str, Any]]]
+"""Flat keys of the friction of stages that differ in its numbers, under other laws by name; arrays of shape (stages,)
+where they differ."""
 
-OWN_LAW: Frictions = MappingProxyType({})
+
+def own_law(stages: Sequence[Stage]) -> dict[str, dict[str, Any]]:
+    """No laws beside that of the stages."""
+    return {}
+
+
 """No other friction law than the stage's own."""
 
 
@@ -132,13 +137,13 @@ class Design:
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
 
 
-def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = OWN_LAW) -> Design:
-    """Carry the method out; edges of hunting are the worst over the stage's own friction and other `laws`, flat keys of
-    friction by name. Raises InputError for input that cannot be used, NoDesign if nothing meets the
-    specification."""
+def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Frictions = own_law) -> Design:
+    """Carry the method out; edges of hunting are the worst over the stage's own friction and other `laws`. Raises
+    InputError for input that cannot be used, NoDesign if nothing meets the specification."""
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
-    over = partial(_by_law, laws={flat["friction.model"]: {}, **laws}, population=population, progress=progress)
+    others = laws([base.with_numbers(_friction_of(population, n)) for n in range(population.count)])
+    over = partial(_by_law, laws={flat["friction.model"]: {}, **others}, population=population, progress=progress)
     without = over(rigid(flat), FIRST * limit, BEYOND * limit, "hunting without isolator")
     friction = float(np.min(least_breakaway(population.over(flat))))
     if friction <= 0:
@@ -164,24 +169,24 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without})
 
 
+def _friction_of(population: Population, number: int) -> dict[str, float]:
+    """What differs in the friction of one of the machines."""
+    return {key: value for key, value in population.of(number).items() if key.startswith("friction.")}
+
+
 def _by_law(
     flat: Mapping[str, Any],
     low: float,
     high: float,
     label: str,
-    laws: Frictions,
+    laws: Mapping[str, Mapping[str, Any]],
     population: Population,
     progress: Progress,
 ) -> dict[str, Corners]:
-    """The edges of a stage over the corners under each law, between crossovers [Hz]. Raises InputError for a law that
-    does not allow what the specification does."""
+    """The edges of a stage over the corners under each law, between crossovers [Hz]."""
     edges = {}
     for law, friction in laws.items():
         there = under_law(flat, friction) if friction else flat
-        if friction and (broken := violations(population.over(there))):
-            raise InputError(
-                "--laws", f"{law}: {broken[0][1]}", "a specification that every law allows", "friso design"
-            )
         edges[law] = edges_over(there, population, low, high, STEPS, progress, f"{label}, {law}" if friction else label)
     return edges
 

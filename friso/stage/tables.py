@@ -46,7 +46,7 @@ class FrictionSection(UncertainSection):
     """Whether static and Coulomb friction are multiplied by what [conditions] make of them."""
     decided_by: ClassVar[Mapping[str, str]] = {}
     """The experiment that would tell the value of a key that other measurements leave open; under "", the one that
-    tells the law from others."""
+    tells the law from LuGre's."""
     fitted: ClassVar[bool] = False
     """Whether `friso identify` fits the law's parameters to logs of moves."""
     words: ClassVar[Mapping[str, str]] = {}

@@ -31,7 +31,6 @@ class LuGre(StribeckSection):
     fitted: ClassVar[bool] = True
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
-    decided_by: ClassVar[Mapping[str, str]] = {"": "the drift under a load that oscillates below break-away"}
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:

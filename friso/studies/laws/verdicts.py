@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -141,16 +142,25 @@ class VerdictsByLaw:
         return [verdict.law for verdict in self.verdicts if not verdict.certain(case)]
 
     def deciding(self, case: str) -> list[str]:
-        """The experiments that would decide, where the verdict depends on the law: those that tell what is open in a
-        law under which the verdict depends on that, else those that tell the laws that disagree from the others."""
-        if not self.depends_on_law(case):
+        """The experiments that would decide, where the verdict depends on the law or is not certain under all: those
+        that tell what is open in a law under which the answer depends on that, else those that tell the laws that
+        disagree, or are not certain, from the others."""
+        if self.hunts(case) is not None or not self.answers(case):
             return []
-        open_ones = [verdict for verdict in self.verdicts if len(verdict.answers(case)) > 1]
+        depends = self.depends_on_law(case)
+        open_ones = [
+            verdict
+            for verdict in self.verdicts
+            if verdict.hunts(case) is None and len(verdict.answers(case)) == (2 if depends else 1)
+        ]
         if open_ones:
             names = {(verdict.law, key) for verdict in open_ones for key in verdict.conversion.open}
+        elif depends:
+            sides = [[v.law for v in self.verdicts if answer in v.answers(case)] for answer in (True, False)]
+            told = [side for side in sides if all("" in friction_law(law).decided_by for law in side)]
+            names = {(law, "") for law in min(told or sides, key=len)}
         else:
-            fewer = [[v for v in self.verdicts if answer in v.answers(case)] for answer in (True, False)]
-            names = {(verdict.law, "") for verdict in min(fewer, key=len)}
+            names = {(law, "") for law in self.uncertain(case)}
         texts = (friction_law(law).decided_by.get(key, "") for law, key in sorted(names))
         return list(dict.fromkeys(filter(None, texts)))
 
@@ -161,7 +171,7 @@ def verdicts_by_law(
     """What becomes of a stage under each law that keeps what is measured of its own. Raises InputError for a law that
     does not declare what that is."""
     conversions, left_out = kept_laws(stage, elements)
-    planned = [(conversion, list(stages_left_open(conversion))) for conversion in conversions]
+    planned = [(conversion, [*trials_left_open(conversion).values()]) for conversion in conversions]
     total, done = sum(len(draws) for _, draws in planned), 0
     kernels(set[KernelRequest]().union(*(needed_kernels(conversion.stage) for conversion in conversions)))
     verdicts = []
@@ -200,27 +210,42 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
     return kept, left_out
 
 
-def frictions_that_keep(stage: Stage, elements: int = ELEMENTS) -> dict[str, dict[str, float]]:
-    """Flat keys of the friction under every other law that keeps what is measured of a stage, as converted and at both
-    ends of what that leaves open, by the name of the law and what was drawn. Raises InputError for a law that does not
-    declare what is measured of it."""
+def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> dict[str, dict[str, Any]]:
+    """Flat keys of the friction of stages that differ in its numbers, under every other law that keeps what is measured
+    of each of them: as converted and at both ends of what that leaves open, by the name of the law and of what is open;
+    arrays of shape (stages,) where they differ. Raises InputError for a law that does not declare what is measured of
+    it."""
+    kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
     frictions = {}
-    for conversion in kept_laws(stage, elements)[0][1:]:
-        for changes in stages_left_open(conversion):
-            flat = conversion.stage.with_numbers(changes).flat()
-            name = ", ".join([conversion.law, *(f"{key} {value:.3g}" for key, value in changes.items())])
-            frictions[name] = {key: value for key, value in flat.items() if key.startswith("friction.")}
+    for law in kept[0]:
+        if not all(law in conversions for conversions in kept):
+            continue
+        conversions = [conversions[law] for conversions in kept]
+        trials = [trials_left_open(conversion) for conversion in conversions]
+        for end, changes in trials[0].items():
+            flats = [
+                {**conversion.stage.flat(), **trial.get(end, {})}
+                for conversion, trial in zip(conversions, trials, strict=True)
+            ]
+            name = ", ".join([law, *(f"{end} {key.removeprefix('friction.')}" for key in changes)])
+            frictions[name] = {key: _together([flat[key] for flat in flats]) for key in flats[0] if "friction." in key}
     return frictions
 
 
-def stages_left_open(conversion: LawConversion) -> Iterator[dict[str, float]]:
-    """What the measurements leave open: as the conversion has it, and at both ends of the ranges; as it is for the
-    stage's own law."""
-    yield {}
+def _together(values: Sequence[Any]) -> Any:
+    """A value that all have, or else an array of them."""
+    return values[0] if all(value == values[0] for value in values) else np.array(values)
+
+
+def trials_left_open(conversion: LawConversion) -> dict[str, dict[str, float]]:
+    """What the measurements leave open [SI]: as the conversion has it, "", and at the "least" and "most" of the ranges;
+    as it is for the stage's own law."""
+    trials: dict[str, dict[str, float]] = {"": {}}
     if conversion.stage == conversion.source:
-        return
+        return trials
     flat = conversion.stage.flat()
-    for end in (0, 1):
+    for end, name in enumerate(("least", "most")):
         changes = {key: ends[end] for key, ends in conversion.open.items() if not np.isclose(ends[end], flat[key])}
         if changes:
-            yield changes
+            trials[name] = changes
+    return trials

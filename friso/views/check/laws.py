@@ -6,11 +6,15 @@ from typing import TYPE_CHECKING, Any
 
 from friso.axis import axis_shown
 from friso.hunting.margin import FARTHEST
+from friso.quantities import percent
+from friso.stage.stage import declared_keys
 from friso.views.check.cases import case_labels
 from friso.views.convert.words import SHOWN
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
 
 COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
@@ -23,60 +27,83 @@ def laws_sentences(laws: VerdictsByLaw) -> list[str]:
     if laws.left_out:
         lost = [f"{law} ({listed([SHOWN[kind] for kind in kinds], 'and')})" for law, kinds in laws.left_out.items()]
         says.append(f"Not tried, because they cannot reproduce the measurements: {'; '.join(lost)}.")
+    says += [text for verdict in laws.verdicts if (text := _misses(verdict))]
     return says
+
+
+def _misses(verdict: LawVerdict) -> str:
+    """By how much a law that was tried misses the virgin curve; "" where it reproduces it."""
+    off = next((item.off for item in verdict.conversion.lost if item.kind == "virgin"), 0.0)
+    known = "leave it out if the virgin curve of this machine was measured"
+    return f"{verdict.law} misses the virgin curve by {percent(off)} of break-away: {known}." if off else ""
 
 
 def _sentence(laws: VerdictsByLaw, case: str) -> str:
     hunts, edges = laws.hunts(case), _edges(laws, case)
     if hunts is not None:
-        return f"under {_all(laws)} the stage {_does(hunts)}{edges}."
-    silent = [verdict.law for verdict in laws.verdicts if not verdict.answers(case)]
-    unsure = [f"under {listed(silent, 'and')} that is not certain"] if silent else []
+        verdicts = {name for verdict in laws.verdicts for name in verdict.verdicts(case)}
+        return f"under {_all(laws)} the stage {_does(verdicts)}{edges}."
     if not laws.answers(case):
-        return "the verdict is not certain under any law that reproduces the measurements."
-    parts = [
-        f"{_does(answer)} under {listed(under, 'and')}"
-        for answer in (True, False)
-        if (under := [verdict.law for verdict in laws.verdicts if verdict.hunts(case) is answer])
-    ]
-    parts += [text for verdict in laws.verdicts if (text := _open(verdict, case))]
-    if not laws.depends_on_law(case):
-        return f"the stage {'; '.join([*parts, *unsure])}{edges}."
+        return "the verdict is not certain under any law that was tried."
+    parts = []
+    for answer in (True, False):
+        alike = [verdict for verdict in laws.verdicts if verdict.hunts(case) is answer]
+        if alike:
+            does = _does({name for verdict in alike for name in verdict.verdicts(case)})
+            parts.append(f"{does} under {listed([verdict.law for verdict in alike], 'and')}")
+    parts += [_open(verdict, case) for verdict in laws.verdicts if verdict.hunts(case) is None]
+    depends = "the verdict depends on the friction law: " if laws.depends_on_law(case) else ""
     measure = listed(laws.deciding(case), "and")
     decide = f" To decide, measure {measure}." if measure else ""
-    return f"the verdict depends on the friction law: the stage {'; '.join([*parts, *unsure])}{edges}.{decide}"
+    return f"{depends}the stage {'; '.join(parts)}{edges}.{decide}"
 
 
 def _all(laws: VerdictsByLaw) -> str:
     """The laws that were tried."""
     count = len(laws.verdicts)
     if count == 1:
-        return "the one law that reproduces the measurements"
-    return f"{'both' if count == 2 else f'all {COUNTS.get(count, count)}'} laws that reproduce the measurements"
+        return "the one law that was tried"
+    return f"{'both' if count == 2 else f'all {COUNTS.get(count, count)}'} laws that were tried"
 
 
-def _does(hunts: bool) -> str:
-    return "hunts" if hunts else "settles"
+def _does(verdicts: set[str]) -> str:
+    """What a stage does that has one of these verdicts, which all hunt or all do not."""
+    if verdicts <= {"hunts"}:
+        return "hunts"
+    if verdicts <= {"hunts", "bistable"}:
+        return "can hunt"
+    return "settles" if verdicts <= {"settles"} else "does not hunt"
 
 
 def _open(verdict: LawVerdict, case: str) -> str:
-    """What the stage does under a law with some of what is open in it; "" if it does so with all of it, or if nothing
-    is certain."""
-    answers = verdict.answers(case)
-    if verdict.hunts(case) is not None or not answers:
-        return ""
-    words = [_does(answer) for answer in (True, False) if answer in answers]
-    if len(answers) > 1:
-        return f"under {verdict.law} it {listed(words, 'or')}, depending on the parameters that are left open"
-    return (
-        f"under {verdict.law} it {words[0]} with some of the values that are left open, and is not certain with others"
-    )
+    """What the stage does under a law with which values of what is open in it, where it does not do the same with
+    all."""
+    told: dict[str, list[Trial]] = {}
+    for trial in verdict.trials:
+        does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"
+        told.setdefault(does, []).append(trial)
+    if len(told) == 1:
+        return f"under {verdict.law} that is not certain"
+    return f"under {verdict.law} it {listed([f'{does} with {_values(verdict, told[does])}' for does in told], 'and')}"
+
+
+def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
+    """The values of what is open in a law, key by key, in some trials."""
+    converted, fields = verdict.conversion.stage.flat(), declared_keys(verdict.conversion.stage.flat())
+    texts = []
+    for key in verdict.conversion.open:
+        unit = getattr(fields[key], "unit", "")
+        values = sorted({trial.drawn.get(key, converted[key]) for trial in trials})
+        shown = listed([with_unit(value, unit) if unit else f"{value:.3g}" for value in values], "and")
+        texts.append(f"{key.removeprefix('friction.').replace('_', ' ')} {shown}")
+    return listed(texts, "and")
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
     edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
     unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
-    missing = f"not determined under {listed(unsought, 'and')}" if unsought else ""
+    part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""
+    missing = f"{part}not determined under {listed(unsought, 'and')}" if unsought else ""
     if not edges:
         none = f"with no edge of hunting within a factor of {FARTHEST:g} of its bandwidth"
         return f", its edge of hunting {missing}" if missing else f", {none}"

@@ -55,7 +55,8 @@ def across_laws(design: Design) -> str:
         edges = {law: corners[place].highest for law, corners in design.by_law.items()}
         least, worst = min(edges, key=edges.__getitem__), max(edges, key=edges.__getitem__)
         ends.append(f"{name} {hertz(edges[least])} ({least}) to {hertz(edges[worst])} ({worst})")
-    return f"Edges of hunting are the worst of {len(design.by_law)} friction laws: {'; '.join(ends)}."
+    moves = f"the moves are simulated under {next(iter(design.by_law))}"
+    return f"Edges of hunting are the worst of {len(design.by_law)} friction laws: {'; '.join(ends)}; {moves}."
 
 
 def need(design: Design) -> str:
