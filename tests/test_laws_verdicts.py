@@ -153,9 +153,7 @@ def test_an_edge_that_is_not_certain_says_so(wording: Wording) -> None:
 
 def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
     """What a law leaves open follows the friction: bristles that hold 1 N elastically would be too much for 0.15 N."""
-    machines = [
-        RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))
-    ]
+    machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))]
     frictions = frictions_that_keep(machines)
     assert {name.split(",")[0] for name in frictions} == {"elasto_plastic", "gms", "rolling"}
     for friction in frictions.values():
