@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import resource
 import subprocess
 import sys
 import tempfile
@@ -249,6 +248,8 @@ def hunting_adrc() -> Values:
 
 def minutes(*arguments: str) -> float:
     """CPU time of a command and the processes it starts [min]: other work on the machine hardly changes it."""
+    import resource  # Windows has none
+
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     friso(*arguments)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -2,6 +2,8 @@
 
 import math
 import os
+import re
+import shlex
 import signal
 import stat
 import sys
@@ -16,12 +18,20 @@ from types import FrameType
 if sys.platform == "win32":
     import _thread
     import ctypes
+    import errno
+    import subprocess
 
     PATIENCE = 2.0
     """How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
     file that appears."""
 
-    _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10))}
+    _DEVICES = {
+        *("CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"),
+        *(f"{port}{number}" for port in ("COM", "LPT") for number in "123456789¹²³"),
+    }
+
+    _LONGEST = 247
+    """Characters of a path of a folder that every Windows takes; of a file it takes twelve more."""
 
     @contextmanager
     def interrupts_held() -> Iterator[None]:
@@ -69,6 +79,23 @@ if sys.platform == "win32":
         """The part of a path that Windows takes for a device; "" where there is none."""
         return next((part for part in path.parts if part.split(".")[0].rstrip().upper() in _DEVICES), "")
 
+    def shell_word(word: str) -> str:
+        """A word of a command as cmd and PowerShell take it: cmd knows no quotes but "..."."""
+        text = subprocess.list2cmdline([word])
+        return text if text.startswith('"') or re.fullmatch(r"[\w.:/\\=+-]+", text) else f'"{text}"'
+
+    def is_closed_pipe(error: BaseException) -> bool:
+        """Whether what is written is no longer read. Windows calls that an invalid argument, which of a file has a
+        name."""
+        return isinstance(error, OSError) and error.errno in (errno.EPIPE, errno.EINVAL) and error.filename is None
+
+    def cause_of(error: OSError) -> str:
+        """Why a file or a folder could not be used. Of a path that is too long Windows says that it is not there."""
+        cause, length = error.strerror or str(error), len(os.path.abspath(error.filename or ""))
+        if length <= _LONGEST or not isinstance(error, FileNotFoundError):
+            return cause
+        return f"{cause}; a path of {length} characters, which Windows takes with long paths switched on alone"
+
     def foreign_writers(status: os.stat_result) -> str:
         """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
         return ""
@@ -112,6 +139,20 @@ else:
     def device_in(path: Path) -> str:
         """ "": a device is a file like others."""
         return ""
+
+    def shell_word(word: str) -> str:
+        """A word of a command as a shell takes it, in quotes that cmd and PowerShell take too where there are such."""
+        if re.fullmatch(r"[\w.,:/=@%+-]+", word):
+            return word
+        return shlex.quote(word) if set('"$`\\!') & set(word) or not word else f'"{word}"'
+
+    def is_closed_pipe(error: BaseException) -> bool:
+        """Whether what is written is no longer read."""
+        return isinstance(error, BrokenPipeError)
+
+    def cause_of(error: OSError) -> str:
+        """Why a file or a folder could not be used."""
+        return error.strerror or str(error)
 
     def foreign_writers(status: os.stat_result) -> str:
         """Who else than this user and root may write to a file, or exchange what this user has in a folder, in words;

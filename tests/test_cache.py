@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from systems import posix
 
 from friso.engine import building, cache, private, prune
 from friso.engine.cache import DAY
@@ -110,6 +111,7 @@ def entry(folder: Path) -> Path:
     return only
 
 
+@posix
 def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path: Path) -> None:
     first, log = finished(start(tmp_path / "cache"))
     assert first
@@ -121,6 +123,7 @@ def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path:
     assert log == ""
 
 
+@posix
 def test_permissions_are_mended(tmp_path: Path) -> None:
     assert built(tmp_path)
     (tmp_path / "kernels").chmod(0o755)
@@ -283,6 +286,7 @@ def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> N
     assert log.count("temporary folder") == 1
 
 
+@posix
 def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     def none(name: str) -> str:
         raise RuntimeError("could not determine the home directory")
@@ -307,6 +311,7 @@ def belongs_to_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(os, "geteuid", lambda: me + 1)
 
 
+@posix
 def test_folders_that_are_missing_are_made_private(tmp_path: Path) -> None:
     before = os.umask(0)
     try:
@@ -316,6 +321,7 @@ def test_folders_that_are_missing_are_made_private(tmp_path: Path) -> None:
     assert mode(tmp_path / "a") == mode(tmp_path / "a" / "b") == 0o700
 
 
+@posix
 @pytest.mark.parametrize("permissions", [0o770, 0o707, 0o777])
 def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path, permissions: int) -> None:
     """It is not friso's to close: the kernel is compiled elsewhere, and nothing of the folder is loaded."""
@@ -326,6 +332,7 @@ def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path
     assert mode(copied) == permissions
 
 
+@posix
 def test_a_link_is_not_followed(copied: Path, tmp_path: Path) -> None:
     (tmp_path / "linked").symlink_to(copied)
     (tmp_path / "below").mkdir()
@@ -336,6 +343,7 @@ def test_a_link_is_not_followed(copied: Path, tmp_path: Path) -> None:
         assert "is a symbolic link" in log
 
 
+@posix
 def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = copied / "kernels"
     folder.chmod(0o755)
@@ -345,6 +353,7 @@ def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pyt
     assert mode(folder) == 0o755
 
 
+@posix
 @pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET])
 def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
     (file,) = (copied / "kernels").glob(pattern)
@@ -355,6 +364,7 @@ def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkey
         assert built(copied)
 
 
+@posix
 def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path: Path) -> None:
     file, link, pipe = tmp_path / "file", tmp_path / "link", tmp_path / "pipe"
     write_sealed(file, b"content")
@@ -378,6 +388,7 @@ def test_a_planted_entry_is_not_loaded(copied: Path, tmp_path: Path) -> None:
     assert not built(copied)
 
 
+@posix
 def test_a_secret_that_others_could_read_is_a_secret_no_more(copied: Path) -> None:
     secret = copied / "kernels" / SECRET
     before = secret.read_bytes()

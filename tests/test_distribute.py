@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import signal
 import subprocess
 import threading
 import time
@@ -10,6 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import dask
+import psutil
 import pytest
 import xarray as xr
 from distributed import LocalCluster
@@ -128,7 +128,7 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
         def kill_after_two(done: int, total: int, what: str) -> None:
             computed.append(done)
             if len(computed) == 3:
-                os.kill(pids[0], signal.SIGKILL)
+                psutil.Process(pids[0]).kill()
 
         run_in_store(study, path, crew, 0.0, kill_after_two)
     with Store.opened(path, study) as store:

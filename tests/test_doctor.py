@@ -17,6 +17,8 @@ def test_this_machine_works(tmp_path: Path) -> None:
     assert {"friso", "Python", "processor", "kept code", "compiling", "running"} <= {
         finding["subject"] for finding in document["findings"]
     }
+    formats = {finding["subject"] for finding in document["findings"] if finding["subject"].endswith(" files")}
+    assert formats <= {"tdms files", "uff files", "lvm files"}
 
 
 def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -51,4 +53,5 @@ def test_a_wrong_result_and_what_cannot_be_loaded_are_told(
     assert all(finding.remedy for finding in broken.values())
     done = friso_inside(tmp_path, "doctor")
     assert done.returncode == 1
+    assert all(f" {subject} " in done.stdout for subject in ("packages", "processor", "running"))  # none is cut
     assert "libstdc++" in done.stdout

@@ -172,6 +172,43 @@ def test_names_of_devices_are_refused_on_windows_alone(host: str, axis: Path) ->
     assert {path.name for path in {*axis.iterdir()} - there} == {"console.toml", *(["con.toml"] * (host == "darwin"))}
 
 
+def test_what_windows_alone_calls_otherwise(axis: Path) -> None:
+    """A pipe that nobody reads any more, a path that is too long, names, and quotes."""
+    with started("win32", axis, "--help") as process:
+        assert process.stdout is not None
+        process.stdout.close()
+        assert process.stderr is not None
+        assert process.stderr.read() == ""
+    assert process.returncode
+    folder = axis / ("a" * 120) / ("b" * 120)
+    assert "long paths" in friso("win32", axis, "simulate", "axis.toml", "--out", folder, status=2)
+    (axis / "words.py").write_text(WORDS)
+    with started("win32", axis, command=("words.py",)) as process:
+        _, err = process.communicate()
+    assert process.returncode == 0, err
+
+
+WORDS = r"""
+from friso.app.names import plain_name
+from friso.engine import building
+from friso.system import shell_word
+
+assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
+assert shell_word("position=Act Pos") == '"position=Act Pos"'
+assert shell_word("a&b,c") == '"a&b,c"'
+assert shell_word(r"C:\logs\x.csv") == r"C:\logs\x.csv"
+
+class Request:
+    builder, task = "none", b"0" * 100_000
+
+builder = building._Builder(building._Surroundings(0, ".", (), ""))
+builder.kill()  # as one does that has waited long enough
+builder._process.wait()
+assert builder.build(Request()) == ""
+builder.end()
+"""
+
+
 @on_windows
 def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
     time = np.arange(0, 4, 2e-3)

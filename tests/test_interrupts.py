@@ -15,9 +15,12 @@ from typing import Any
 import pytest
 from filelock import FileLock
 from inside import friso_inside
+from systems import posix
 
 from friso import interrupts
 from friso.engine import building
+
+pytestmark = posix  # elsewhere a process cannot send itself such a signal, but is ended
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 COMMAND = [sys.executable, "-X", "importtime", "-m", "friso", "bode", str(RIG)]
@@ -39,7 +42,7 @@ def test_a_signal_while_friso_starts_is_one_line(tmp_path: Path, seed: int) -> N
     assert line == f"friso: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", interrupts.SIGNALS)
 @pytest.mark.parametrize("becomes", [None, ImportError("a library that is half there"), SystemExit(0)])
 def test_a_signal_that_a_library_turns_into_something_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, becomes: BaseException | None

@@ -15,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from refusals import Refused, Wording
 from scipy.io import savemat
+from systems import posix
 
 from friso.errors import InputError, LogError
 from friso.identification.logs import confined
@@ -602,7 +603,7 @@ def test_nothing_but_numbers_and_texts_comes_back(tmp_path: Path, monkeypatch: p
     assert not mark.exists()
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+@posix
 def test_pipes_and_devices_are_refused_at_once(tmp_path: Path, refused: Refused) -> None:
     """Opening a pipe would wait for a writer, and a device may never end."""
     os.mkfifo(tmp_path / "a.csv")

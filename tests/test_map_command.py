@@ -2,7 +2,6 @@
 
 import json
 import os
-import pty
 import re
 import shutil
 import signal
@@ -15,6 +14,7 @@ import pytest
 import xarray as xr
 from inside import friso_inside
 from refusals import Refused, Wording
+from systems import posix
 
 from friso.studies.cells import USUAL
 
@@ -106,8 +106,11 @@ def test_a_store_takes_nothing_that_makes_another_study(
     refused.says(done.stderr)
 
 
+@posix
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""
+    import pty
+
     command = [sys.executable, "-m", "friso", "map", str(RIG), "--x", "controller.crossover=4 Hz..12 Hz:300"]
     command += ["--y", "joint.stroke=0.1 mm..1 mm:40", "--rtol", "1e-7", "--out", "a.zarr", "--verify", "0"]
     terminal, other = pty.openpty()

@@ -12,6 +12,7 @@ import typer
 from filelock import FileLock
 from inside import friso_inside
 from refusals import Refused
+from systems import posix
 
 from friso.answers.drafts import DRAFTS, Drafts
 from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, check_store_folder, write
@@ -238,7 +239,7 @@ def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -
     assert not any(draft.exists() for draft in left)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="links and permissions as POSIX has them")
+@posix
 def test_what_others_may_have_put_there_is_no_draft(tmp_path: Path) -> None:
     """A link would have a lock made, and what was in it lost, in a folder of this user."""
     mine = tmp_path / "mine"
@@ -290,7 +291,7 @@ def test_a_signal_while_files_get_their_names_waits(
     real = Path.replace
 
     def replace(path: Path, target: Path) -> Path:
-        os.kill(os.getpid(), number)
+        signal.raise_signal(number)
         return real(path, target)
 
     monkeypatch.setattr(Path, "replace", replace)
@@ -329,7 +330,7 @@ def test_a_command_that_fails_while_writing_leaves_nothing(
     assert tree(tmp_path) == {}
 
 
-@pytest.mark.skipif(os.name != "posix", reason="pipes of POSIX")
+@posix
 @pytest.mark.parametrize("content", [None, b"files = " + b"[" * 100_000, b"\xff", b"command = 3"])
 def test_a_marker_of_others_marks_nothing(tmp_path: Path, content: bytes | None) -> None:
     if content is None:

@@ -13,6 +13,7 @@ from typing import Any
 import psutil
 import pytest
 import xarray as xr
+from systems import posix
 
 from friso.stage import Stage
 from friso.studies import execute
@@ -91,7 +92,7 @@ def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.
         assert not worker.is_alive()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="permissions as POSIX has them")
+@posix
 @pytest.mark.parametrize("kill", [False, True])
 def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> None:
     """Also by workers whose parent was killed."""
@@ -121,6 +122,7 @@ def test_workers_end_with_who_started_them(tmp_path: Path) -> None:
     worker.wait(30)
 
 
+@posix
 def test_ctrl_c_ends_the_blocks_in_flight(rig: Stage) -> None:
     """In the worker too, which would be at it for minutes."""
     axes = {"controller.crossover": "2 Hz..16 Hz:200", "joint.stroke": "0.1 mm..1 mm:200"}

@@ -20,6 +20,7 @@ import pytest
 import xarray as xr
 from filelock import FileLock
 from refusals import Refused
+from systems import posix
 
 from friso.errors import StoreError
 from friso.stage import Stage
@@ -279,7 +280,7 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path, refu
         process.stdout.readline()
         with refused():
             sweep(rig, AXES, store=path)
-        process.send_signal(signal.SIGKILL)
+        process.kill()
     with Store.opened(path, Request(rig, AXES).study()):  # the lock went with its process
         pass
 
@@ -407,7 +408,7 @@ def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Re
         read_store(stored)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="links, pipes and devices of POSIX")
+@posix
 @pytest.mark.parametrize(
     "name", [".zmetadata", ".zattrs", "peaks/.zarray", "joint.stroke/0", ".blocks/0.0", "peaks/0.0"]
 )
@@ -431,7 +432,7 @@ def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: s
             read(stored)
 
 
-@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+@posix
 @pytest.mark.parametrize("name", [".blocks", "peaks", "joint.stroke"])
 def test_nothing_is_written_where_a_link_in_a_store_leads(stored: Path, rig: Stage, name: str, tmp_path: Path) -> None:
     (stored / name).rename(tmp_path / "elsewhere")
@@ -599,7 +600,7 @@ def test_every_file_of_metadata_is_checked_and_written_anew(stored: Path, finish
     ]
 
 
-@pytest.mark.skipif(os.name != "posix", reason="permissions as POSIX has them")
+@posix
 def test_a_store_is_open_to_whom_the_user_lets_read_files(rig: Stage, tmp_path: Path) -> None:
     before = os.umask(0o027)
     try:
@@ -643,7 +644,7 @@ def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
 def test_ctrl_c_while_a_store_is_made_leaves_nothing(tmp_path: Path) -> None:
     def slow(folder: Path) -> None:
         folder.mkdir()
-        os.kill(os.getpid(), signal.SIGINT)
+        signal.raise_signal(signal.SIGINT)
         for number in range(20):
             time.sleep(0.01)
             (folder / str(number)).write_text("")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from inside import friso_inside
+from systems import posix
 
 import friso
 from friso.answers.inputs import stage_of
@@ -25,8 +26,6 @@ MACHINE = {
     **{"masses.stage": "3 kg", "friction.model": "none"},
     **{"motion.acceleration": "1 m/s^2", "motion.acceleration_time": "30 ms"},
 }
-
-posix = pytest.mark.skipif(sys.platform == "win32", reason="devices and pipes of POSIX")
 
 
 @posix

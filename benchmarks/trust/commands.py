@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import random
-import resource
 import shutil
 import signal
 import subprocess
@@ -109,6 +108,8 @@ def interrupted(rng: random.Random, folder: Path) -> None:
 def short_of_disk(rng: random.Random, folder: Path) -> None:
     """No file may become larger than some size: one message, status 1, and the files whole or not at all."""
     name = rng.choice([*QUICK])
+    import resource  # Windows has none
+
     most = int(10 ** rng.uniform(1, 6.5))
     _prepare(name, folder)
 

@@ -34,6 +34,8 @@ class DoctorAnswer(Answer):
 
     def tables(self) -> Sequence[AnswerTable]:
         """What was looked at."""
+        if all(check.works for check in self.result):
+            return [AnswerTable("", ["Result"], [(check.subject, [check.text]) for check in self.result])]
         rows = [(check.subject, [check.text, "" if check.works else check.remedy]) for check in self.result]
         return [AnswerTable("", ["Result", "Remedy"], rows)]
 

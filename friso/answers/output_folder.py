@@ -16,7 +16,7 @@ from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
 from friso.stage.files import parsed, text_of
-from friso.system import device_in
+from friso.system import cause_of, device_in
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -133,7 +133,7 @@ def write_file(option: str, path: Path, content: Content, overwrite: bool) -> No
         path.parent.stat()  # a folder that is missing is a mistake, not one to make
         write({path: content})
     except OSError as error:
-        expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
+        expected = f"a new file in a folder that can be written ({cause_of(error)}); nothing was overwritten"
         raise InputError(option, str(path), expected, path.name) from None
 
 
@@ -201,7 +201,7 @@ def _check_writable(folder: Path) -> None:
         for path in reversed(made(folder)):
             path.rmdir()  # for now: it appears with what is written
     except OSError as error:
-        expected = f"a folder that can be written ({error.strerror})"
+        expected = f"a folder that can be written ({cause_of(error)})"
         raise InputError("--out", str(folder), expected, "--out report") from None
     if folder.exists() and not os.access(folder, os.W_OK):
         raise InputError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")

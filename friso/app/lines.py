@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping
 from typing import Any
 
 from friso.app.machine import Machine
 from friso.quantities import as_toml
+from friso.system import shell_word
 
 
 def command_line(command: str, machine: Machine, options: Mapping[str, Any]) -> str:
-    """The command, as a POSIX shell takes it."""
+    """The command, as the shell of this system takes it."""
     sets = [("set", f"{key}={_bare(value)}") for key, value in _set(machine).items()]
     words = ["friso", command, machine.name]
     for name, value in [*sets, *options.items()]:
         option = f"--{name.strip('_').replace('_', '-')}"
         words += [option] if value is True else [option, str(value)]
-    return " ".join(map(shlex.quote, words))
+    return " ".join(map(shell_word, words))
 
 
 def python_line(function: str, machine: Machine, options: Mapping[str, Any]) -> str:

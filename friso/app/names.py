@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
+
+from friso.system import device_in
 
 _OUTSIDE = re.compile(r"[^\w.+ -]")
 
@@ -13,4 +16,5 @@ LONGEST = 150
 def plain_name(name: str, otherwise: str) -> str:
     """The last part of a name without what leads elsewhere, hides a file, or reads as an option of a command."""
     last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
-    return last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ") or otherwise
+    plain = last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
+    return f"_{plain}" if device_in(Path(plain)) else plain

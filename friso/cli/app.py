@@ -21,6 +21,7 @@ from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import escaping
 from friso.errors import InputError, shortened
+from friso.system import cause_of, is_closed_pipe
 from friso.version import VERSION
 
 
@@ -137,7 +138,7 @@ def _failed(error: BaseException) -> int:
     """Say what went wrong; the status with which the process ends. Raises what nobody should meet."""
     if isinstance(error, typer.Exit):
         return error.exit_code
-    if isinstance(error, BrokenPipeError):
+    if is_closed_pipe(error):
         sys.stderr.close()
         return 1
     if isinstance(error, InputError):
@@ -149,7 +150,9 @@ def _failed(error: BaseException) -> int:
         say(f"{shortened(usage())}\n  try: {context.command_path if context else 'friso'} --help")
         return 2
     if isinstance(error, RuntimeError | OSError | MemoryError):
-        say(f"the computation could not be completed: {error}")
+        cause = cause_of(error) if isinstance(error, OSError) else error
+        place = f": {error.filename}" if isinstance(error, OSError) and error.filename else ""
+        say(f"the computation could not be completed: {cause}{place}")
         return 1
     raise error
 

@@ -36,10 +36,12 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
     screen = console(sys.stdout, highlight=False, markup=False)
     lines = [["", *(label for label, _ in rows)], *zip(columns, *(row for _, row in rows), strict=True)]
     texts, title = [[*map(one_line, column)] for column in lines], one_line(title)
-    narrow = [_narrow(column) for column in texts]
-    for part in _side_by_side(narrow, screen.width - 1):
+    names, *others = map(_narrow, texts)
+    room = screen.width - 1
+    narrow = [names, *(min(width, room - names - 2 * _BORDER) for width in others)]
+    for part in _side_by_side(narrow, room):
         table = Table(title=title or None, title_justify="left")
-        spare = max(0, screen.width - 1 - sum(narrow[k] + _BORDER for k in part))
+        spare = max(0, room - sum(narrow[k] + _BORDER for k in part))
         for k in part:
             width = min(max(map(len, texts[k])), narrow[k] + spare)
             spare -= width - narrow[k]

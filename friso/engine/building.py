@@ -142,14 +142,14 @@ class _Builder:
         """Build what is requested; the name of its entry, "" where the process ended instead."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        with suppress(BrokenPipeError):  # it says why
+        with suppress(OSError):  # nobody reads it any more: the process ended, and says why
             pickle.dump((request.builder, request.task), self._process.stdin)
             self._process.stdin.flush()
         return self._process.stdout.readline().decode("ascii").strip()
 
     def end(self) -> str:
         """End the process; what it has said on standard error."""
-        with suppress(BrokenPipeError):
+        with suppress(OSError):
             self._process.communicate()
         self._messages.seek(0)
         message = self._messages.read().decode(errors="replace")

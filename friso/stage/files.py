@@ -16,6 +16,7 @@ from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage, changed
+from friso.system import cause_of
 from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
@@ -155,7 +156,8 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
 
 
 def _reason(error: OSError | ValueError) -> str:
-    return str(getattr(error, "strerror", None) or error).lower()
+    cause = cause_of(error) if isinstance(error, OSError) else str(error)
+    return cause[:1].lower() + cause[1:]
 
 
 def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:

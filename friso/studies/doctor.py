@@ -88,7 +88,7 @@ def _packages() -> Iterator[DoctorCheck]:
     yield DoctorCheck("packages", ", ".join(present))
 
 
-DEVELOPMENT = ("test", "bench")
+DEVELOPMENT = ("test", "docs", "bench")
 """Extras that add nothing for a user."""
 
 

@@ -28,6 +28,7 @@ from friso.studies.metadata import annotate_metadata, checked_metadata, is_store
 from friso.studies.store_files import refuse_foreign
 from friso.studies.store_folder import exchange, lock_store, make, remove_leftovers, remove_partial_files
 from friso.studies.study import CellBlock, Study, study_of
+from friso.system import cause_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -284,5 +285,5 @@ def _refused(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        expected = f"a folder that can be written ({error.strerror or error})"
+        expected = f"a folder that can be written ({cause_of(error)})"
         raise StoreError("--out", str(path), expected, "--out study.zarr") from None

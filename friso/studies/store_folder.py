@@ -19,7 +19,7 @@ from filelock import FileLock, Timeout
 from friso.errors import StoreError
 from friso.interrupts import hold_interrupts
 from friso.leftovers import is_leftover, remove_leftover
-from friso.system import MOVES_OPEN_FOLDERS, rename_folder
+from friso.system import MOVES_OPEN_FOLDERS, cause_of, rename_folder
 from friso.whole_file import PARTIAL, is_partial
 
 LOCK = ".friso.lock"
@@ -89,7 +89,7 @@ def lock_store(path: Path) -> Iterator[FileLock]:
         expected = "to wait, or another --out"
         raise StoreError("", "a store that another friso is writing to", expected, origin=str(path)) from None
     except OSError as error:
-        expected = f"a store that can be written to ({error.strerror})"
+        expected = f"a store that can be written to ({cause_of(error)})"
         raise StoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
     try:
         yield lock

@@ -2,8 +2,9 @@
 
 Python imports it at its start, in children too, where its folder is in PYTHONPATH. friso's modules get `os`, `signal`,
 `sys` and `ctypes` without the names that the other system lacks; other packages have versions of their own for it, and
-are left alone. For Windows, also: what is open cannot be renamed, replaced or deleted; text files are cp1252 with CRLF
-unless they are opened otherwise.
+are left alone. For Windows, also: what is open cannot be renamed, replaced or deleted; paths are not longer than 259
+characters; a pipe that nobody reads is an invalid argument; text files are cp1252 with CRLF unless they are opened
+otherwise.
 """
 
 import builtins
@@ -13,6 +14,7 @@ import locale
 import multiprocessing
 import os
 import signal
+import stat
 import sys
 from types import ModuleType
 
@@ -135,8 +137,29 @@ def _deleting(real):
     return delete
 
 
+class Pipe(io.FileIO):
+    """One that nobody reads is an invalid argument."""
+
+    def write(self, data):
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            raise OSError(22, "Invalid argument") from None
+
+
+def _in_short_path(real):
+    def done(path, *more, **others):
+        if isinstance(path, str | os.PathLike) and len(os.path.abspath(path)) > 259:
+            raise FileNotFoundError(2, "No such file or directory", os.fsdecode(path))
+        return real(path, *more, **others)
+
+    return done
+
+
 def _windows_open(real):
     def opened(file, mode="r", buffering=-1, encoding=None, errors=None, newline=None, *more, **others):
+        if mode == "wb" and isinstance(file, int) and stat.S_ISFIFO(os.fstat(file).st_mode):
+            return io.BufferedWriter(Pipe(file, mode))
         if "b" not in mode:
             encoding = "cp1252" if encoding in (None, "locale") else encoding
             newline = "\r\n" if newline is None and not set(mode) & {"r", "+"} else newline
@@ -149,5 +172,8 @@ if HOST == "win32":
     _rename = os.rename
     os.rename, os.replace = _renaming(os.rename), _renaming(os.replace)
     os.unlink = os.remove = _deleting(os.unlink)
-    builtins.open = io.open = _windows_open(io.open)
+    os.open, os.mkdir = _in_short_path(os.open), _in_short_path(os.mkdir)
+    builtins.open = io.open = _windows_open(_in_short_path(io.open))
+    if stat.S_ISFIFO(os.fstat(1).st_mode):
+        sys.stdout = io.TextIOWrapper(io.BufferedWriter(Pipe(1, "wb", closefd=False)), sys.stdout.encoding)
     locale.getpreferredencoding = lambda do_setlocale=True: "cp1252"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -18,6 +17,7 @@ from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Un
 from friso.cli.output import DefaultFolder, Overwrite
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
+from friso.system import shell_word
 
 if TYPE_CHECKING:
     from friso.answers.output_folder import OutputFolder
@@ -119,8 +119,7 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
 
 def _command(options: Sequence[str]) -> str:
     """The command as it was called, with more options: to be copied."""
-    arguments = (argument if argument.isalnum() else shlex.quote(argument) for argument in sys.argv[1:])
-    return " ".join(["friso", *arguments, *options])
+    return " ".join(["friso", *map(shell_word, sys.argv[1:]), *options])
 
 
 def listed_kinds() -> list[tuple[str, str]]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 import stat
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
@@ -18,6 +17,7 @@ from friso.identification.logs.log import ROLES
 from friso.identification.logs.roles import role_of
 from friso.quantities import Bound, Quantity, as_toml, quoted
 from friso.stage.files import parsed, text_of
+from friso.system import shell_word
 
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)
@@ -127,11 +127,10 @@ def _pair(
 def option(name: str, left: str, right: str) -> str:
     """An option LEFT=RIGHT as a shell takes it."""
     text = f"{left}={right}"
-    if re.fullmatch(r"[\w.,:/=@%+-]+", text):
-        return f"{name} {text}"
-    if set('"$`\\!') & set(text):
-        return f"{name} {shlex.quote(text)}"
-    return f'{name} {left}="{right}"' if re.fullmatch(r"\w+", left) else f'{name} "{text}"'
+    word = shell_word(text)
+    if word == f'"{text}"' and re.fullmatch(r"\w+", left):
+        word = f'{left}="{right}"'
+    return f"{name} {word}"
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identification.contents import ChannelContent, LogContent
+from friso.system import shell_word
 from friso.views.drawing.figure import GREEN, ORANGE
 from friso.views.drawing.prefixes import NOTHING, range_with_unit, with_unit
 
@@ -39,7 +40,7 @@ def open_questions(content: LogContent) -> list[str]:
 def next_command(content: LogContent) -> str:
     """The command that identifies the file, with the options that are still needed."""
     options = dict.fromkeys(gap.example for gap in content.gaps if gap.example.startswith("--"))
-    return " ".join(["friso identify", _quoted(str(content.path)), *options])
+    return " ".join(["friso identify", shell_word(str(content.path)), *options])
 
 
 def channel_rows(content: LogContent) -> list[tuple[str, list[str]]]:
@@ -84,7 +85,3 @@ def _holds(content: LogContent) -> str:
     time = longest.time
     lasts = "" if time is None or not time.size else f" over {with_unit(float(time[-1] - time[0]), 's', 4)}"
     return f"{len(content.channels)} channels, {longest.values.size} samples{lasts}"
-
-
-def _quoted(text: str) -> str:
-    return f'"{text}"' if " " in text else text
