@@ -15,6 +15,12 @@ from functools import cache
 from pathlib import Path
 from types import FrameType
 
+
+def _quoted(word: str) -> str:
+    """A word of a command in quotes, of KEY=VALUE the value alone."""
+    return re.sub(r"([\w.]+=)?(.*)", r'\1"\2"', word, count=1, flags=re.DOTALL)
+
+
 if sys.platform == "win32":
     import _thread
     import ctypes
@@ -81,8 +87,12 @@ if sys.platform == "win32":
 
     def shell_word(word: str) -> str:
         """A word of a command as cmd and PowerShell take it: cmd knows no quotes but "..."."""
+        if re.fullmatch(r"[\w.:/\\=+-]+", word):
+            return word
+        if word and '"' not in word and not word.endswith("\\"):
+            return _quoted(word)
         text = subprocess.list2cmdline([word])
-        return text if text.startswith('"') or re.fullmatch(r"[\w.:/\\=+-]+", text) else f'"{text}"'
+        return text if text.startswith('"') else f'"{text}"'
 
     def is_closed_pipe(error: BaseException) -> bool:
         """Whether what is written is no longer read. Windows calls that an invalid argument, which of a file has a
@@ -144,7 +154,7 @@ else:
         """A word of a command as a shell takes it, in quotes that cmd and PowerShell take too where there are such."""
         if re.fullmatch(r"[\w.,:/=@%+-]+", word):
             return word
-        return shlex.quote(word) if set('"$`\\!') & set(word) or not word else f'"{word}"'
+        return shlex.quote(word) if set('"$`\\!') & set(word) or not word else _quoted(word)
 
     def is_closed_pipe(error: BaseException) -> bool:
         """Whether what is written is no longer read."""

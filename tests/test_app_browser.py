@@ -188,7 +188,7 @@ def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Brows
     line = page.inner_text("#dialog pre")
     page.keyboard.press("Escape")
     assert friso.load(tmp_path / "out.toml").controller.crossover == pytest.approx(9.7)
-    assert line == "friso simulate thesis_rig.toml --set joint.locked=true --set 'controller.crossover=9.7 Hz'"
+    assert line == 'friso simulate thesis_rig.toml --set joint.locked=true --set controller.crossover="9.7 Hz"'
     page.set_input_files("#file", tmp_path / "out.toml")
     page.wait_for_function("() => document.querySelectorAll('#machines [role=tab]').length > 1", timeout=30_000)
     text = friso.simulate(tmp_path / "out.toml").sentences()[0]

@@ -194,7 +194,7 @@ from friso.engine import building
 from friso.system import shell_word
 
 assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
-assert shell_word("position=Act Pos") == '"position=Act Pos"'
+assert shell_word("position=Act Pos") == 'position="Act Pos"'
 assert shell_word("a&b,c") == '"a&b,c"'
 assert shell_word(r"C:\logs\x.csv") == r"C:\logs\x.csv"
 

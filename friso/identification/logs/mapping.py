@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import stat
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
@@ -126,11 +125,7 @@ def _pair(
 
 def option(name: str, left: str, right: str) -> str:
     """An option LEFT=RIGHT as a shell takes it."""
-    text = f"{left}={right}"
-    word = shell_word(text)
-    if word == f'"{text}"' and re.fullmatch(r"\w+", left):
-        word = f'{left}="{right}"'
-    return f"{name} {word}"
+    return f"{name} {shell_word(f'{left}={right}')}"
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:
