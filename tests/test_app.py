@@ -39,6 +39,7 @@ from friso.studies.request import Request
 from friso.studies.sweep import run_in_memory
 from friso.views.drawing import matplotlib_renderer
 from friso.views.drawing.drawable import drawable
+from friso.views.drawing.figure import Axis, Figure, Panel, Series
 
 RIG = Path(friso.example("thesis_rig"))
 STICK_SLIP = Path(friso.example("lugre_stick_slip"))
@@ -390,6 +391,35 @@ def test_a_run_is_that_of_friso(served: Served) -> None:
     assert lines[0]["y"].dtype == np.float32
     expected = drawable(answer.figures()[0]).panels[0].series[1].y
     assert np.array_equal(lines[0]["y"], expected.astype(np.float32))
+
+
+def test_a_cell_of_a_map_shows_the_error_of_its_run(served: Served) -> None:
+    part = served.ask("cell", STICK_SLIP, {"masses.stage": "1.1 kg"})[-1]
+    assert part["sentences"] == [*friso.simulate(STICK_SLIP, set={"masses.stage": "1.1 kg"}).sentences()]
+    assert [trace.get("name") for trace in part["figures"][0]["data"]] == ["error"]
+
+
+def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Last, over the same keys, with its sentence; `friso.boundary` itself takes too long here."""
+    asked = []
+    curve = Series(np.array([0.9, 1.1]), np.array([7.0, 9.0]), "flip of the hunting cycle", "#222222")
+    panel = Panel("", Axis("Stage mass", "kg"), Axis("Static friction", "N"), (curve,))
+
+    class Edge:
+        figures = staticmethod(lambda: [Figure("boundary", "Edge of hunting", "", (panel,))])
+        sentences = staticmethod(lambda: ["Hunting ends there."])
+
+    monkeypatch.setattr(friso, "boundary", lambda stage, **options: asked.append(options) or Edge())
+    axes = {"x": "masses.stage=0.8 kg..1.2 kg", "y": "friction.static=6 N..12 N", "log": True}
+    answers = [part for part in served.ask("map", STICK_SLIP, **axes, edge=True) if "figures" in part]
+    drawn = [[trace.get("name") for trace in part["figures"][0]["data"]].count(curve.label) for part in answers]
+    assert drawn[:-1] == [0, 0, 0]
+    assert drawn[-1] > 0
+    assert [options | {"progress": None} for options in asked] == [axes | {"progress": None}]
+    assert answers[-1]["sentences"] == [*answers[-2]["sentences"], "Hunting ends there."]
+    assert answers[-1]["command"].endswith("--metric outcome --log")
+    layout = answers[-1]["figures"][0]["layout"]
+    assert layout["xaxis"]["type"] == layout["yaxis"]["type"] == "log"
 
 
 def test_a_report_has_page_figures_document_and_stage_file(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -197,13 +197,16 @@ def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Brows
     )
 
 
-def test_a_click_on_the_map_sets_the_machine_there(browsed: Browsed) -> None:
+def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_there(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#tab-map")
     page.wait_for_selector(".plot .heatmaplayer image", timeout=60_000)
     before = page.input_value('[data-path="controller.crossover"] input[type=text]')
     place = page.locator(".plot .nsewdrag").first.bounding_box()
     assert place is not None
+    page.mouse.move(place["x"] + 0.8 * place["width"], place["y"] + 0.4 * place["height"])
+    page.mouse.move(place["x"] + 0.8 * place["width"], place["y"] + 0.5 * place["height"])
+    page.wait_for_selector("#beside .main-svg", timeout=60_000)  # the run of the cell under the pointer
     page.mouse.click(place["x"] + 0.8 * place["width"], place["y"] + 0.5 * place["height"])
     field = '[data-path="controller.crossover"] input[type=text]'
     page.wait_for_function(
@@ -282,6 +285,17 @@ def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
     browsed.page.wait_for_selector(".plot .main-svg")
     browsed.page.wait_for_timeout(300)
     assert browsed.page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    browsed.page.emulate_media(color_scheme=scheme)
+    for tab in ("run", "map", "remedies", "logs"):
+        browsed.page.click(f"#tab-{tab}")
+        browsed.page.wait_for_timeout(300)
+        found = axe.run(browsed.page).response["violations"]
+        assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in found] == []
 
 
 def test_nothing_went_wrong_and_nothing_left_this_machine(browsed: Browsed) -> None:

@@ -1,4 +1,4 @@
-"""Two machines in one figure: the pinned one stays behind the other, in grey."""
+"""What stands in a figure beside its own: the pinned machine in grey; on maps, machines and the edge of hunting."""
 
 from __future__ import annotations
 
@@ -57,3 +57,11 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
             markers.append(Markers(np.array([right]), np.array([up]), label, *style))
     panels = tuple(replace(panel, markers=(*panel.markers, *markers)) for panel in figure.panels)
     return replace(figure, panels=panels)
+
+
+def with_edge(figure: Figure, edge: Figure | None) -> Figure:
+    """A map over two keys with the curves on which hunting ends over the same two."""
+    if edge is None:
+        return figure
+    curves = edge.panels[0].series
+    return replace(figure, panels=tuple(replace(panel, series=(*panel.series, *curves)) for panel in figure.panels))

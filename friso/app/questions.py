@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from functools import lru_cache, partial
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ import friso
 from friso.app import machine as machines
 from friso.app.archive import archive
 from friso.app.frames import figure_on_page
-from friso.app.ghosts import ghosts_of, with_places
+from friso.app.ghosts import ghosts_of, with_edge, with_places
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
 from friso.app.uploads import Uploads
@@ -92,6 +92,16 @@ def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     yield parts_of(asked, friso.simulate(asked.machine.stage), ghosts_of(pinned), **_lines("simulate", asked))
 
 
+def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """What the run of a cell of a map does: its error alone."""
+    asked.chosen()
+    answer = friso.simulate(asked.machine.stage)
+    with speaking_of(answer.axis_kind):
+        (figure,) = answer.figures()
+        error = replace(figure, panels=tuple(panel for panel in figure.panels if panel.title == "Error"))
+        yield {"kind": "answer", "sentences": [*answer.sentences()], "figures": [figure_on_page(error, narrow=True)]}
+
+
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The verdict by the cycles that attract, in a word for each case: a map of a single cell, or one over the joint
     locked and free."""
@@ -138,25 +148,39 @@ COARSE_TO_FINE = (6, 21, 41)
 
 
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """A map over two keys, coarse to fine; where the machine stands in it, and the pinned one."""
-    options = asked.chosen("x", "y", "metric")
+    """A map over two keys, coarse to fine, and last, if it is asked for, the edge of hunting over it; where the machine
+    stands in it, and the pinned one."""
+    options = asked.chosen("x", "y", "log", "metric", "edge")
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
-    metric = options.get("metric", "outcome")
+    shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
     stands = [("this machine", asked.machine.stage)]
     stands += [("pinned", asked.pinned.stage)] if asked.pinned else []
-    for count in COARSE_TO_FINE:
-        ranges: dict[str, Any] = {name: f"{text}:{count}" for name, text in axes.items()}
-        answer = friso.sweep(asked.machine.stage, **ranges, metric=metric, progress=work.progress)
+
+    def part(answer: Answer, ranges: Mapping[str, Any], edge: Answer | None = None) -> AnswerPart:
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
-        more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, "metric": metric}, "sweep")}
-        part = parts_of(asked, answer, partial(with_places, stands=stands, keys=[*keys.values()]), **more)
-        yield part if count == COARSE_TO_FINE[-1] else {**part, "kind": "partly"}
+        more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, **shown}, "sweep")}
+        (curves,) = [None] if edge is None else edge.figures()
+
+        def drawn(figure: Figure) -> Figure:
+            return with_edge(with_places(figure, stands, [*keys.values()]), curves)
+
+        return parts_of(asked, answer, drawn, **more)
+
+    for count in COARSE_TO_FINE:
+        ranges = {name: f"{text}:{count}" for name, text in axes.items()}
+        answer = friso.sweep(asked.machine.stage, **ranges, **shown, progress=work.progress)
+        last = count == COARSE_TO_FINE[-1] and not options.get("edge")
+        yield {**part(answer, ranges), **({} if last else {"kind": "partly"})}
+    if options.get("edge"):
+        edge = friso.boundary(asked.machine.stage, **axes, log=shown["log"], progress=work.progress)
+        whole = part(answer, ranges, edge)
+        yield {**whole, "sentences": [*whole["sentences"], *edge.sentences()]}
 
 
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Where hunting ends, over one key or in the plane of two."""
-    options = asked.chosen("x", "y")
+    options = asked.chosen("x", "y", "log")
     answer = friso.boundary(asked.machine.stage, **options, progress=work.progress)
     yield parts_of(asked, answer, **_lines("boundary", asked, options))
 
@@ -221,6 +245,7 @@ def _dropped(asked: PageRequest) -> tuple[list[Path], dict[str, Any]]:
 QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "machine": machine,
     "run": run,
+    "cell": cell,
     "verdict": verdict,
     "check": check,
     "bode": bode,
@@ -249,7 +274,8 @@ REPORTS: Mapping[str, Callable[..., Answer]] = {
 
 def report(function: Callable[..., Answer], asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The files of an answer."""
-    options = asked.chosen("x", "y", "metric")
+    options = asked.chosen("x", "y", "log", "metric", "edge")
+    options.pop("edge", None)  # the archive of a map holds the map
     if function is friso.sweep:
         options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
     answer = function(asked.machine.stage, **options, progress=work.progress)

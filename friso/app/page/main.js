@@ -22,7 +22,8 @@ const sent = () => ({ machine: machines.sent(), pinned: machines.pinned() });
 const set = (values, dragged = false) => machines.set(values, dragged);
 
 const pictures = new Pictures(sent, {
-  set: (values) => set(withUnits(values)),
+  set: (values) => set(values),
+  worded: withUnits,
   progress: answers.progress,
   shown: (part) => (answer = part),
   take: (name, toml) => machines.add(`${name.replaceAll(" ", "_")}.toml`, toml, true),

@@ -1,6 +1,7 @@
 // The pictures of the answer, in tabs: each asks its own question.
 import { $, el, words } from "./dom.js";
 import { worded } from "./keys.js";
+import { Beside } from "./beside.js";
 import { Logs } from "./logs.js";
 import { clear, draw, stale } from "./plot.js";
 import { Remedies } from "./remedies.js";
@@ -28,6 +29,7 @@ export class Pictures {
       { id: "remedies", label: "What stops it" },
       { id: "logs", label: "Logs" },
     ];
+    this.beside = new Beside(sent);
     this.own = { remedies: new Remedies(sent, tell), logs: new Logs(sent, tell) };
     window.addEventListener("resize", () => {
       if (this.narrow !== this.was) this.ask();
@@ -63,6 +65,7 @@ export class Pictures {
     this.shown = id;
     this.goOn();
     this.live.stop();
+    this.beside.leave();
     const place = $("picture");
     if (this.plots) clear(this.plots);
     place.replaceChildren();
@@ -131,7 +134,7 @@ export class Pictures {
     }
     if (answer.kind !== "partly") this.tell.progress(null);
     this.answer = answer;
-    draw(this.plots, answer.figures, (point) => this.clicked(point));
+    draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) });
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = answer.drawing ? [this.drawn(answer.drawing)] : [];
     this.below.replaceChildren(...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
@@ -156,14 +159,17 @@ export class Pictures {
       this.timer = setTimeout(() => this.ask(), AT_REST);
     };
     const metric = el("select", { id: "metric" }, ...["outcome", "verdict", "peak_to_peak", "settling_time", "largest_force"].map((name) => el("option", { value: name }, words(name))));
-    const metrics = this.shown === "map" ? [el("label", {}, "Shown", metric)] : [];
-    const form = el("div", { class: "form" }, ...fields.flatMap((item) => item.elements), ...metrics);
+    const log = el("input", { id: "log", type: "checkbox", checked: chosen.every((key) => key.range.log) });
+    const edge = el("input", { id: "edge", type: "checkbox" });
+    const metrics = this.shown === "map" ? [el("label", {}, "Shown", metric), el("label", { class: "tick" }, edge, "Edge of hunting (about a minute)")] : [];
+    const form = el("div", { class: "form" }, ...fields.flatMap((item) => item.elements), el("label", { class: "tick" }, log, "Logarithmic"), ...metrics);
     form.addEventListener("change", start);
     place.append(form);
     return () => {
       this.kept.set("axes", fields.map((item) => item.key.value));
       const options = Object.fromEntries(fields.map((item, k) => ["xy"[k], `${item.key.value}=${item.low.value}..${item.high.value}`]));
-      return this.shown === "map" ? { ...options, metric: metric.value } : options;
+      const ranges = { ...options, log: log.checked };
+      return this.shown === "map" ? { ...ranges, metric: metric.value, edge: edge.checked } : ranges;
     };
   }
 
@@ -181,11 +187,24 @@ export class Pictures {
     return { key, low, high, elements: [el("label", {}, label, key), el("label", {}, "from", low), el("label", {}, "to", high)] };
   }
 
-  /** A cell was clicked: the machine is set there. */
-  clicked(point) {
-    if (this.shown !== "map" || !this.answer?.places || !point.data.z) return;
+  /** The values of the two keys of a map [SI] in a cell, null elsewhere. */
+  cell(point) {
+    if (this.shown !== "map" || !this.answer?.places || !point?.data.z) return null;
     const [row, column] = point.pointIndex;
     const { axes, places } = this.answer;
-    this.tell.set({ [axes.x]: places.x[column], [axes.y]: places.y[row] });
+    return { [axes.x]: places.x[column], [axes.y]: places.y[row] };
+  }
+
+  /** A cell was clicked: the machine is set there. */
+  clicked(point) {
+    const values = this.cell(point);
+    if (values) this.tell.set(this.tell.worded(values));
+  }
+
+  /** The pointer is over a cell: its run is shown beside. */
+  hovered(point) {
+    const values = this.cell(point);
+    if (values) this.beside.show(this.tell.worded(values));
+    else this.beside.leave();
   }
 }

@@ -13,8 +13,11 @@ function themed(value) {
   return Object.fromEntries(Object.entries(value).map(([name, item]) => [name, themed(item)]));
 }
 
-/** Draw figures into a place, keeping the plots that are there: those of the same name are updated. */
-export function draw(place, figures, tell = () => {}) {
+/**
+ * Draw figures into a place, keeping the plots that are there: those of the same name are updated. `tell` is called with
+ * the point that is `clicked`, and with that which the pointer is over (`hovered`), null once it is gone.
+ */
+export function draw(place, figures, tell = {}) {
   const there = new Map([...place.children].filter((child) => child.dataset.name).map((child) => [child.dataset.name, child]));
   for (const [name, child] of there) if (!figures.some((figure) => figure.name === name)) remove(child);
   for (const figure of figures) {
@@ -40,7 +43,11 @@ function plot(place, figure, tell) {
   place.style.height = `${layout.height}px`;
   const [data, shown] = dark.matches ? [themed(figure.data), themed(layout)] : [figure.data, layout];
   Plotly.react(place, data, shown, CONFIG);
-  if (fresh) place.on("plotly_click", (event) => tell(event.points[0]));
+  if (!fresh) return;
+  if (tell.clicked) place.on("plotly_click", (event) => tell.clicked(event.points[0]));
+  if (!tell.hovered) return;
+  place.on("plotly_hover", (event) => tell.hovered(event.points[0]));
+  place.on("plotly_unhover", () => tell.hovered(null));
 }
 
 function remove(child) {
@@ -57,5 +64,5 @@ export function clear(place) {
 export const stale = (place) => place.querySelectorAll(".figure").forEach((box) => box.classList.add("stale"));
 
 dark.addEventListener("change", () => {
-  for (const place of document.querySelectorAll(".plot")) if (place.figure) plot(place, place.figure, () => {});
+  for (const place of document.querySelectorAll(".plot")) if (place.figure) plot(place, place.figure, {});
 });
