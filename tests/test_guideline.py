@@ -17,7 +17,7 @@ from refusals import Refused
 from snapshots import Snapshots
 from variants import VARIANTS
 
-from friso.answers.output_folder import write
+from friso.answers.output_folder import UNFINISHED, write
 from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
@@ -493,13 +493,23 @@ def test_wrong_number_of_samples(samples: str, monkeypatch: Any, capsys: Any, tm
     assert not (tmp_path / "none").exists()
 
 
-def test_unfinished_guideline_says_what_is_kept(monkeypatch: Any, capsys: Any, tmp_path: Path) -> None:
+@pytest.mark.parametrize("parts", [0, 1])
+def test_an_interrupted_guideline_says_what_is_kept_and_leaves_nothing_else(
+    parts: int, monkeypatch: Any, capsys: Any, tmp_path: Path
+) -> None:
+    out = tmp_path / "new" / "out"
+
     def interrupted(*_: Any) -> SimpleNamespace:
+        (out / UNFINISHED).mkdir(parents=True)
+        for part in range(parts):
+            (out / UNFINISHED / f"{part}.npz").write_bytes(b"")
         raise KeyboardInterrupt
 
     monkeypatch.setattr("friso.studies.guideline.guideline", interrupted)
-    monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", "64", "--out", str(tmp_path)])
+    monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", "64", "--out", str(out)])
     with pytest.raises(SystemExit) as left:
         main()
     assert left.value.code == 130
-    assert re.search(r"\b0 parts\b", capsys.readouterr().err)
+    assert ("1 parts" in capsys.readouterr().err) == bool(parts)
+    assert len([*tmp_path.rglob("*.npz")]) == parts
+    assert (tmp_path / "new").exists() == bool(parts)

@@ -2,8 +2,11 @@
 
 import errno
 import os
+import shutil
 import signal
+import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +17,8 @@ from inside import friso_inside
 from refusals import Refused
 from systems import posix
 
-from friso.answers.drafts import DRAFTS, Drafts
-from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, check_store_folder, write
+from friso.answers.drafts import DRAFTS, Drafts, made
+from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, _check_writable, check_store_folder, write
 from friso.cli.app import command_line
 from friso.errors import InputError
 from friso.stage import load
@@ -302,6 +305,42 @@ def test_a_signal_while_files_get_their_names_waits(
         signal.signal(number, before)
     assert seen == [number]
     assert {(folder / name).read_text() for name in NAMES} == {"new"}
+
+
+def test_an_interrupt_at_any_line_leaves_all_files_or_none(tmp_path: Path) -> None:
+    """Ctrl-C at each line of the code that makes folders and gives drafts their names, one after the other."""
+    folder, line = tmp_path / "new" / "out", 0
+    while _interrupted_at(line := line + 1, lambda: OutputFolder("check", folder, False).write({"a": "1"})):
+        assert {path.name for path in folder.rglob("*")} in (set(), {"a", MARKER}), line
+        assert folder.exists() or [*tmp_path.iterdir()] == [], line
+        shutil.rmtree(tmp_path / "new", ignore_errors=True)
+    assert line > 50
+
+
+def _interrupted_at(number: int, work: Callable[[], object]) -> bool:
+    """Do some work with Ctrl-C at a line of the functions that make something; whether there are as many."""
+    left = number
+    functions = (made, _check_writable, Drafts.add, Drafts._spare, Drafts.put_in_place, Drafts.__exit__)
+    making = {function.__code__ for function in functions}
+
+    def trace(frame: Any, event: str, argument: object) -> Any:
+        nonlocal left
+        if frame.f_code not in making:
+            return None
+        left -= event == "line"
+        if left == 0 and event == "line":
+            signal.raise_signal(signal.SIGINT)
+        return trace
+
+    before, handler = sys.gettrace(), signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        sys.settrace(trace)
+        with suppress(KeyboardInterrupt):
+            work()
+    finally:
+        sys.settrace(before)
+        signal.signal(signal.SIGINT, handler)
+    return left <= 0
 
 
 def test_files_that_are_there_are_replaced(folder: Path) -> None:

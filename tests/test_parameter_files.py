@@ -307,6 +307,13 @@ BAD: dict[str, tuple[str | bytes, str]] = {
         json.dumps({"axis0": {"vel_integrator_gain": {"x" * 10_000: dict.fromkeys(map(str, range(99_000)), 0)}}}),
         "a key of 10",
     ),
+    "digits": (f"[JOINT_0]\nP = {100_000 * '1'}x\n", "a number"),
+    "countless axes": (
+        json.dumps(
+            {f"axis{k}": {"controller.config": {"pos_gain": 1, "vel_integrator_gain": 1}} for k in range(20_000)}
+        ),
+        "0.5.1 to 0.5.6",
+    ),
     "old firmware": (
         '{"axis0": {"controller": {"config": {"pos_gain": 1, "vel_gain": 1, "vel_integrator_gain": 1}}}}',
         "0.5.1 to 0.5.6",
@@ -360,6 +367,14 @@ def test_what_these_firmwares_do_not_have_is_told(tmp_path: Path) -> None:
     left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
     assert any(text.startswith("gain_scheduling_min_ratio") for text in left_out)
     assert any(text.startswith("load_encoder_axis = 1") for text in left_out)
+
+
+def test_what_is_left_out_is_as_many_lines_as_friso_says(tmp_path: Path) -> None:
+    strange = {f"x{k}\nfriso: all is well": 1 for k in range(2000)}
+    path = backup(tmp_path, load_encoder_axis=10**4000, **strange)
+    left_out = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"}).left_out
+    assert len(left_out) < 10
+    assert all(len(text) < 2000 and "\n" not in text for text in left_out)
 
 
 def test_formats_are_listed() -> None:

@@ -37,7 +37,7 @@ class Drafts:
 
     def __init__(self) -> None:
         self.folders: dict[Path, Path] = {}
-        self.locks = ExitStack()
+        self.locks, self.held = ExitStack(), ExitStack()
         self.drafts: list[tuple[Path | None, Path]] = []
         self.tidied: set[Path] = set()
         self.numbers = count()
@@ -46,9 +46,10 @@ class Drafts:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        self.locks.close()
-        for folder in self.folders.values():
-            shutil.rmtree(folder, ignore_errors=True)
+        with self.held, hold_interrupts():
+            self.locks.close()
+            for folder in self.folders.values():
+                shutil.rmtree(folder, ignore_errors=True)
 
     def add(self, path: Path, content: Content) -> None:
         """The draft of a file; None: an earlier one is deleted in the end."""
@@ -66,28 +67,28 @@ class Drafts:
         self.drafts.append((draft, path))
 
     def put_in_place(self) -> None:
-        """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end. A
-        name always has a file, the earlier one or the new."""
+        """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the drafts
+        are gone. A name always has a file, the earlier one or the new."""
         undo: list[Callable[[], object]] = []
-        with hold_interrupts():
-            try:
-                for draft, path in self.drafts:
-                    undo += [folder.rmdir for folder in made(path.parent)]
-                    if os.path.lexists(path):
-                        spare = self._spare(path)
-                        _duplicate(path, spare)
-                        undo.append(partial(replace_file, spare, path))
-                    elif draft is not None:
-                        undo.append(path.unlink)
-                    if draft is not None:
-                        replace_file(draft, path)
-                    elif os.path.lexists(path):
-                        path.unlink()
-            except BaseException:
-                for step in reversed(undo):
-                    with suppress(OSError):  # the rest is undone all the same
-                        step()
-                raise
+        self.held.enter_context(hold_interrupts())
+        try:
+            for draft, path in self.drafts:
+                undo += [folder.rmdir for folder in made(path.parent)]
+                if os.path.lexists(path):
+                    spare = self._spare(path)
+                    _duplicate(path, spare)
+                    undo.append(partial(replace_file, spare, path))
+                elif draft is not None:
+                    undo.append(path.unlink)
+                if draft is not None:
+                    replace_file(draft, path)
+                elif os.path.lexists(path):
+                    path.unlink()
+        except BaseException:
+            for step in reversed(undo):
+                with suppress(OSError):  # the rest is undone all the same
+                    step()
+            raise
 
     def _tidy(self, path: Path) -> None:
         """Remove what killed processes left of drafts, near `path`: where there was no folder yet, further up."""
@@ -100,8 +101,9 @@ class Drafts:
         """A path that is free, on the disk of `path`, with its suffix."""
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
-            folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
-            self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
+            with hold_interrupts():
+                folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
+                self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
 
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from friso import paths
 from friso.answers.drafts import DRAFTS, Drafts, made
 from friso.errors import InputError
+from friso.interrupts import hold_interrupts
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
 from friso.stage.files import parsed, text_of
@@ -198,8 +199,9 @@ _LISTED = 8
 def _check_writable(folder: Path) -> None:
     """Raises InputError where no file can be written into the folder, or it cannot be made."""
     try:
-        for path in reversed(made(folder)):
-            path.rmdir()  # for now: it appears with what is written
+        with hold_interrupts():
+            for path in reversed(made(folder)):
+                path.rmdir()  # for now: it appears with what is written
     except OSError as error:
         expected = f"a folder that can be written ({cause_of(error)})"
         raise InputError("--out", str(folder), expected, "--out report") from None

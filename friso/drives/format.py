@@ -47,8 +47,9 @@ class AxisParameters:
         return entry is not None and str(entry).strip().lower() not in ENDLESS and self.number(name) != 0
 
 
-_NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?|nan)", re.IGNORECASE)
-"""A number as drives read it: neither the underscores nor the digits of other scripts that Python takes."""
+_NUMBER = re.compile(r"[+-]?(?:(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:e[+-]?[0-9]+)?|inf(?:inity)?|nan)", re.IGNORECASE)
+"""A number as drives read it: neither the underscores nor the digits of other scripts that Python takes. There is one
+way to read a run of digits: a hundred thousand take no time."""
 
 MOST = 1e30
 """Largest number that a parameter can be."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from friso.drives.format import FORMATS, TOLD, AsStage, AxisParameters, ParameterFormat
 from friso.drives.questions import UserAnswers, refuse_open
-from friso.errors import InputError
+from friso.errors import InputError, shortened
 from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage import Stage
@@ -47,7 +47,7 @@ def stage_from(path: Path, axis: str | None, user_answers: Mapping[str, Any]) ->
         stage = _with_answers(of_axis, kind, chosen, path, user_answers)
     except InputError as error:
         raise error if error.origin else error.found_in(f"{path}, {chosen.name}") from None
-    return StageOfAxis(stage, path, kind, chosen.name, of_axis.left_out)
+    return StageOfAxis(stage, path, kind, chosen.name, tuple(shortened(one_line(text)) for text in of_axis.left_out))
 
 
 def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:

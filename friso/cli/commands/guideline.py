@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.asking import ask
+from friso.cli.asking import ask, kept_until_done
 from friso.cli.command import WHERE, Command
-from friso.cli.common import AsJson, say
+from friso.cli.common import AsJson
 from friso.cli.output import DefaultFolder, Overwrite
 
 
@@ -37,12 +37,8 @@ def guideline(
     checked_samples(samples)
     keep = Keep(out / UNFINISHED)
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
-    try:
+    with kept_until_done(keep, "parts of the sweeps"):
         ask("guideline", question, samples=samples, folder=keep.folder, **shown)
-    except KeyboardInterrupt:
-        say(f"{keep.count} parts of the sweeps are kept in {keep.folder}; the same command resumes from there")
-        raise
-    keep.clear()
 
 
 COMMAND = Command(guideline, 140, WHERE)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.asking import Details, ask
+from friso.cli.asking import Details, ask, kept_until_done
 from friso.cli.command import WHY, Command
-from friso.cli.common import AsJson, Tolerance, say
+from friso.cli.common import AsJson, Tolerance
 from friso.cli.output import OutFolder, Overwrite
 
 
@@ -46,12 +46,8 @@ def reproduce(
     kept = Kept(folder / UNFINISHED)
     shown = {"out": folder, "overwrite": overwrite, "as_json": as_json, "details": details, "lines": LINES}
     asked = {"points": points, "only": only, "draws": draws, "rtol": rtol, "laws": laws}
-    try:
+    with kept_until_done(kept, "pieces of the work"):
         ask("reproduce", question, names, **asked, folder=kept.folder, **shown)
-    except KeyboardInterrupt:
-        say(f"{kept.count} pieces of the work are kept in {kept.folder}; the same command resumes from there")
-        raise
-    kept.clear()
 
 
 LINES = 10.0

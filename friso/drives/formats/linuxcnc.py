@@ -10,6 +10,7 @@ follows, in whatever unit the drive is scaled to: FF1 = 1 where that is machine 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -86,13 +87,14 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
         raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", "an axis whose loop LinuxCNC closes", "P = 50")
     letters = re.sub(r"\s", "", sections.get("TRAJ", {}).get("COORDINATES", "")).upper()
     named = [replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains]
-    return tuple(replace(axis, letter=_letter(axis.name, letters)) for axis in named)
+    counts = Counter(letters)
+    return tuple(replace(axis, letter=_letter(axis.name, letters, counts)) for axis in named)
 
 
-def _letter(name: str, letters: str) -> str:
+def _letter(name: str, letters: str, counts: Mapping[str, int]) -> str:
     """The letter of a joint, where each letter of the machine has one joint."""
     number = int(name.partition("_")[2])
-    is_named = name.startswith("JOINT") and number < len(letters) and letters.count(letters[number]) == 1
+    is_named = name.startswith("JOINT") and number < len(letters) and counts[letters[number]] == 1
     return letters[number] if is_named else ""
 
 

@@ -17,6 +17,7 @@ from friso.drives.conversions import TRAVEL, TRAVELS, travel_of
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
 from friso.drives.questions import OpenQuestion, UserAnswers, of_the_machine
 from friso.errors import InputError
+from friso.quantities import quoted
 from friso.stage.controllers import FILTERS_KEY
 from friso.stage.filters import FEEDBACK
 from friso.stage.lists import row_keys
@@ -105,15 +106,17 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
             values[place] = entry
         if len(values) + len(waiting) > MOST_KEYS:
             raise InputError("", f"more than {MOST_KEYS} entries", "a configuration as odrivetool writes it")
-    names = sorted({key.split(".")[0] for key in values if key.startswith("axis") and f".{CONFIG}.pos_gain" in key})
-    if not names:
-        raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
+    held: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        name, _, inside = key.partition(".")
+        held.setdefault(name, {})[inside] = value
     axes = tuple(
-        AxisParameters(
-            name, {key.removeprefix(f"{name}."): v for key, v in values.items() if key.startswith(f"{name}.")}
-        )
-        for name in names
+        AxisParameters(name, held[name])
+        for name in sorted(held)
+        if name.startswith("axis") and f"{CONFIG}.pos_gain" in held[name]
     )
+    if not axes:
+        raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
     for axis in axes:
         if f"{MOTOR}.torque_constant" not in axis.values:
             actual = f"{axis.name} without a motor.config.torque_constant, which firmware 0.5.1 to 0.5.6 has"
@@ -219,11 +222,13 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     own, load = axis.name.removeprefix("axis"), axis.values.get(f"{CONFIG}.load_encoder_axis")
     if isinstance(load, int) and str(load) != own:
         left.append(
-            f"load_encoder_axis = {load}: position and velocity come from that axis's encoder; where it is behind a "
-            "screw or belt, [transmission] and [encoder] have to be added"
+            f"load_encoder_axis = {quoted(load)}: position and velocity come from that axis's encoder; where it is "
+            "behind a screw or belt, [transmission] and [encoder] have to be added"
         )
-    names = (key.removeprefix(f"{CONFIG}.").split(".")[0] for key in axis.values if key.startswith(f"{CONFIG}."))
-    left += [f"{name}, which these firmwares do not have" for name in dict.fromkeys(names) if name not in KNOWN]
+    settings = (key.removeprefix(f"{CONFIG}.") for key in axis.values if key.startswith(f"{CONFIG}."))
+    names = dict.fromkeys(key.split(".")[0] for key in settings)
+    if strange := [name for name in names if name not in KNOWN]:
+        left.append(f"{', '.join(strange)}: these firmwares have no such setting")
     if axis.values.get(f"{CONFIG}.anticogging.anticogging_enabled"):
         left.append("the map against cogging")
     return tuple(left)
