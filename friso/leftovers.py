@@ -4,11 +4,14 @@ a leftover."""
 from __future__ import annotations
 
 import shutil
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
+
+from friso.system import foreign_writers
 
 
 def is_leftover(folder: Path, lock: str) -> bool:
@@ -26,6 +29,18 @@ def remove_leftover(folder: Path, lock: str) -> None:
         with suppress(OSError):
             (folder / lock).unlink(missing_ok=True)
             folder.rmdir()
+
+
+def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
+    """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; what others put
+    there, to have a lock made in a folder of this user, stays."""
+    for folder in root.glob(f"{prefix}*"):
+        try:
+            status = folder.lstat()
+        except OSError:  # another process was quicker
+            continue
+        if stat.S_ISDIR(status.st_mode) and not foreign_writers(status):
+            remove_leftover(folder, lock)
 
 
 @contextmanager

@@ -323,6 +323,18 @@ def test_logs_that_come_at_the_same_time_are_both_kept() -> None:
         kept.remove()
 
 
+def test_what_a_killed_server_left_goes_with_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    left, alive = tmp_path / f"{uploads.PREFIX}left", uploads.Uploads()
+    (left / "1").mkdir(parents=True)
+    (left / "1" / "log.csv").write_bytes(b"1")
+    second = uploads.Uploads()
+    assert {*tmp_path.iterdir()} == {alive.folder, second.folder}
+    alive.remove()
+    second.remove()
+    assert [*tmp_path.iterdir()] == []
+
+
 @pytest.mark.parametrize("name", ["ä" * 300 + ".csv", "x" * 300 + ".csv"])
 def test_a_long_name_is_shortened(served: Served, name: str) -> None:
     status, _, content = served.request("POST", f"/logs/{quote(name)}", b"1")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import stat
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
@@ -17,8 +16,8 @@ from typing import TYPE_CHECKING
 from filelock import FileLock
 
 from friso.interrupts import hold_interrupts
-from friso.leftovers import remove_leftover
-from friso.system import foreign_writers, replace_file
+from friso.leftovers import remove_leftovers
+from friso.system import replace_file
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -95,7 +94,7 @@ class Drafts:
         for folder in {*path.absolute().parents[:_LEVELS]} - self.tidied:
             self.tidied.add(folder)
             if folder.is_dir():
-                _remove_leftovers(folder)
+                remove_leftovers(folder, DRAFTS, _LOCK)
 
     def _spare(self, path: Path) -> Path:
         """A path that is free, on the disk of `path`, with its suffix."""
@@ -113,18 +112,6 @@ def _duplicate(path: Path, spare: Path) -> None:
         os.link(path, spare, follow_symlinks=False)
     except (OSError, NotImplementedError):  # a disk without links
         shutil.copy2(path, spare, follow_symlinks=False)
-
-
-def _remove_leftovers(root: Path) -> None:
-    """Remove what killed processes of this user left of their drafts: nobody holds their lock."""
-    for folder in root.glob(f"{DRAFTS}*"):
-        try:
-            status = folder.lstat()
-            if not stat.S_ISDIR(status.st_mode) or foreign_writers(status):
-                continue  # put there by others, to have a lock made in a folder of this user
-        except OSError:  # another process was quicker
-            continue
-        remove_leftover(folder, _LOCK)
 
 
 def made(folder: Path) -> list[Path]:

@@ -8,8 +8,11 @@ import tempfile
 from collections.abc import AsyncIterable
 from pathlib import Path
 
+from filelock import FileLock
+
 from friso.app.names import plain_name
 from friso.errors import InputError
+from friso.leftovers import remove_leftovers
 
 MOST_BYTES = 64_000_000
 """Size of a log at most."""
@@ -18,11 +21,19 @@ MOST_FILES = 50
 """Files that are kept at most."""
 
 
+PREFIX, LOCK = "friso-uploads-", "lock"
+"""How the folders of servers begin, and the file in each that its server keeps locked."""
+
+
 class Uploads:
-    """The files by the names under which the page knows them. The page names no other file."""
+    """The files by the names under which the page knows them. The page names no other file. What a killed server left
+    is deleted by the next."""
 
     def __init__(self) -> None:
-        self.folder = Path(tempfile.mkdtemp(prefix="friso-app-"))
+        remove_leftovers(Path(tempfile.gettempdir()), PREFIX, LOCK)
+        self.folder = Path(tempfile.mkdtemp(prefix=PREFIX))
+        self.lock = FileLock(self.folder / LOCK)
+        self.lock.acquire()
         self.files: dict[str, Path] = {}
         self.numbers = itertools.count(1)
 
@@ -30,7 +41,7 @@ class Uploads:
         """Keep a file as it comes; the name by which it is asked for. Raises InputError for one that is too large, and
         OSError for one that cannot be written."""
         place = self.folder / str(next(self.numbers))  # several may come at the same time
-        if len([*self.folder.iterdir()]) >= MOST_FILES:
+        if sum(1 for entry in self.folder.iterdir() if entry.is_dir()) >= MOST_FILES:
             raise InputError("file", f"more than {MOST_FILES} files", "a new start of the server")
         plain = plain_name(name, "log")
         place.mkdir()
@@ -59,4 +70,5 @@ class Uploads:
 
     def remove(self) -> None:
         """Delete all of them."""
+        self.lock.release()
         shutil.rmtree(self.folder, ignore_errors=True)

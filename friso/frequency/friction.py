@@ -120,10 +120,15 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
 
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
-    """The expressions as a function of the values of their symbols by name."""
+    """The expressions as a function of the values of their symbols by name; what no float holds is infinite or NaN."""
     symbols = sorted(set[Any]().union(*(expression.free_symbols for expression in expressions)), key=str)
     function = sp.lambdify(symbols, expressions, [{"sine": sine}, "numpy"])
-    return lambda values: function(*(values[str(symbol)] for symbol in symbols))
+
+    def values_of(values: Mapping[str, Any]) -> list[Any]:
+        with np.errstate(all="ignore"):
+            return function(*(values[str(symbol)] for symbol in symbols))
+
+    return values_of
 
 
 def level(flat: Mapping[str, Any], forward: bool) -> float:
