@@ -114,6 +114,7 @@ def _summary(records: list[dict[str, Any]], seconds: float) -> None:
             ["edges, sure ones", f"{len(edges)}, {sum(claim['edge_sure'] for claim in edges)}"],
             ["stages with something sure that is wrong", f"{len(wrong)}: {', '.join(map(str, sorted(wrong)))}"],
             ["stages with something wrong that was not sure", unsure_wrong],
+            ["claims whose attack was given up for its work", sum(len(record["given_up"]) for record in records)],
             ["wall time [s]", f"{seconds:.0f}"],
         ],
     )

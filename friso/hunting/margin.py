@@ -200,7 +200,7 @@ class _Grid:
         motions = self.motions[at]
         if motions and at not in self.inspected and all(motion.cycles is None for motion in motions):
             distances = np.outer([motion.distance for motion in motions], ALONG).ravel()
-            survey = outward.surveyed(self.factors[at : at + 1], distances)
+            survey = outward.surveyed_at_once(self.factors[at : at + 1], distances)
             self.attracts[at], self.decided[at] = survey.attracts[0], survey.decided[0]
             self.motions[at] = list(survey.motions)
         self.inspected.add(at)

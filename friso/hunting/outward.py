@@ -209,6 +209,11 @@ class Outward:
         begins = None if distances is None else np.broadcast_to(distances, (len(factors), np.shape(distances)[-1]))
         return attractors(self._stages(factors), distances=begins, cycles=cycles, suggested=suggested)
 
+    def surveyed_at_once(self, factors: np.ndarray, distances: np.ndarray) -> Attractors:
+        """The same from all starts at once, beside the cycles that the return maps suggest: where motions leave slowly
+        what repels, that takes a third of the work."""
+        return self.surveyed(factors, distances, suggested=families(self._stages(factors)))
+
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
 

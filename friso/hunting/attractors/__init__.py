@@ -182,8 +182,9 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         survey.slow_down(np.arange(stages.count), cycles)
     for runs, owners in starts.waves(at_once=True):
         survey.follow(runs, owners)
-    flips = first.attracts != survey.attracted
+    told = survey.attracted | ~survey.unknown
+    flips = told & (first.attracts != survey.attracted)
     confirmed_twice = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
     confirmed = [motion for motion in observed if not flips[motion.stage]]
-    decided = first.decided & (survey.attracted | ~survey.unknown) & ~flips
+    decided = first.decided & told & ~flips
     return replace(first, motions=(*confirmed_twice, *confirmed), decided=decided, flips=flips)

@@ -40,25 +40,23 @@ def close_orbits(
 
 def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
     """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
-    actuator exerts no force on a stage at rest: of several that before which the stage has stood still for longest."""
+    actuator balances constant forces on a stage at rest: of several that before which the stage has
+    stood still for longest."""
     stages, size = pending.stages, len(pending.stages.kernel.states)
-    numbers, balance = np.arange(stages.count), stages.relaxed
-    ahead = np.zeros(stages.count)
+    numbers, ahead = np.arange(stages.count), np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
     for group in (numbers[octave == n] for n in np.unique(octave)):
         runs, step = pending.take(group), float(times[group].min()) / SAMPLES
         paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step).samples
         for k, path in zip(group, paths, strict=True):
-            crossed = _balanced(
-                path[:, stages.integral] - balance[k] * path[:, stages.sticking], path[:, stages.sticking]
-            )
-            ahead[k] = step * crossed
+            residuals = stages.take(np.full(len(path), k)).unbalanced(path)
+            ahead[k] = step * _balanced(residuals, path[:, stages.sticking])
     return stages.run(pending.states, np.maximum(ahead, 1e-9 * times), pending.rtol).ends[:, :size]
 
 
 def _balanced(residuals: np.ndarray, place: np.ndarray) -> float:
-    """The sample, and what share of the step to the next, at which the integrator is no longer off the state that
-    exerts no force, where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
+    """The sample, and what share of the step to the next, at which the integrator is no longer off that balance,
+    where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
     if not np.isfinite(place).any():  # the run failed
         return 0.0
     standing = np.abs(np.diff(place)) < STILL * np.nanmax(place) - STILL * np.nanmin(place)

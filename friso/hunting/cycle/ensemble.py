@@ -18,7 +18,7 @@ from friso.equations.structure import Structure, shared_structure
 WITHOUT_FRICTION = 1e-6
 """Size of the motion [m] from which magnitudes follow where no friction deflects the loop: such a stage is linear."""
 
-PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton")
+PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
 """Properties of the stages one by one, which are kept with them."""
 
 
@@ -118,9 +118,21 @@ class Ensemble:
 
     @cached_property
     def relaxed(self) -> np.ndarray:
-        """State of the integrator per displacement [s] at which the actuator exerts no force on a stage at rest, shape
-        (count,)."""
+        """State of the integrator per displacement [s] at which the actuator exerts no more force on a stage at rest
+        than at the reference, shape (count,)."""
         return self.settled(Steady(-1.0, 1.0))[:, self.integral]
+
+    @cached_property
+    def balancing(self) -> np.ndarray:
+        """Force of the actuator that balances the constant forces on a stage [N], shape (count,)."""
+        constant = sum(np.asarray(self.flat[f"bias.{name}"]) for name in self.structure.biased)
+        return np.broadcast_to(-constant, (self.count,)).astype(float)
+
+    def unbalanced(self, states: np.ndarray) -> np.ndarray:
+        """By how much the integrators are off the state in which the actuator balances the constant forces on a stage
+        at rest where it sticks, shape (count,), in states (count, states)."""
+        balanced = self.relaxed * states[:, self.sticking] + self.per_newton * self.balancing
+        return states[:, self.integral] - balanced
 
     @cached_property
     def per_newton(self) -> np.ndarray:

@@ -14,7 +14,7 @@ REFINED = 8
 """Distances between the two of the map that enclose a fixed point, to enclose it closer."""
 
 UNWINDING = 0.4
-"""Time from landing until the actuator exerts no force, in units of the wait for the break-away."""
+"""Time from landing until the actuator only balances constant forces, in units of the wait for the break-away."""
 
 
 ALMOST = 0.03

@@ -10,13 +10,14 @@ from friso.hunting.cycle.ensemble import Ensemble
 
 def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
     """States, shape (count, states), of stages at rest that are displaced [m] (count,), the bristles relaxed and the
-    integrator such that the actuator exerts no force; but integrals of outer loops have `wound` up for a time [s].
+    integrator such that the actuator balances constant forces, and exerts none without these; but integrals of outer
+    loops have `wound` up for a time [s].
 
     A stage that sticks winds up from here until it breaks away, and has forgotten by then how it came to stick: these
     states are a line through all hunting cycles with sticking, and the distance to the reference alone tells what
     follows, unless there are integrals in several loops.
     """
-    states = stages.settled(Steady(-displacement, displacement))
+    states = stages.settled(Steady(-displacement, displacement, force=stages.balancing))
     states[:, stages.outer_integrals] = np.reshape(-displacement * wound, (-1, 1))
     return states
 

@@ -109,8 +109,8 @@ def close(
     """Close orbits from guesses: states (count, states) at which the stage sticks, and times [s] (count,).
 
     `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one; `swings` are those in that time, if they are
-    not as few as there may be. The phase is that at which the integrator's state makes the actuator exert no force on a
-    stage at rest. A Jacobian serves for as long as steps with it bring the gap down fast. Where a limiter chatters, the
+    not as few as there may be. The phase is that at which the integrator's state makes the actuator balance constant
+    forces on a stage at rest, and exert none without these. A Jacobian serves for as long as steps with it bring the gap down fast. Where a limiter chatters, the
     flow's derivative changes from one nanometre to the next and points nowhere; the last Jacobian from farther away
     then serves for as many steps as it takes.
     """
@@ -215,9 +215,9 @@ class _Shooting:
         return jacobians
 
     def _residual(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
-        """By how much the phase is off, shape (orbits, 1): the integrator's state that exerts no force is wanted."""
-        states = self.states[which]
-        return (states[:, stages.integral] - stages.relaxed * states[:, stages.sticking])[:, None]
+        """By how much the phase is off, shape (orbits, 1): the integrator's state is wanted in which the actuator
+        balances constant forces, and exerts none without these."""
+        return stages.unbalanced(self.states[which])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
         """Keep what is closer than before; what is closed, fails or gets no closer rests."""
