@@ -110,9 +110,9 @@ def close(
 
     `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one; `swings` are those in that time, if they are
     not as few as there may be. The phase is that at which the integrator's state makes the actuator balance constant
-    forces on a stage at rest, and exert none without these. A Jacobian serves for as long as steps with it bring the gap down fast. Where a limiter chatters, the
-    flow's derivative changes from one nanometre to the next and points nowhere; the last Jacobian from farther away
-    then serves for as many steps as it takes.
+    forces on a stage at rest, and exert none without these. A Jacobian serves for as long as steps with it bring the
+    gap down fast. Where a limiter chatters, the flow's derivative changes from one nanometre to the next and points
+    nowhere; the last Jacobian from farther away then serves for as many steps as it takes.
     """
     orbits = _iterated(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
     return replace(orbits, swings=swings or orbits.swings)
