@@ -64,6 +64,20 @@ def test_a_signal_that_a_library_turns_into_something_else(
     assert signal.getsignal(number) is before
 
 
+def test_a_termination_in_code_from_a_text_has_its_own_status(tmp_path: Path) -> None:
+    """Python remembers that such code ended in a KeyboardInterrupt, and would end by SIGINT."""
+    lines = ["from friso.cli import app", f"app._run = lambda: exec({_TERMINATION!r})", "app.main()"]
+    (tmp_path / "terminated.py").write_text("\n".join(lines), "utf-8")
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path])}
+    done = subprocess.run(
+        [sys.executable, "-m", "terminated"], cwd=tmp_path, capture_output=True, text=True, env=environ
+    )
+    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "friso: terminated\n")
+
+
+_TERMINATION = "import signal; signal.raise_signal(signal.SIGTERM)"
+
+
 def test_an_import_that_is_under_way_ends_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "half_there.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = True\n")
     monkeypatch.syspath_prepend(tmp_path)

@@ -111,6 +111,9 @@ def _status() -> int:
             return _failed(error)
         status = INTERRUPTED
     if status == INTERRUPTED:  # typer's word for Ctrl-C too
+        # Where code from a text was interrupted (a dataclass's, say), python -m ends by SIGINT whatever the status is,
+        # unless other such code ran to its end after it.
+        exec("")
         say("interrupted" if signal in (0, 2) else "terminated")
         return 128 + signal if signal else INTERRUPTED
     return status
