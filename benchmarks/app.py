@@ -1,7 +1,9 @@
 """How long `friso app` takes from an input event to the painted picture, in Chromium: python -m benchmarks.app.
 
 A slider of the thesis rig is moved step by step; each step waits for the picture. Prints medians and 95th percentiles
-[ms] of the picture, and of the first picture of a map and of the Bode plots from the click on their tabs.
+[ms] of the picture, and of the first picture of a map and of the Bode plots from the click on their tabs. Then the
+slider is dragged, a step with every frame that the browser paints: prints the time between frames, and the memory of
+page and server before and after so many drags.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import sys
 from typing import Any
 
 import numpy as np
+import psutil
 
 import friso
 
@@ -34,13 +37,27 @@ STEP = """async ([place, value]) => {
 }"""
 
 
+DRAG = """async (steps) => {
+  const slider = document.querySelector('[data-path="controller.crossover"] input[type=range]');
+  const times = [];
+  for (let k = 0; k < steps; k += 1) {
+    times.push(await new Promise(requestAnimationFrame));
+    slider.value = 480 + (k % 80);
+    slider.dispatchEvent(new Event("input"));
+  }
+  slider.dispatchEvent(new Event("change"));
+  return times;
+}"""
+
+
 def main() -> None:
     """Measure, and print a table."""
     from playwright.sync_api import sync_playwright
 
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--steps", type=int, default=100, help="steps of the slider")
-    steps = parser.parse_args().steps
+    parser.add_argument("--drags", type=int, default=1000, help="steps of the drag with every frame")
+    chosen = parser.parse_args()
     chromium = shutil.which("chromium") or shutil.which("google-chrome")
     command = [
         sys.executable,
@@ -63,12 +80,15 @@ def main() -> None:
         page.wait_for_selector(".js-plotly-plot .main-svg", timeout=120_000)
         page.wait_for_selector("#answer .rest .note", timeout=120_000)
         page.evaluate(WATCH)
-        _report("picture of a dragged slider", _steps(page, ".plots", steps))
+        _report("picture of a dragged slider", _steps(page, ".plots", chosen.steps))
         page.evaluate("""document.querySelector('[data-path="controller.crossover"] input[type=range]')
             .dispatchEvent(new Event("change"))""")
         page.wait_for_timeout(1000)
         _report("map: first picture", _times(page, "map", ".heatmaplayer image", 5))
         _report("Bode plots", _times(page, "bode", ".plot .main-svg", 5))
+        page.click("#tab-run")
+        page.wait_for_selector(".plot .main-svg")
+        _drag(page, server.pid, chosen.drags)
         browser.close()
         server.terminate()
 
@@ -91,6 +111,25 @@ def _times(page: Any, tab: str, painted: str, count: int) -> list[float]:
         page.wait_for_timeout(500)
         times.append(page.evaluate(wait, [tab, painted]))
     return times
+
+
+def _drag(page: Any, server: int, count: int) -> None:
+    """Print what a drag of so many steps does to frames and memory; a tenth of them comes first, so that all is
+    loaded."""
+    tool = page.context.new_cdp_session(page)
+
+    def megabytes() -> tuple[float, float]:
+        tool.send("HeapProfiler.collectGarbage")
+        return tool.send("Runtime.getHeapUsage")["usedSize"] / 1e6, psutil.Process(server).memory_info().rss / 1e6
+
+    page.evaluate(DRAG, count // 10)
+    before = megabytes()
+    times = page.evaluate(DRAG, count)
+    page.wait_for_timeout(3000)
+    after = megabytes()
+    _report("between frames while dragging", [*np.diff(times)])
+    for place, first, last in zip(("page", "server"), before, after, strict=True):
+        print(f"memory of the {place:<16} before {first:6.1f} MB   after {last:6.1f} MB   of {count} drags")
 
 
 def _report(what: str, times: list[float]) -> None:
