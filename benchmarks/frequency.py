@@ -29,8 +29,8 @@ def one_by_one(stage: Stage, members: Members, omega: np.ndarray) -> list[float]
     margins = []
     for k in range(len(members)):
         loop = friso.linear(stage, members[k], "open")
-        poles = control.feedback(loop, 1).poles()
-        margins.append(float(np.abs(1 + loop(1j * omega)).min()) if poles.real.max() < 0 else np.nan)
+        poles = loop.feedback(1).poles()
+        margins.append(float(np.abs(1 + loop(1j * omega)).min()) if np.real(poles).max() < 0 else np.nan)
     return margins
 
 

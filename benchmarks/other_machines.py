@@ -92,7 +92,7 @@ def differences(here: Answers, there: Answers) -> list[tuple[str, str]]:
     verdicts = [[case["verdict"] for case in machine.check["cases"].values()] for machine in (here, there)]
     rows = [("verdicts of the check", str(sum(a != b for a, b in zip(*verdicts, strict=True))))]
     swings = here.runs["outcome"].values == "swings"
-    for name in sorted(here.runs.data_vars.keys() - OF_SOLVER):
+    for name in sorted({str(name) for name in here.runs.data_vars} - OF_SOLVER):
         one, other = here.runs[name].values, there.runs[name].values
         if name in OF_SWINGS:
             one, other = one[swings], other[swings]

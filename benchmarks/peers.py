@@ -93,7 +93,7 @@ def _odeint(order: int) -> Solve:
 
 def _cvode(order: int) -> Solve:
     """CVODE's BDF up to the given order."""
-    from sksundae.cvode import CVODE
+    from sksundae.cvode import CVODE  # pyright: ignore[reportMissingImports]  # of the extra "bench"
 
     def solve(task: Task) -> tuple[np.ndarray, int]:
         f, j, rows = task.equations.fill_rate, task.equations.fill_jacobian, task.rows

@@ -29,7 +29,7 @@ def measure(rtol: float, repetitions: int) -> dict[str, list[float | str]]:
     """Least time [s] of each map on one core, and which of its runs swing, packed; in this process."""
     maps: dict[str, list[float | str]] = {}
     for case in both_maps(rig(True), rig(False)):
-        times = []
+        times, peaks = [], np.zeros(0)
         for _ in range(repetitions + 1):  # the first one warms up
             start = time.process_time()
             peaks, _ = friso_map(case, rtol)

@@ -160,6 +160,15 @@ def test_a_swing_that_stops_before_the_end_rests(until: float) -> None:
     assert outcomes(end_of_traces(TIME, 1e-3 + stopped, BAND)).tolist() == ["creeps"]
 
 
+def test_a_jump_after_a_decay_is_no_swing() -> None:
+    """An integral that is reset as the error passes zero: the stage comes in, jumps once, and comes in again. Where a part
+    of the trace begins on the flank before, nothing turned."""
+    decay = lambda since: np.exp(-np.maximum(TIME - since, 0))  # noqa: E731
+    jumped = np.where(TIME < 15.4, 1e-3 * decay(6.0), 2e-5 * decay(15.4) ** 0.1)[None]
+    for run in (jumped, -jumped):
+        assert outcomes(end_of_traces(TIME, run, 1e-6), 1e-6).tolist() == ["creeps"]
+
+
 def test_rest_may_be_asked_for_some_time() -> None:
     late = np.where(TIME < 18, 1e-3, 0.0)[None]
     end = end_of_traces(TIME, late, BAND)

@@ -89,7 +89,7 @@ def _forked(command: list[str], **_: Any) -> SimpleNamespace:
                 sys.stdout.flush()
             finally:
                 os._exit(0)
-        _, status = os.waitpid(child, 0)
+        status = os.waitpid(child, 0)[1]
         if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM:
             raise subprocess.TimeoutExpired(command, confined.SECONDS)
         out.seek(0)

@@ -102,7 +102,7 @@ def swinging(bench: Bench, trial: Trial) -> str:
     second = trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
     fine = bench.follow(second, FINE)
     for start in fine.swinging[:TRIED]:
-        if attracts(bench, fine.ends[start], fine.periods[start]):
+        if attracts(bench, fine.ends[start], float(fine.periods[start])):
             size, swing = second.sizes[start], fine.amplitude[start]
             kind, followed = second.kinds[start], fine.followed[start]
             about = by_scipy(bench, fine.ends[start], float(swing))

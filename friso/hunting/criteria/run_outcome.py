@@ -83,11 +83,10 @@ def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, complete
     """
     runs = len(deviation)
     swing, earlier = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, HALF))
-    late = time >= HALF * time[-1]
-    values = np.ascontiguousarray(deviation[:, late])
     ended = np.full(runs, time[-1])
-    samples = np.full(runs, values.shape[1])
-    turns = scan_turning_points(np.tile(time[late], (runs, 1)), values, samples, np.nan_to_num(swing), ended)
+    # All of the trace: the first sample of a part of it would pass for a turn, on a flank too.
+    samples, values = np.full(runs, len(time)), np.ascontiguousarray(deviation)
+    turns = scan_turning_points(np.tile(time, (runs, 1)), values, samples, np.nan_to_num(swing), ended)
     done = np.ones(runs, bool) if completed is None else completed
     return End(done, swing, earlier, turns.period, turns.turned, last_outside(time, deviation, band), ended)
 
