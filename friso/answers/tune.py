@@ -117,9 +117,9 @@ def tune(
     force_limit : str or float, optional
         Largest force of the actuator during the moves, "50 N" or a number [N].
     bandwidth_limit : str or float, optional
-        Bandwidth that modes not in the stage file allow at most, "25 Hz" or a number [Hz].
+        Highest bandwidth that modes missing from the stage file allow, "25 Hz" or a number [Hz].
     only, keep : str, optional
-        What alone may be changed, and what may not: "controller" or "joint".
+        The part to change alone, and the part to leave unchanged: "controller" or "joint".
     seed : int
         Seed of the draws: the same one gives the same machines.
     set : dict, optional

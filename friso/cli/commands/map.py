@@ -61,7 +61,7 @@ def map_cells(
 
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
 
-    A study that was interrupted goes on: friso map thesis_rig_map.zarr
+    To resume an interrupted study: friso map thesis_rig_map.zarr
     """
     if check:
         return _check(source, as_json)

@@ -26,11 +26,11 @@ ForceLimitOption = Annotated[
 BandwidthLimit = Annotated[
     str | None,
     typer.Option(
-        "--bandwidth-limit", metavar="FREQUENCY", help="Bandwidth that modes not in the stage file allow at most."
+        "--bandwidth-limit", metavar="FREQUENCY", help="Highest bandwidth that modes missing from the stage file allow."
     ),
 ]
-OnlyOption = Annotated[Changeable | None, typer.Option("--only", help="What alone may be changed.")]
-KeepOption = Annotated[Changeable | None, typer.Option("--keep", help="What may not be changed.")]
+OnlyOption = Annotated[Changeable | None, typer.Option("--only", help="Change this part alone.")]
+KeepOption = Annotated[Changeable | None, typer.Option("--keep", help="Leave this part unchanged.")]
 SeedOption = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
 ]
