@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import argparse
 
-import control
 import numpy as np
 
 import friso

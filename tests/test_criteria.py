@@ -161,8 +161,8 @@ def test_a_swing_that_stops_before_the_end_rests(until: float) -> None:
 
 
 def test_a_jump_after_a_decay_is_no_swing() -> None:
-    """An integral that is reset as the error passes zero: the stage comes in, jumps once, and comes in again. Where a part
-    of the trace begins on the flank before, nothing turned."""
+    """An integral that is reset as the error passes zero: the stage comes in, jumps once, and comes in again. A part of
+    the trace that begins on the flank before begins with no turn."""
     decay = lambda since: np.exp(-np.maximum(TIME - since, 0))  # noqa: E731
     jumped = np.where(TIME < 15.4, 1e-3 * decay(6.0), 2e-5 * decay(15.4) ** 0.1)[None]
     for run in (jumped, -jumped):

@@ -40,8 +40,10 @@ class CheckAnswer(Answer):
     @cached_property
     def isolator(self) -> Suggestion | None:
         """What an isolator would do for a stage without a joint that hunts; None for any other."""
+        from friso.hunting.criteria import ATTRACTED
+
         case = self.result["given"]
-        if case.stage.joint or case.verdict not in ("hunts", "bistable"):
+        if case.stage.joint or case.verdict not in ATTRACTED:
             return None
         from friso.remedies.suggestion import suggestion
 

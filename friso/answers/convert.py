@@ -51,7 +51,7 @@ class ConvertAnswer(Answer):
         return convert_document(self.result)
 
     def files(self) -> Files:
-        """The stage file and the page."""
+        """The stage file and the figure."""
         from friso.views.convert.page import convert_files
 
         return convert_files(self.result, self.name)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
+from friso.hunting.criteria import ATTRACTED
 from friso.hunting.margin import DISTANCE, FARTHEST
 from friso.hunting.verdict import BANDWIDTHS, FEEDING, STARTS
 from friso.quantities import percent
@@ -39,7 +40,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
         return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if FEEDING in case.judgement.given_up else []
-    after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
+    after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
     return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *after])
 
 
@@ -60,7 +61,7 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
     words = [case.verdict for case in both]
     if len(words) < 2 or "failed" in words or not all(case.judgement.hunting.certain for case in both):
         return None
-    locked, free = (word in ("hunts", "bistable") for word in words)
+    locked, free = (word in ATTRACTED for word in words)
     if not free:
         return "The free joint stops the hunting." if locked else None
     if words == ["hunts", "bistable"]:
