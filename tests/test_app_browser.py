@@ -294,8 +294,8 @@ def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
     for tab in ("run", "map", "remedies", "logs"):
         browsed.page.click(f"#tab-{tab}")
         browsed.page.wait_for_timeout(300)
-        found = axe.run(browsed.page).response["violations"]
-        assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in found] == []
+        violations = axe.run(browsed.page).response["violations"]
+        assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
 
 
 def test_nothing_went_wrong_and_nothing_left_this_machine(browsed: Browsed) -> None:

@@ -182,9 +182,9 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         survey.slow_down(np.arange(stages.count), cycles)
     for runs, owners in starts.waves(at_once=True):
         survey.follow(runs, owners)
-    told = survey.attracted | ~survey.unknown
-    flips = told & (first.attracts != survey.attracted)
+    resolved = survey.attracted | ~survey.unknown
+    flips = resolved & (first.attracts != survey.attracted)
     confirmed_twice = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
     confirmed = [motion for motion in observed if not flips[motion.stage]]
-    decided = first.decided & told & ~flips
+    decided = first.decided & resolved & ~flips
     return replace(first, motions=(*confirmed_twice, *confirmed), decided=decided, flips=flips)

@@ -157,8 +157,8 @@ class VerdictsByLaw:
             names = {(verdict.law, key) for verdict in open_ones for key in verdict.conversion.open}
         elif depends:
             sides = [[v.law for v in self.verdicts if answer in v.answers(case)] for answer in (True, False)]
-            told = [side for side in sides if all("" in friction_law(law).decided_by for law in side)]
-            names = {(law, "") for law in min(told or sides, key=len)}
+            distinguished = [side for side in sides if all("" in friction_law(law).decided_by for law in side)]
+            names = {(law, "") for law in min(distinguished or sides, key=len)}
         else:
             names = {(law, "") for law in self.uncertain(case)}
         texts = (friction_law(law).decided_by.get(key, "") for law, key in sorted(names))

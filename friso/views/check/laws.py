@@ -34,8 +34,8 @@ def laws_sentences(laws: VerdictsByLaw) -> list[str]:
 def _misses(verdict: LawVerdict) -> str:
     """By how much a law that was tried misses the virgin curve; "" where it reproduces it."""
     off = next((item.off for item in verdict.conversion.lost if item.kind == "virgin"), 0.0)
-    known = "leave it out if the virgin curve of this machine was measured"
-    return f"{verdict.law} misses the virgin curve by {percent(off)} of break-away: {known}." if off else ""
+    advice = "leave it out if the virgin curve of this machine was measured"
+    return f"{verdict.law} misses the virgin curve by {percent(off)} of break-away: {advice}." if off else ""
 
 
 def _sentence(laws: VerdictsByLaw, case: str) -> str:
@@ -78,13 +78,14 @@ def _does(verdicts: set[str]) -> str:
 def _open(verdict: LawVerdict, case: str) -> str:
     """What the stage does under a law with which values of what is open in it, where it does not do the same with
     all."""
-    told: dict[str, list[Trial]] = {}
+    trials: dict[str, list[Trial]] = {}
     for trial in verdict.trials:
         does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"
-        told.setdefault(does, []).append(trial)
-    if len(told) == 1:
+        trials.setdefault(does, []).append(trial)
+    if len(trials) == 1:
         return f"under {verdict.law} that is not certain"
-    return f"under {verdict.law} it {listed([f'{does} with {_values(verdict, told[does])}' for does in told], 'and')}"
+    parts = [f"{does} with {_values(verdict, having)}" for does, having in trials.items()]
+    return f"under {verdict.law} it {listed(parts, 'and')}"
 
 
 def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
