@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 
+import control
 import numpy as np
 
 import friso
@@ -28,7 +29,7 @@ def one_by_one(stage: Stage, members: Members, omega: np.ndarray) -> list[float]
     margins = []
     for k in range(len(members)):
         loop = friso.linear(stage, members[k], "open")
-        poles = loop.feedback(1).poles()
+        poles = control.poles(loop.feedback(1))
         margins.append(float(np.abs(1 + loop(1j * omega)).min()) if np.real(poles).max() < 0 else np.nan)
     return margins
 
