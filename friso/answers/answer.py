@@ -201,6 +201,10 @@ class Answer(ABC):
         with speaking_of(self.axis_kind):
             return f"<friso {self.command}: {escaped(next(iter(self.sentences()), 'no answer'))}>"
 
+    def __str__(self) -> str:
+        with speaking_of(self.axis_kind):
+            return escaped("\n".join(self.sentences()))
+
     def _repr_html_(self) -> str:
         """What a notebook shows: the answer and the small tables, no arrays."""
         with speaking_of(self.axis_kind):

@@ -68,7 +68,7 @@ class TuneAnswer(Answer):
             check_designable(self.result.stage)
         except InputError:
             return []
-        isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffix == ".toml"]
+        isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"]]
         return [f"friso design {file}" for file in isolators]
 
     def figures(self) -> Sequence[Figure]:

@@ -49,7 +49,8 @@ def front(task: LeafTask) -> list[Candidate]:
     first[: len(first) // 4] = start  # from where the others are reached, however little room there is
     variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
     algorithm = NSGA2(pop_size=POPULATION, **variation)
-    result = minimize(_problem(task, needs), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
+    with np.errstate(invalid="ignore"):  # pymoo's distances within a front of a single geometry
+        result = minimize(_problem(task, needs), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
     if result.X is None or result.F is None:
         return []
     bought = sheets(task.spec)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.motion import last_corner
 from friso.equations.settings import SETTINGS
 from friso.equations.structure import structure
-from friso.errors import InputError
+from friso.errors import InputError, StageError
 from friso.frequency.crossover import Limits, limits
 from friso.hunting.check import Case
 from friso.progress import Progress, silent
@@ -56,7 +57,8 @@ UNSEEN = 2000
 class Advice:
     """The outcomes of all remedies, in the order of the catalogue, for a stage that was checked and measured itself
     (`present`); the bandwidths with which it keeps its margin; what its edge of hunting depends on; what to relax where
-    nothing works; whether it was interrupted."""
+    nothing works; whether it was interrupted. The tables of the machine `as_built` take no part; they and the
+    `correlations` go with the stages that are written."""
 
     stage: Stage
     goal: Goal
@@ -69,6 +71,8 @@ class Advice:
     seed: int
     interrupted: bool = False
     sensitivities: Sensitivities | None = None
+    as_built: Mapping[str, Any] = field(default_factory=dict)
+    correlations: Correlations = field(default_factory=Correlations)
 
     @property
     def needed(self) -> bool:
@@ -79,6 +83,13 @@ class Advice:
     def least(self) -> RemedyOutcome | None:
         """The least change that works (see `ChangeSize`)."""
         return next(iter(self.working), None)
+
+    def complete(self, tuned: Stage) -> Stage:
+        """A tuned stage with the tables of the machine as built; without them where they are of another controller."""
+        try:
+            return tuned.replace(self.as_built)
+        except StageError:
+            return tuned
 
     def size(self, outcome: RemedyOutcome) -> ChangeSize:
         """How large the change is for a remedy that has settings."""
@@ -158,6 +169,8 @@ def tune(
         seed,
         interrupted,
         None if interrupted else edge_sensitivities(ideal, case.judgement.margin),
+        {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
+        correlations,
     )
 
 

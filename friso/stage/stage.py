@@ -295,9 +295,19 @@ class Stage(Section):
 
 def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> Stage:
     """The stage of tables in which dotted keys are set, or removed by None. Raises StageError."""
+    own = {*tables}
     for key, value in changes.items():
         _put(tables, key, getattr(value, "text", value))
-    return Stage(**tables)
+    try:
+        return Stage(**tables)
+    except StageError as error:
+        name = error.key.partition(".")[0]
+        begun = [key for key in changes if key.startswith(f"{name}.")]
+        if name in own or not begun or not error.actual.startswith("nothing"):
+            raise
+        actual = f"set for a stage that has no [{name}]"
+        expected = f"a stage with [{name}], or all of its keys; {error.key}: {error.expected}"
+        raise StageError(begun[0], actual, expected, error.example) from None
 
 
 def _axis_written(tables: Mapping[str, Any]) -> AxisKind:

@@ -12,7 +12,9 @@ from friso.cli.output import Overwrite
 
 
 def example(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="See the list below.")],
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="See the list below; left out, it is printed.")
+    ] = None,
     path: Annotated[
         Path | None, typer.Argument(metavar="[FILE]", help="The file to write; default: NAME.toml, here.")
     ] = None,
@@ -25,6 +27,10 @@ def example(
     from friso.answers.output_folder import write_file
     from friso.answers.starting import example as example_path
 
+    if name is None:
+        for listed, title in listed_examples():
+            print(f"{listed:<28}{title}")
+        return
     source = example_path(name)
     target = path or Path(source.name)
     write_file("FILE", target, source.read_text(encoding="utf-8"), overwrite)

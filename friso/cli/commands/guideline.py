@@ -27,6 +27,7 @@ def guideline(
     """Two formulas for the crossover at which hunting ends: guideline.md, its charts, guideline_edges.csv.
 
     Example: friso guideline --out guideline
+
     A quick try: friso guideline --samples 64 --out /tmp/guideline
     """
     from friso.answers.guideline import guideline as question

@@ -35,7 +35,9 @@ def reproduce(
 
     Written into the folder reproduction, or of single claims into one such as reproduction-F15B.
     What is done of an interrupted run stays, and the same command goes on from there.
+
     Example: friso reproduce --points 21 --draws 12 --out reproduction
+
     One claim: friso reproduce --only F15B
     """
     from friso.answers.output_folder import UNFINISHED

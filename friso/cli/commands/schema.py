@@ -13,7 +13,7 @@ from friso.cli.command import HELP, Command
 
 def schema(
     of: Annotated[
-        str, typer.Option("--of", metavar="FILE", help='What it describes: "stage" or "specification".')
+        str, typer.Option("--of", metavar="stage|specification", help="Which of the two files it describes.")
     ] = "stage",
 ) -> None:
     """JSON Schema of the stage file, or of the specification of a design: for completion in editors.

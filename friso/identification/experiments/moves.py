@@ -23,7 +23,7 @@ FEW = 7.0
 
 WITHOUT_CONTROLLER = (
     "without the machine's own controller the simulated stage follows the logged position; with it (--stage) the "
-    "intervals are narrower, and more is identified, as far as that loop explains the record"
+    "intervals may be narrower, and more may be identified, as far as that loop explains the record"
 )
 
 MOST = 40_000

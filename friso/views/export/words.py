@@ -6,7 +6,8 @@ from friso.drives.gains import Gains
 
 COLUMNS = ("Symbol", "In this file", "In other units")
 
-DIGITS = 6
+DIGITS = 4
+"""Significant digits of gains for people; parameters of a drive have all that they need."""
 
 
 def title(gains: Gains) -> str:
@@ -36,4 +37,5 @@ def notes(gains: Gains) -> list[str]:
 
 def _with_unit(value: tuple[float, str]) -> str:
     number, unit = value
-    return f"{number:.{DIGITS}g} {unit}".rstrip()
+    rounded = float(f"{number:.{DIGITS}g}")
+    return f"{rounded:.10g} {unit}".rstrip()

@@ -21,10 +21,10 @@ def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
 
 
 def _figure(content: LogContent, number: int) -> Figure:
-    channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)[:MOST]
-    left = len(content.channels) - len(channels)
-    caption = "As they stand in the file, in its own units." + (f" {left} channels are not drawn." if left else "")
-    panels = tuple(_panel(channel) for channel in channels)
+    channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
+    left = len(channels) - MOST
+    caption = "As they stand in the file, in its own units." + (f" Not drawn: the last {left}." if left > 0 else "")
+    panels = tuple(_panel(channel) for channel in channels[:MOST])
     return Figure(f"logs_{number}", title(content), caption, panels, columns=2 if len(panels) > 1 else 1)
 
 

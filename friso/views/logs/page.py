@@ -33,7 +33,7 @@ def logs_html(contents: Sequence[LogContent], figures: Sequence[Figure]) -> str:
         for number, content in enumerate(contents, 1)
     ]
     return Report(
-        "logs.html",
+        "logs",
         ", ".join(content.path.name for content in contents),
         figures,
         values={

@@ -9,7 +9,7 @@ from friso.system import shell_word
 from friso.views.drawing.figure import GREEN, ORANGE
 from friso.views.drawing.prefixes import NOTHING, range_with_unit, with_unit
 
-COLUMNS = ("Unit", "Range", "Course", "Samples", "Role, and why")
+COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
 """Columns of the table of channels."""
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
@@ -50,7 +50,7 @@ def channel_rows(content: LogContent) -> list[tuple[str, list[str]]]:
 
 def _cells(channel: ChannelContent) -> list[str]:
     role = f"{channel.role.replace('_', ' ')}: {channel.reason}" if channel.role else channel.reason or NOTHING
-    return [channel.unit or NOTHING, _range(channel), sparkline(channel.course()), _samples(channel), role]
+    return [channel.unit or NOTHING, role, _range(channel), sparkline(channel.course()), _samples(channel)]
 
 
 def _range(channel: ChannelContent) -> str:

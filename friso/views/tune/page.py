@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
 
 from friso.remedies.method import Advice
+from friso.stage import Stage
+from friso.stage.correlations import correlations_file, correlations_text
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
@@ -29,9 +32,21 @@ def stage_files(tuning: Advice) -> dict[str, Content]:
             continue
         slug = outcome.remedy.name.replace(",", "").replace(":", "").replace(" ", "-")
         unsure = "" if outcome.certainty == "works" else "-not-sure"
-        files[f"tuned-{slug}{unsure}.toml"] = outcome.stage.to_toml()
+        files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
     least = tuning.least
-    return {"tuned.toml": least.stage.to_toml() if least and least.stage else None, **files}
+    return {**_stage_file(tuning, "tuned.toml", least.stage if least else None), **files}
+
+
+def _stage_file(tuning: Advice, name: str, stage: Stage | None) -> dict[str, Content]:
+    """A stage file, and beside it how its uncertain keys hang together; what there is not is None."""
+    beside = correlations_file(Path(name)).name
+    if stage is None:
+        return {name: None, beside: None}
+    correlations = tuning.correlations.among(stage.uncertain())
+    return {
+        name: tuning.complete(stage).to_toml(),
+        beside: correlations_text(correlations, stage) if correlations.keys else None,
+    }
 
 
 class Behind(NamedTuple):
