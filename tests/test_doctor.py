@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from inside import friso_inside
 
+from friso.cli.common import print_table
 from friso.studies import doctor
 
 
@@ -19,6 +20,11 @@ def test_this_machine_works(tmp_path: Path) -> None:
     }
     formats = {finding["subject"] for finding in document["findings"] if finding["subject"].endswith(" files")}
     assert formats <= {"tdms files", "uff files", "lvm files"}
+
+
+def test_a_long_text_in_a_table_leaves_room_for_the_names(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table("", ["Result"], [("processor", ["packages " * 60])])
+    assert "processor" in capsys.readouterr().out
 
 
 def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,7 +11,7 @@ import pytest
 from refusals import Refused, Wording
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
-from friso.errors import InputError
+from friso.errors import InputError, StageError
 from friso.quantities import Quantity, Value, any_sign, positive
 from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
 
@@ -69,6 +69,13 @@ def test_thesis_rig_in_si(rig: Stage) -> None:
         "motion.return_at": 5.0,
         "motion.duration": 20.0,
     }
+
+
+def test_a_key_set_in_a_table_that_the_stage_has_not_is_named_itself() -> None:
+    with pytest.raises(StageError) as refused:
+        loads(RIGID).replace({"joint.locked": True})
+    assert refused.value.key == "joint.locked"
+    assert "joint.limiter_stiffness" in refused.value.expected
 
 
 def test_flat_holds_plain_python_values(rig: Stage) -> None:

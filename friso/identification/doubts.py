@@ -26,6 +26,9 @@ that is less than this share of the force."""
 NONE_LEFT = 1e-3
 """Share of the force below which Coulomb friction is no friction of a bearing."""
 
+WITHOUT_FRICTION = ". The stage file says that there is no friction: with a table [friction], friction is identified"
+"""What to do where the structure that was told leaves friction out."""
+
 WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb friction"}
 """What the inverse model identifies, in sentences."""
 
@@ -47,6 +50,7 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
             f"The whole model contradicts the record: on the moves it leaves {percent(plain.whole_error, 3)} of the "
             f"force, a plain mass with friction {percent(inverse.error, 3)}. What follows is from the latter alone"
             f"{''.join(f'; {cause.sentence}' for cause in reasons)}"
+            f"{WITHOUT_FRICTION if flat['friction.model'] == 'none' else ''}"
         )
     if poor:
         why = "; ".join(cause.sentence for cause in reasons) or UNKNOWN

@@ -107,13 +107,19 @@ def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Chann
 
 
 def _fit(role: str, channel: Channel) -> tuple[bool, int, bool]:
-    """How well a channel fits a role: whether it changes, its unit, its first letter."""
+    """How well a channel fits a role: whether it changes, and not as a clock does; its unit, its first letter."""
     finite = channel.values[np.isfinite(channel.values)]
-    changes = bool(finite.size and np.ptp(finite) > 0)
+    changes = bool(finite.size and np.ptp(finite) > 0) and not _like_a_clock(finite)
     kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))  # those of a rotary axis among them
     unit = 1 if not channel.unit else 2 if any(unit_factor(channel.unit, kind) is not None for kind in kinds) else 0
     first = next(iter(words(channel.name)), " ")[0]
     return changes, unit, first in _INITIALS.get(role, "")
+
+
+def _like_a_clock(values: np.ndarray) -> bool:
+    """Whether values rise evenly, as no measured motion does."""
+    steps = np.diff(values)
+    return values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0)
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:
