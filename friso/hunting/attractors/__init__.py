@@ -178,6 +178,8 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         distances = np.full((stages.count, len(BESIDE)), np.nan)
         distances[motion.stage] = BESIDE * motion.distance
         starts.stuck_at(distances)
+        if motion.seen is not None:
+            starts.seen(motion.stage, motion.seen)
     for cycles in first.families:
         survey.slow_down(np.arange(stages.count), cycles)
     for runs, owners in starts.waves(at_once=True):

@@ -82,9 +82,11 @@ class Pending:
 
 @dataclass(frozen=True)
 class Ends:
-    """How a round ended, arrays of shape (runs,): which runs were `completed`, which of them surely `rest`, the `steps`
-    that they took, and how their last swings repeat, with where these turn [m] and when [s], (runs, swings)."""
+    """How a round ended, arrays of shape (runs,): in what `states`, (runs, kept), which runs were `completed`, which of
+    them surely `rest`, the `steps` that they took, and how their last swings repeat, with where these turn [m] and when
+    [s], (runs, swings)."""
 
+    states: np.ndarray
     completed: np.ndarray
     rest: np.ndarray
     steps: np.ndarray
@@ -101,7 +103,7 @@ class Ends:
         """Those of the runs with these numbers."""
         arrays = (self.values[numbers], self.times[numbers])
         flags = (self.completed[numbers], self.rest[numbers], self.steps[numbers])
-        return Ends(*flags, self.repeats.take(numbers), *arrays)
+        return Ends(self.states[numbers], *flags, self.repeats.take(numbers), *arrays)
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
@@ -142,7 +144,8 @@ def one_round(runs: Pending, budget: float = BUDGET) -> tuple[Pending, Ends]:
     values, times = last_swings(results, np.maximum(LEG * (high - low), least), KEPT)
     standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
-    return replace(runs, states=results.ends), Ends(completed, completed & standing, steps, repeats, values, times)
+    ends = Ends(results.ends, completed, completed & standing, steps, repeats, values, times)
+    return replace(runs, states=results.ends), ends
 
 
 def _stands_still(

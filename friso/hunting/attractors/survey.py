@@ -81,6 +81,7 @@ class Swinging:
     swings: int
     cycles: Cycles | None = None
     number: int = 0
+    seen: np.ndarray | None = None
 
     def like(self, other: Swinging) -> bool:
         """Whether two motions of a stage are the same, or mirror images."""
@@ -337,9 +338,8 @@ class Survey:
             else:
                 self.unknown[owners[k]] = True
                 continue
-            motion = Swinging(
-                int(owners[k]), float(repeats.size[k] / 2), time, period, float(ends.values[k, -1]), swings
-            )
+            size, distance = float(repeats.size[k] / 2), float(ends.values[k, -1])
+            motion = Swinging(int(owners[k]), size, time, period, distance, swings, seen=ends.states[k])
             self.add([motion])
 
 
