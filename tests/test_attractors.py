@@ -241,6 +241,7 @@ def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.Mon
     what the others do, by beginning at rest."""
     monkeypatch.setattr(starts, "DISTANCES", (np.array([1e-6, 2e-6]),))
     monkeypatch.setattr(friso.hunting.attractors, "BESIDE", np.array([1e-6]))
+    monkeypatch.setattr(starts.Starts, "seen", lambda *_: None)
     attracted = attractors(held(CREEPING), thorough=True)
     assert attracted.flips.tolist() == [True]
     assert attracted.decided.tolist() == [False]

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.truth.by_hand import ByHand, NotWritten, by_hand
 from benchmarks.truth.claims import Claim
 from benchmarks.truth.refute import Refutation
-from benchmarks.truth.swings import RESTS, SWINGS, judge, legs
+from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from benchmarks.truth.trials import SMALL
 
 RELEASES = (0.3, 1.5, 20.0)
@@ -18,6 +18,9 @@ RELEASES = (0.3, 1.5, 20.0)
 
 PERIODS, SAMPLES = 40.0, 8000
 """Periods for which is followed, and samples in which turning points are sought."""
+
+LONGER = 10.0
+"""How many times as long one is followed on that swings then: it may be on its way to rest for hundreds of periods."""
 
 
 def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
@@ -54,13 +57,22 @@ def followed(equations: ByHand, start: np.ndarray) -> str:
         before = np.linspace(0.0, corner, 100)
         start = equations.run(start, before)[-1]
     last = replace(equations, pieces=equations.pieces[-1:])
-    x = last.run(start, times)[:, 0] - equations.pieces[-1, 1]
+    run = last.run(start, times)
+    if (word := _word(equations, run, times - corner)) != SWINGS:
+        return word
+    longer = np.linspace(0.0, LONGER * PERIODS * period, int(LONGER) * SAMPLES)
+    return _word(equations, last.run(run[-1], times[-1] + longer), longer)
+
+
+def _word(equations: ByHand, run: np.ndarray, times: np.ndarray) -> str:
+    """What became of states (times, states) at times from 0 on [s]."""
+    x = run[:, 0] - equations.pieces[-1, 1]
     if not np.isfinite(x[-1]):
-        return "unsure"
+        return UNSURE
     small = SMALL * equations.length
     places = _turns(x, small)
-    late = x[3 * SAMPLES // 4 :]
-    return judge(legs(times[places] - corner, x[places], PERIODS * period), float(np.ptp(late)), small, False)
+    late = x[3 * len(x) // 4 :]
+    return judge(legs(times[places], x[places], float(times[-1])), float(np.ptp(late)), small, False)
 
 
 def _turns(x: np.ndarray, least: float) -> np.ndarray:
