@@ -59,9 +59,9 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
     return replace(figure, panels=panels)
 
 
-def with_edge(figure: Figure, edge: Figure | None) -> Figure:
+def with_edge(figure: Figure, edge: Answer | None) -> Figure:
     """A map over two keys with the curves on which hunting ends over the same two."""
     if edge is None:
         return figure
-    curves = edge.panels[0].series
+    curves = edge.figures()[0].panels[0].series
     return replace(figure, panels=tuple(replace(panel, series=(*panel.series, *curves)) for panel in figure.panels))

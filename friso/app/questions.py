@@ -157,25 +157,28 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     stands = [("this machine", asked.machine.stage)]
     stands += [("pinned", asked.pinned.stage)] if asked.pinned else []
 
-    def part(answer: Answer, ranges: Mapping[str, Any], edge: Answer | None = None) -> AnswerPart:
+    edge: Answer | None = None
+
+    def drawn(figure: Figure) -> Figure:
+        return with_edge(with_places(figure, stands, [*keys.values()]), edge)
+
+    def part(count: int) -> AnswerPart:
+        ranges: dict[str, Any] = {name: f"{text}:{count}" for name, text in axes.items()}
+        answer = friso.sweep(asked.machine.stage, **ranges, **shown, progress=work.progress)
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, **shown}, "sweep")}
-        (curves,) = [None] if edge is None else edge.figures()
-
-        def drawn(figure: Figure) -> Figure:
-            return with_edge(with_places(figure, stands, [*keys.values()]), curves)
-
         return parts_of(asked, answer, drawn, **more)
 
-    for count in COARSE_TO_FINE:
-        ranges = {name: f"{text}:{count}" for name, text in axes.items()}
-        answer = friso.sweep(asked.machine.stage, **ranges, **shown, progress=work.progress)
-        last = count == COARSE_TO_FINE[-1] and not options.get("edge")
-        yield {**part(answer, ranges), **({} if last else {"kind": "partly"})}
+    *coarse, finest = COARSE_TO_FINE
+    for count in coarse:
+        yield {**part(count), "kind": "partly"}
+    whole = part(finest)
     if options.get("edge"):
-        edge = friso.boundary(asked.machine.stage, **axes, log=shown["log"], progress=work.progress)
-        whole = part(answer, ranges, edge)
-        yield {**whole, "sentences": [*whole["sentences"], *edge.sentences()]}
+        yield {**whole, "kind": "partly"}
+        edge = friso.boundary(asked.machine.stage, x=axes["x"], y=axes["y"], log=shown["log"], progress=work.progress)
+        whole = part(finest)
+        whole["sentences"] += edge.sentences()
+    yield whole
 
 
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
