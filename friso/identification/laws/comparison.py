@@ -143,10 +143,11 @@ def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], di
 
 
 def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> LawPrediction:
-    whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], problem.everywhere())
+    starts = problem.everywhere()  # not the fit to all records: it has seen what is left out
+    whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], starts)
     errors = []
     for out in parts:
-        fit = problem.fitted([~mask for mask in out], whole.numbers[None])
+        fit = problem.fitted([~mask for mask in out], starts)
         left = problem.errors(fit.numbers[None])
         friction = [record.force - fit.mass * record.acceleration for record in problem.records]
         rest, size = (np.concatenate([row[mask] for row, mask in zip(rows, out, strict=True)])
