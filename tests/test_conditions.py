@@ -60,6 +60,10 @@ def test_a_drive_as_built_moves_along_the_rail_whatever_the_place() -> None:
             {"friction": VARIANTS["rigid, GMS"].as_written()["friction"], **CONDITIONS},
             "conditions.load_per_acceleration",
         ),
+        (
+            {"rail": {**RAIL["rail"], "coulomb_deviation": 0.9}, "friction.coulomb": "2.9 N", PLACE: "3 mm"},
+            PLACE,
+        ),
     ],
 )
 def test_conditions_that_cannot_be(changes: dict[str, object], key: str, refused: Refused) -> None:

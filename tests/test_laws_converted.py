@@ -159,6 +159,16 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert wrong.returncode == 2
 
 
-def test_gms_keeps_its_own() -> None:
-    conversion = convert(under(gms()), "gms", 3)
-    assert not [item for item in conversion.lost if item.kind != "virgin"]
+@pytest.mark.parametrize("friction", [*STICKING, stribeck(2)])
+def test_a_law_converted_to_itself_stays_as_it_is(friction: str) -> None:
+    """But for another number of elements, which lag as those did."""
+    stage = under(friction)
+    law = stage.flat()["friction.model"]
+    conversion = convert(stage, law, 3)
+    assert conversion.stage == stage
+    assert not conversion.lost
+    assert not conversion.open
+    if law == "gms":
+        more = convert(stage, law, 6)
+        assert more.stage.flat()["friction.attraction"] == stage.flat()["friction.attraction"]
+        assert not more.lost

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar
 
 from friso.quantities import Bound, Number, Quantity, Value, any_sign, non_negative, positive
 from friso.stage.section import Rule, UncertainSection
@@ -11,6 +12,14 @@ from friso.stage.tables import friction_law
 CONDITIONS = "conditions"
 
 from_0_to_1 = Bound("from 0 to 1", lambda value: (value >= 0) & (value <= 1))
+
+
+def _falls(flat: Mapping[str, Any]) -> Any:
+    """Whether static friction is no smaller than Coulomb friction, under a law that has both, there and then."""
+    if not {"friction.static", "friction.coulomb"} <= {*flat}:
+        return True
+    static, coulomb = (flat[f"friction.{x}"] * flat.get(f"{CONDITIONS}.{x}_factor", 1.0) for x in ("static", "coulomb"))
+    return (static >= coulomb) | (flat["friction.static"] < flat["friction.coulomb"])  # the latter is told by the law
 
 
 class Conditions(UncertainSection):
@@ -43,6 +52,12 @@ class Conditions(UncertainSection):
             lambda flat: "conditions.place" not in flat or "rail.seed" in flat,
             "a [rail] on which the place is",
             '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm"',
+        ),
+        Rule(
+            ("conditions.place",),
+            _falls,
+            "a place at which the rail leaves static friction no smaller than Coulomb friction",
+            "static_deviation = 0.2, coulomb_deviation = 0.2 in [rail]",
         ),
         Rule(
             ("conditions.cold", "conditions.warm_up_time"),

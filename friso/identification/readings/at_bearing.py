@@ -17,6 +17,7 @@ from scipy.signal import bilinear, lfilter, lfilter_zi
 from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
+from friso.stage.transmission import moving_mass
 
 FINER = 8
 """Points per sample for what a mode of the structure does: a mode of a tenth of the sampling rate is off by 0.05 %."""
@@ -83,16 +84,16 @@ def machine_between(flat: Mapping[str, Any]) -> Between:
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
         for name in ("drive.", "joint.", "parasitic.")
     )
-    cart, held = (flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
+    held, moving = flat.get("masses.stage", 0.0), float(moving_mass(flat))
     lower = np.sqrt(1 - mode["mass"] / held) if mode else 1.0
     return Between(
         delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
         bandwidth=drive.get("current_bandwidth", np.inf),
-        mass=cart + held,
-        beyond=held / (cart + held) if joint and held else 0.0,
+        mass=moving,
+        beyond=held / moving if joint and held else 0.0,
         contact=joint.get("limiter_stiffness", np.inf),
         joint=joint.get("stiffness", 0.0),
-        mode=StructureMode(mode["mass"] / (cart + held), *(lower * mode[key] for key in ("frequency", "damping_ratio")))
+        mode=StructureMode(mode["mass"] / moving, *(lower * mode[key] for key in ("frequency", "damping_ratio")))
         if mode
         else None,
         viscous=(flat.get("friction.viscous", 0.0), 0.0),

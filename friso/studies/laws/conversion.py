@@ -101,7 +101,11 @@ def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
     if not before.stiffness and law != stage.flat()["friction.model"]:
         actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
-    keys = friction_law(law).keeping(before, elements)
+    flat, keys = stage.flat(), friction_law(law).keeping(before, elements)
+    if law == flat["friction.model"]:  # nothing is left open
+        if len(keys) == sum(key in flat for key in keys):
+            return compared(stage, stage, before)
+        keys |= {key: flat[key] for key in friction_law(law).left_open(before)}
     return compared(stage, with_friction(stage, law, keys), before)
 
 
@@ -114,6 +118,7 @@ def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConvers
     """A stage `made` from another, whose friction was measured `before`."""
     flat = made.flat()
     after, law = measure_friction(flat), friction_law(flat["friction.model"])
+    left_open = {} if flat["friction.model"] == source.flat()["friction.model"] else law.left_open(before)
     items = (
         _curve(source, made, before),
         _number("static", "N", before.levels.static, after.levels.static),
@@ -122,7 +127,7 @@ def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConvers
         _number("damping", "N*s/m", before.damping, after.damping),
         _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
-    return LawConversion(made, source, before, after, items, law.left_open(before), passive_where(flat))
+    return LawConversion(made, source, before, after, items, left_open, passive_where(flat))
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
@@ -167,7 +172,7 @@ WITHIN = 0.02
 def _virgin_change(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
     """The virgin curve, where the two are farthest apart."""
     if not after.stiffness:
-        return MeasuredChange("virgin", "N", before.levels.static, 0.0, 1.0, WITHIN)
+        return MeasuredChange("virgin", "N", before.levels.static, 0.0, float(before.stiffness > 0), WITHIN)
     force = np.interp(before.displacement, after.displacement, after.force)
     at = int(np.argmax(np.abs(force - before.force)))
     return MeasuredChange("virgin", "N", float(before.force[at]), float(force[at]), before.misfit(force), WITHIN)
