@@ -33,7 +33,7 @@ from snapshots import Snapshots
 from friso.hunting import Judgement, Kick, Margin
 from friso.hunting.margin import BandwidthWindow
 from friso.hunting.outward import AttractionEnd
-from friso.hunting.verdict import BANDWIDTHS, STARTS
+from friso.hunting.verdict import BANDWIDTHS, LOWER, STARTS
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
@@ -401,6 +401,9 @@ def test_what_a_search_left_open_depends_on_whether_the_edge_is_sure() -> None:
     unsure = replace(sure, margin=replace(sure.margin, certain=False))
     assert "other bandwidths" in sentence(sure)
     assert "other bandwidths" not in sentence(unsure)
+    everywhere = sentence(replace(sure, margin=None, given_up=(LOWER,)))
+    assert "still possible at 10 times" in everywhere
+    assert "lower bandwidths" in everywhere
 
 
 def test_a_peak_count_that_contradicts_the_verdict_is_explained(wording: Wording) -> None:

@@ -1,5 +1,7 @@
 """What was given up or is not certain is not told as sure: verdicts that rest on made-up surveys and runs."""
 
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -10,14 +12,14 @@ from made_up import fake_cycle, fake_hunting
 from patched import patched
 from variants import VARIANTS
 
-from friso.engine.allowance import allowance
+from friso.engine.allowance import Exhausted, allowance, current_allowance
 from friso.engine.arrays import Status
 from friso.hunting import basin, verdict
 from friso.hunting.attractors import Attractors, Target
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt
-from friso.hunting.margin import NOT_SOUGHT
+from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.verdict import LEFT_OVER, STARTS, SWINGS_ON, UNFOLLOWED, Judgement, judge
+from friso.hunting.verdict import BANDWIDTHS, LEFT_OVER, LOWER, STARTS, SWINGS_ON, UNFOLLOWED, Judgement, judge
 
 STAGE = VARIANTS["rigid"]
 TARGET = Target(1e-3, 1.6, 100.0, 25.0)
@@ -79,13 +81,14 @@ def judged(
     swing: float = 0.0,
     complete: bool = True,
     starts: tuple[Kick, Kick, MoveShare | None] = (HUNTING, HUNTING, None),
+    sought: Callable[[], SearchedBandwidths] = lambda: NOT_SOUGHT,
 ) -> Judgement:
     """The verdict on a stage that something attracts, where its own motion ends so."""
     attraction = replace(fake_hunting(fake_cycle()), surveyed=surveyed(complete))
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "ends_in": lambda *_: (np.array([ends]), np.array([completed]), np.array([swing])),
-        "search_bandwidths": lambda *_: NOT_SOUGHT,
+        "search_bandwidths": lambda *_: sought(),
         "displacements_that_hunt": lambda *_: starts[0],
         "pushes_that_hunt": lambda *_: starts[1],
         "moves_that_hunt": lambda *_: starts[2],
@@ -131,6 +134,21 @@ def test_what_ends_in_the_hunting_that_was_found_hunts_whatever_else_there_is() 
 )
 def test_no_kick_or_move_starts_hunting_only_if_all_were_run(starts: Any, certain: bool) -> None:
     assert (STARTS in judged(starts=starts).given_up) == (not certain)
+
+
+@pytest.mark.parametrize(("to_the_top", "left"), [(False, BANDWIDTHS), (True, LOWER)])
+def test_of_a_stage_that_hunts_at_all_higher_bandwidths_the_lower_ones_alone_are_given_up(
+    to_the_top: bool, left: str
+) -> None:
+    def exhausted() -> SearchedBandwidths:
+        allowed = current_allowance()
+        assert allowed is not None
+        with suppress(Exhausted):
+            allowed.exhaust()
+        return replace(NOT_SOUGHT, to_the_top=to_the_top)
+
+    assert judged(sought=exhausted).given_up == (left,)
+    assert judged().given_up == ()
 
 
 @pytest.mark.parametrize(("budget", "work"), [(100, np.inf), (2_000_000, 1e5)])

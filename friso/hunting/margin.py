@@ -64,12 +64,14 @@ class BandwidthWindow:
 class SearchedBandwidths:
     """What a search through the bandwidths showed: the `margin` (None: no such edge); the other `windows` in which
     something attracts; of a stage that something attracts the end below it of what does, `lower` (None: there is none);
-    and whether the search `contradicts` that nothing attracts the stage itself, to which an orbit was followed."""
+    whether the search `contradicts` that nothing attracts the stage itself, to which an orbit was followed; and whether
+    something attracts up to the highest bandwidth, so that there is no edge, `to_the_top`."""
 
     margin: Margin | None
     windows: tuple[BandwidthWindow, ...]
     lower: AttractionEnd | None = None
     contradicts: bool = False
+    to_the_top: bool = False
 
 
 NOT_SOUGHT = SearchedBandwidths(None, ())
@@ -102,7 +104,7 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     lower = grid.lower_end(index) if attracting else None
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
-        return SearchedBandwidths(None, grid.windows(index), lower, contradicts)
+        return SearchedBandwidths(None, grid.windows(index), lower, contradicts, bool(grid.attracts[index:].all()))
     at, end, certain = edge
     conclusive = certain and not contradicts
     inside = None if crossover is None else crossover * end.inside

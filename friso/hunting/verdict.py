@@ -76,8 +76,8 @@ class Judgement:
     reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no
     longer than its own end, as the longer run was not needed or not completed). `observed`: what attracts was observed
     in long simulations, no orbit that attracts could be closed. `lasting` [m], peak to peak, is where this motion alone
-    was seen to swing on, at the end of the time for which it was followed. `given_up`: what of `PARTS`, or `FEEDING`,
-    would have taken more work than was allowed.
+    was seen to swing on, at the end of the time for which it was followed. `given_up`: what of `PARTS`, or `LOWER`, or
+    `FEEDING`, would have taken more work than was allowed.
     """
 
     verdict: Verdict
@@ -107,6 +107,9 @@ class Judgement:
 
 PARTS = ATTRACTION, STARTS, BANDWIDTHS = "what attracts the stage", "kicks and moves", "other bandwidths"
 """What is computed for a verdict, in this order; without a cycle that attracts the second is left out."""
+
+LOWER = "lower bandwidths"
+"""What is given up of the other bandwidths where something attracts up to the highest one."""
 
 FEEDING = "what feeds it"
 """What is computed behind these of a stage with a backlash that something attracts."""
@@ -255,7 +258,8 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
     """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
     with allowance(work) as search:
         sought = search_bandwidths(stage, attraction.target is not None, attraction.surveyed)
-    return sought, (BANDWIDTHS,) if search.exhausted else ()
+    left = LOWER if sought.to_the_top else BANDWIDTHS
+    return sought, (left,) if search.exhausted else ()
 
 
 def _as_sure(edge: Margin | None, attraction: Hunting) -> Margin | None:

@@ -10,7 +10,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.criteria import ATTRACTED
 from friso.hunting.margin import DISTANCE, FARTHEST
-from friso.hunting.verdict import BANDWIDTHS, FEEDING, STARTS
+from friso.hunting.verdict import BANDWIDTHS, FEEDING, LOWER, STARTS
 from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
@@ -226,7 +226,8 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
         return [*says, *_windows(item.case), *_unsearched(item.case)]
     if judgement.hunting.target is None:
         return says
-    return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says]
+    lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if LOWER in judgement.given_up else []
+    return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says, *lower]
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
