@@ -114,6 +114,7 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Identif
     assert part == pushed.segments[0]
     assert errors.force < 0.05
     assert errors.position < 5e-3
+    assert 0 < predicted.apart < 0.05
     silent = replace(pushed, signals={**pushed.signals, "disturbance": 0 * pulses})
     assert simulated_log(result, silent).errors.force > 5 * errors.force
 
@@ -263,8 +264,9 @@ def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves,
         assert not by_name[name].determined, name
         assert by_name[name].low < by_name[name].high
     wording(by_name["friction.static"].reason)
-    assert by_name["friction.static"].low == pytest.approx(by_name["friction.coulomb"].value, rel=1e-3)
-    assert by_name["friction.static"].high == pytest.approx(HIGHEST_RATIO * by_name["friction.coulomb"].value, rel=1e-3)
+    coulomb, static = by_name["friction.coulomb"], by_name["friction.static"]
+    assert coulomb.low - 1e-9 < static.low < coulomb.value  # Coulomb friction may be less than its value as well
+    assert HIGHEST_RATIO * coulomb.value < static.high < HIGHEST_RATIO * coulomb.high + 1e-9
     lengths = [by_name["friction.coulomb"].value / by_name[BRISTLES[0]].high, SHORTEST]
     assert lengths[0] < 2 * lengths[1]  # all that is believed of bristles, and not what the fit makes of them
     mass = by_name["masses.cart"]

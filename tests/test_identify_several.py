@@ -18,6 +18,7 @@ from friso.identification.logs.joined import join_logs
 from friso.identification.logs.log import Log
 from friso.identification.method import check_predictions, identify
 from friso.identification.readings.common import record
+from friso.identification.readings.course import Course
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.stage import Stage
 
@@ -44,6 +45,29 @@ def test_a_log_that_says_enough_alone_stays_alone() -> None:
     logs = [ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(seed)) for seed in (1, 2)]
     single = piece(logs[0], logs[0].segments[0], "single")
     assert [len(group) for group in KINDS["break-away"].groups([*logs, single])] == [1, 1, 1]
+
+
+def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
+    """What one of them alone shows best are its moves."""
+    speeds = (0.02, 0.05, 0.1)
+
+    def course(*speeds: float) -> Course:
+        log = travels([*speeds], FLAT, np.random.default_rng(1))
+        return Course(replace(log, signals={role: log[role] for role in ("position", "force")}))
+
+    courses = [course(speed) for speed in speeds]
+    alone, together = KINDS["constant-speed"].claims, KINDS["constant-speed"].claims_together
+    moves = KINDS["moves"].claims
+    assert alone is not None
+    assert together is not None
+    assert moves is not None
+    assert together(courses)
+    assert not together(courses[:2])
+    assert not alone(courses[0])
+    assert moves(courses[0])
+    several = course(*speeds)
+    assert alone(several)
+    assert not moves(several)
 
 
 def test_logs_of_one_speed_each_are_one_curve_of_friction() -> None:

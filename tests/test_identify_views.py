@@ -243,7 +243,7 @@ def everything() -> tuple[Identification, list[LogFile], list[Prediction]]:
         LogFile(Path(f"{item.name}.csv"), item, kind, "as specified", None) for kind, _, logs in rows for item in logs
     ]
     predictions = [
-        Prediction(log, "moves", SimulatedLog(moved.part, moved.simulated, moved.errors)),
+        Prediction(log, "moves", SimulatedLog(moved.part, moved.simulated, moved.errors, 0.02)),
         Prediction(exps[0], "frequency", (0.1, 0.7)),
     ]
     return outcome, files, predictions

@@ -14,7 +14,7 @@ from friso.errors import InputError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.checks import clipped_share, interpolated, samples_held, unwrapped
-from friso.identification.logs.delays import fitted_lag, in_blocks, lag
+from friso.identification.logs.delays import fitted_lag, force_line, in_blocks, lag
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, from_options
@@ -130,8 +130,18 @@ def test_time_is_never_proposed_for_another_role(tmp_path: Path) -> None:
     assert caught.value.options == ()
 
 
+def test_a_unit_tells_the_role_of_the_only_channel_that_has_it(tmp_path: Path) -> None:
+    names = ["t/s", "x_soll/mm", "x/mm", "F/N"]
+    log = log_of(tmp_path, names, [columns()[0], *2 * [columns()[1]], columns()[3]])
+    assert {"reference", "position", "force"} <= log.signals.keys()
+    two = ["t [s]", "x [mm]", "y [mm]", "F [N]"]
+    with pytest.raises(GapsError) as caught:
+        log_of(tmp_path, two, [columns()[0], *2 * [columns()[1]], columns()[3]])
+    assert [gap.key for gap in caught.value.gaps] == ["position"]
+
+
 def test_no_candidate_lists_the_channels(tmp_path: Path, wording: Wording) -> None:
-    text = message(tmp_path, ["time [s]", "a [mm]", "b", "force [N]"], columns())
+    text = message(tmp_path, ["time [s]", "a [mm]", "b [mm]", "force [N]"], columns())
     wording(text)
 
 
@@ -219,6 +229,11 @@ def test_unit_spellings(text: str, si: str, factor: float) -> None:
 
 def test_headings() -> None:
     assert split_heading("enc1 (mm)") == ("enc1", "mm")
+    assert split_heading("x / nm") == ("x", "nm")
+    assert split_heading("v in mm/s") == ("v", "mm/s")
+    assert split_heading("v/(mm/s)") == ("v", "mm/s")
+    assert split_heading("mm/s") == ("mm/s", "")
+    assert split_heading("on/off") == ("on/off", "")
     assert split_heading("x [flurbs]") == ("x", "flurbs")
     assert split_heading("test space (1)") == ("test space (1)", "")
     assert split_heading("[m]") == ("[m]", "")
@@ -369,6 +384,20 @@ def test_delay_with_its_interval(true: float) -> None:
     causes = np.stack([two, np.ones_like(two)], axis=1)
     value, half = in_blocks(lambda a, b: fitted_lag(one[a:b], causes[a:b]), t.size)
     assert abs(value - true) < 2 * half + 0.02
+
+
+def test_a_body_that_sticks_while_the_force_turns_is_not_late() -> None:
+    """Force and motion of a sine with dwells at its ends, through which friction turns."""
+    step, count, dwell = 5e-3, 2400, 0.1
+    phase = 2 * np.pi * 0.5 * step * np.arange(count)
+    swing, way = np.sin(phase), np.sign(np.cos(phase))
+    velocity = 0.15 * np.sign(swing) * np.maximum(np.abs(swing) - dwell, 0.0)
+    stuck = way * np.clip(way * swing / dwell, -1, 1)
+    friction = 3 * np.where(np.abs(swing) > dwell, np.sign(swing), stuck)
+    position = np.cumsum(velocity) * step
+    force = 6 * np.gradient(velocity, step) + friction + 10 * velocity
+    whole = [slice(0, count)]
+    assert force_line(position, force, step, whole) == ""
 
 
 def test_friction_is_no_delay(tmp_path: Path) -> None:

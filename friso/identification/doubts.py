@@ -34,16 +34,23 @@ WORDS = {"mass": "the mass", "viscous": "viscous friction", "coulomb": "Coulomb 
 
 
 def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: float, cart_share: float) -> Quality:
-    """How good a fit is, with what is wrong with it in sentences."""
+    """How good a fit is, with what is wrong with it in sentences.
+
+    Of a stage that sticks much of the time, which the inverse model cannot know, the whole model may describe a record
+    that is `beyond` the inverse one; what this explains of it counts then only if it is more than the whole does."""
     left = fit.left
     noise_left = noise * fit.problem.passes
     flat, unit = fit.stage, log.unit("force")
     plain = Quality(noise, left, noise_left, inverse.error, whole_error(flat, inverse))
     if fit.problem.closed and fit.explains(noise):
         return plain
-    doubts, poor = [], inverse.error > POOR
+    force = float(np.sqrt(np.mean(log["force"][log.longest] ** 2)))
+    beyond = inverse.error > POOR and left < UNSETTLED * force
+    doubts, poor = [], inverse.error > POOR and not beyond
     reasons = causes(log, inverse, cart_share) if plain.lacks_something or poor else []
-    worse = plain.whole_error > max(CONTRADICTS * inverse.error, FINE)
+    if beyond:
+        reasons = [cause for cause in reasons if cause.without is None or cause.without.error * force < left]
+    worse = not beyond and plain.whole_error > max(CONTRADICTS * inverse.error, FINE)
     rejected = worse and plain.lacks_something and not poor
     if rejected:
         doubts.append(
@@ -71,7 +78,6 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         values = f"{one.first:.4g} and {one.second:.4g} {unit_of_it}"
         doubts.append(f"The halves of the record differ in {WORDS[one.name]}: {values}; its interval holds both")
     without = tuple(cause.without for cause in reasons if cause.without)
-    force = float(np.sqrt(np.mean(log["force"][log.longest] ** 2)))
     best = min([inverse.error, *(model.error for model in without)])
     unsettled = plain.lacks_something and min(left / force, best) > UNSETTLED
     return replace(

@@ -113,10 +113,11 @@ class ExperimentKind(Generic[Result]):
     last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts). `partial`: whether a log
     shows too little for a result of its own, such as one event; logs like that count as one log with gaps. `together`:
     all its logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured
-    them, too. `claims` says why a log without a stated kind may be of this one, or None; `around` makes
-    up a stage around a log where none is given. `notes` are what the engineer should know of all its results, the stage
-    being given or not; `doubts` what speaks against believing a result, in sentences, and `failed` whether its analysis
-    failed, whatever of it still holds. Functions raise InputError for logs that cannot be used."""
+    them, too. `claims` says why a log without a stated kind may be of this one, or None, `claims_together` the same of
+    several logs, whatever each seems to be alone; `around` makes up a stage around a log where
+    none is given. `notes` are what the engineer should know of all its results, the stage being given or not; `doubts`
+    what speaks against believing a result, in sentences, and `failed` whether its analysis failed, whatever of it still
+    holds. Functions raise InputError for logs that cannot be used."""
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
     estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
@@ -129,6 +130,7 @@ class ExperimentKind(Generic[Result]):
     together: bool = False
     responses: bool = False
     claims: Callable[[Course], str | None] | None = None
+    claims_together: Callable[[Sequence[Course]], str | None] | None = None
     around: Callable[[Log], Stage | None] | None = None
     notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
     predictor: Predictor[Result] | None = None

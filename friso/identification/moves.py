@@ -25,15 +25,17 @@ from friso.identification.model_error import (
 )
 from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
 from friso.identification.output_error.coverage import Coverage, coverage
+from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
 from friso.identification.output_error.one_way import either_way
 from friso.identification.output_error.parameters import MASS, fit_parameters, is_free, keys_of
 from friso.identification.output_error.problem import Problem, Simulated, loop_problem, tracking
 from friso.identification.output_error.profile import Profile
-from friso.identification.output_error.repeated import as_far_off_as_repeated
+from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, noise_of
+from friso.identification.slow_records import without_what_is_too_slow
 from friso.progress import Progress, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -104,6 +106,7 @@ def identify_moves(
     if not fit.problem.closed:
         fit = as_far_off_as_repeated(fit, log, part, inverse.bandwidth, noise, progress)
     if not fit.explains(noise):
+        fit = fit if fit.problem.closed else late_by_a_sample(fit)
         fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"))
     fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
     estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
@@ -116,6 +119,10 @@ def identify_moves(
     estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
     estimates = with_halves(estimates, flat, quality)
     estimates, correlation = with_possible_values(estimates, correlation, flat)
+    counted = answer.fit.problem.counted > 0
+    estimates, correlation = without_what_is_too_slow(
+        estimates, correlation, flat, moved, counted, quality, log.unit("force")
+    )
     simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
@@ -159,11 +166,13 @@ def _with_changes(
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """Another log of the same axis, simulated: the samples used, the record, and its errors."""
+    """Another log of the same axis, simulated: the samples used, the record, and its errors; and how far machines drawn
+    from the intervals go from that record at most, `apart`, as a share of the position."""
 
     part: slice
     simulated: Simulated
     errors: SimulationErrors
+    apart: float
 
 
 def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | None = None) -> SimulatedLog:
@@ -178,7 +187,16 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
     part = log.longest
     problem = _same_kind(moves.loop, log, part, set_up, {*log.setup, *moves.log.setup})
     simulated = problem.record(moves.fit.inner)
-    return SimulatedLog(part, simulated, errors_of(log, part, simulated, moves.inverse.bandwidth))
+    drawn = drawn_from(moves.estimates, moves.correlation, problem.parameters, moves.fit.inner)
+    others = [np.linalg.norm(record.position - simulated.position, axis=1) for _, record in problem.simulated(drawn)]
+    away = np.concatenate(others)
+    errors = errors_of(log, part, simulated, moves.inverse.bandwidth)
+    return SimulatedLog(
+        part,
+        simulated,
+        errors,
+        float(away[np.isfinite(away)].max(initial=0.0)) / float(np.linalg.norm(log["position"][part])),
+    )
 
 
 def _same_kind(problem: Problem, log: Log, part: slice, set_up: Mapping[str, Any] | None, changed: set[str]) -> Problem:

@@ -71,6 +71,21 @@ def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogF
             mappings[path] = mapping.over(load_mapping(path, folder) or Mapping())
     if gaps:
         raise OpenQuestions(gaps, mappings)
+    return _recognised_together(files)
+
+
+def _recognised_together(files: list[LogFile]) -> list[LogFile]:
+    """The files, those without a stated kind as of the kind that claims all of these together, if one does."""
+    kindless = [number for number, file in enumerate(files) if file.mapping.experiment is None]
+    courses = [Course(source) for number in kindless if isinstance(source := files[number].source, Log)]
+    for name in KINDS if len(courses) > 1 else ():
+        claims = KINDS[name].claims_together
+        reason = claims(courses) if claims is not None else None
+        if reason is not None:
+            return [
+                replace(file, kind=name, reason=reason) if number in kindless and isinstance(file.source, Log) else file
+                for number, file in enumerate(files)
+            ]
     return files
 
 

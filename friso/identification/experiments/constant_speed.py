@@ -12,6 +12,7 @@ from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
 from friso.identification.logs.log import Log
+from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
 from friso.identification.readings.friction_velocity import STRAIGHT, FrictionVelocity, distinct, friction_velocity
 from friso.identification.readings.passes import passes
@@ -58,6 +59,19 @@ def _partial(log: Log) -> bool:
     return not steady or distinct(np.array(steady)) < STRAIGHT
 
 
+def _claims_together(courses: Sequence[Course]) -> str | None:
+    """Constant speeds, most of the way of each log, and enough of them for a curve of friction over speed."""
+    speeds = [course.speeds for course in courses]
+    count = distinct(np.concatenate(speeds)) if all(map(len, speeds)) else 0
+    return f"most of the way goes at one of {count} constant speeds" if count >= STRAIGHT else None
+
+
 KIND = ExperimentKind[FrictionAtSpeeds](
-    _analyse, _estimates, _correlated, after=("frequency", "moves"), partial=_partial
+    _analyse,
+    _estimates,
+    _correlated,
+    after=("frequency", "moves"),
+    partial=_partial,
+    claims=lambda course: _claims_together([course]),
+    claims_together=_claims_together,
 )

@@ -12,6 +12,9 @@ MOST = 20
 """Longest delay looked for, in samples."""
 LEAST = 0.25
 """Shortest delay reported, in samples: derivatives are smoothed more than what they are compared with."""
+CLEAR = 1 / 3
+"""Share of what no delay leaves unexplained that a delay leaves at most: a body that sticks while the force turns looks
+late by some samples as well, and leaves half."""
 WINDOW = 11
 """Samples over which derivatives are smoothed (Savitzky-Golay, no delay of its own)."""
 
@@ -41,7 +44,7 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
     push = _smoothed(force[part], 0, period)
     sign = np.sign(velocity) * (np.abs(velocity) > 0.01 * np.abs(velocity).max())
     causes = np.stack([acceleration, velocity, sign, place - place.mean(), np.ones_like(push)], axis=1)
-    return _line("motion", "the force", in_blocks(lambda a, b: fitted_lag(push[a:b], causes[a:b]), push.size), period)
+    return _line("motion", "the force", in_blocks(lambda a, b: _clear_lag(push[a:b], causes[a:b]), push.size), period)
 
 
 def lag(first: np.ndarray, second: np.ndarray) -> float:
@@ -57,6 +60,17 @@ def lag(first: np.ndarray, second: np.ndarray) -> float:
 def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
     """By how many samples the causes, of shape (n, p), come after what they sum up to by least squares: the lag with
     the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at the border."""
+    return _peak(_explained(effect, causes), 0.5)
+
+
+def _clear_lag(effect: np.ndarray, causes: np.ndarray) -> float:
+    """The same; NaN where no lag at all leaves little more."""
+    shares = _explained(effect, causes)
+    return _peak(shares, 0.5) if 1 - shares.max() < CLEAR * (1 - shares[MOST]) else np.nan
+
+
+def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
+    """The share of an effect that its causes explain at each lag, of -MOST to MOST samples."""
     middle = effect[MOST:-MOST] - effect[MOST:-MOST].mean()
     energy = middle @ middle
     shares = []
@@ -65,7 +79,7 @@ def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
         shifted = shifted / np.maximum(np.abs(shifted).max(axis=0), np.finfo(float).tiny)
         fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
         shares.append(float(fit @ (shifted.T @ middle)) / energy if energy > 0 else 0.0)
-    return _peak(np.array(shares), 0.5)
+    return np.array(shares)
 
 
 def _peak(heights: np.ndarray, least: float) -> float:

@@ -22,6 +22,9 @@ OPTIONAL = ("velocity", "acceleration")
 _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "fuivmk", "disturbance": "d"}
 """Letters with which channels of a role often begin, to choose the example of a message."""
 
+_WANTED = ("set", "ref", "soll", "cmd", "target")
+"""Parts of names that tell what was wanted from what was measured, for the same purpose."""
+
 
 class GapsError(LogError):
     """What logs do not tell: the errors of which any one would stop the reading, each with the option that mends it as
@@ -106,14 +109,16 @@ def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Chann
     return max(fits, key=lambda pair: pair[1])[0] if fits else None
 
 
-def _fit(role: str, channel: Channel) -> tuple[bool, int, bool]:
-    """How well a channel fits a role: whether it changes, and not as a clock does; its unit, its first letter."""
+def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
+    """How well a channel fits a role: whether it changes, and not as a clock does; its unit, whether it is what was
+    wanted, its first letter."""
     finite = channel.values[np.isfinite(channel.values)]
     changes = bool(finite.size and np.ptp(finite) > 0) and not _like_a_clock(finite)
     kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))  # those of a rotary axis among them
     unit = 1 if not channel.unit else 2 if any(unit_factor(channel.unit, kind) is not None for kind in kinds) else 0
     first = next(iter(words(channel.name)), " ")[0]
-    return changes, unit, first in _INITIALS.get(role, "")
+    wanted = any(word in channel.name.lower() for word in _WANTED)
+    return changes, unit, wanted == (role == "reference"), first in _INITIALS.get(role, "")
 
 
 def _like_a_clock(values: np.ndarray) -> bool:

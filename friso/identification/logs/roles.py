@@ -1,4 +1,4 @@
-"""Which channel is what: as the user says, else proposed by name with a reason, never guessed between two."""
+"""Which channel is what: as the user says, else proposed by name or unit with a reason, never guessed between two."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.units import split_heading
+from friso.identification.logs.units import split_heading, unit_factor
 from friso.quantities import quoted
 
 _SET = frozenset(
@@ -61,6 +61,9 @@ _KEYS = {
     "disturbance": frozenset(["disturbance", "injected", "injection"]),
 }
 """Words in a name that tell what a channel is."""
+
+_TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A")}
+"""Units that tell a role where a single channel without one has them."""
 
 _GERMAN = re.compile(r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?")
 """Names that begin with what is wanted or what is, or end with it: Sollposition, Istposition, Lagesollwert."""
@@ -139,8 +142,9 @@ class Proposal:
 
 
 def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
-    """Roles with their channels: first what the user assigned, then what the names show. Of several channels whose
-    names show a role, the one whose name is nothing else has it. Raises LogError for a name that is not there."""
+    """Roles with their channels: first what the user assigned, then what the names show, then what units do. Of several
+    channels whose names show a role, the one whose name is nothing else has it. Raises LogError for a name that is not
+    there."""
     chosen = {
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
         for role, name in assigned.items()
@@ -163,7 +167,26 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
         else:
             channel, word = matches[0]
             chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
+    for role in _TOLD_BY_UNIT.keys() - {*chosen, *rivals}:
+        channel = _only_one(role, table, [choice.channel for choice in chosen.values()])
+        if channel is not None:
+            chosen[role] = AssignedRole(role, channel, f"the only channel in {channel.unit} without a role", False)
     return Proposal(chosen, rivals)
+
+
+def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Channel | None:
+    """The only channel in a unit of a role, of those whose names tell nothing of what they are; None without it."""
+    used = {id(channel) for channel in taken}
+    fits = [
+        channel
+        for channel in table.channels
+        if id(channel) not in used
+        and channel.unit
+        and role_of(channel.name) is None
+        and not {*words(channel.name)} & (_SET | _NOT_MEASURED)
+        and any(unit_factor(channel.unit, unit) is not None for unit in _TOLD_BY_UNIT[role])
+    ]
+    return fits[0] if len(fits) == 1 else None
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:

@@ -53,6 +53,8 @@ _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
     r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
 )
+_OVER = re.compile(r"(?P<name>[^/\[(]*?[^/\[(\s])(?:\s*/\s*|\s+in\s+)(?P<unit>\([^()]+\)|[^\s()\[\]]+)")
+"""Headings of ISO 80000, a quantity over its unit, and their like in words."""
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
 """Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
 _MEASURED_IN = {
@@ -109,9 +111,12 @@ _KINDS = (
 
 def split_heading(heading: str) -> tuple[str, str]:
     """Name and unit of a heading: "Position (mm)" is ("Position", "mm"). A text in square brackets is always a unit
-    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none). Without
-    brackets a name may end with its unit, and keeps it: "angle_deg"."""
+    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none), as one
+    behind a stroke or "in": "x/mm", "Kraft in N". Else a name may end with its unit, and keeps it: "angle_deg"."""
     heading = heading.strip()
+    over = _OVER.fullmatch(heading)
+    if over is not None and is_unit(over["unit"].strip("()")) and not is_unit(heading):
+        return over["name"], over["unit"].strip("()")
     opening, closing = "[]" if heading.endswith("]") else "()"
     name, bracket, inner = heading.removesuffix(closing).rpartition(opening)
     if not (heading.endswith(closing) and bracket and name.strip()) or closing in inner:

@@ -24,6 +24,9 @@ SHORTEST, LONGEST = 5e-8, 3e-4
 RADII = 5e-3, 0.5
 """Radii [m] between which bearings that turn are believed to be: their bristles bend by an angle [rad]."""
 
+STRIBECK_UP_TO = 0.02
+"""Speed [m/s] up to which the Stribeck effect of a bearing may act."""
+
 
 @dataclass(frozen=True)
 class FitParameter:
@@ -57,6 +60,12 @@ def bends(flat: Mapping[str, Any]) -> tuple[float, float]:
     return SHORTEST / largest, LONGEST / smallest
 
 
+def stribeck_up_to(flat: Mapping[str, Any]) -> float:
+    """The highest Stribeck velocity [m/s] that is believed of a bearing; on a rotary axis [rad/s], at the radius in the
+    middle of those that bearings have."""
+    return STRIBECK_UP_TO if axis_of(flat) == LINEAR else STRIBECK_UP_TO / float(np.sqrt(np.prod(RADII)))
+
+
 def is_free(flat: Mapping[str, Any]) -> bool:
     """Whether a stage given as flat keys has a joint that moves."""
     return "joint.stiffness" in flat and not flat["joint.locked"]
@@ -68,9 +77,10 @@ def fit_parameters(
     """The parameters of a stage given as flat keys, that a log may show.
 
     `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
-    is the highest of the log, `travel` [m] how far it goes: no Stribeck velocity and no bristle can be beyond them.
-    Where it does not go `both_ways`, a constant force and an asymmetry cannot be distinguished from friction, and are
-    left out. Raises InputError for a friction law that is not among those that can be fitted."""
+    is the highest of the log, `travel` [m] how far it goes: no bristle bends further, and no Stribeck velocity is
+    higher unless bearings have such. Where it does not go `both_ways`, a constant force and an asymmetry cannot be
+    distinguished from friction, and are left out. Raises InputError for a friction law that is not among those that can
+    be fitted."""
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if friction_law(flat["friction.model"]).fitted:
@@ -107,7 +117,7 @@ def _friction(
             parameters.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
         parameters += [
             FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
-            _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, speed),
+            _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, max(speed, stribeck_up_to(flat))),
         ]
     if "friction.bristle_stiffness" in flat:
         shortest, longest = bends(flat)

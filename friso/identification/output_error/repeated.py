@@ -50,6 +50,21 @@ def as_far_off_as_repeated(
     return replace(once, covariance=once.covariance * np.outer(wider, wider))
 
 
+def late_by_a_sample(fit: OutputErrorFit) -> OutputErrorFit:
+    """The fit of a stage that followed a log which it does not explain to its noise, with a deviation of the damping of
+    the bristles that allows for one sample: what holds the stage to the log knows no better when it breaks away, and a
+    delay passes for damping, times the stiffness."""
+    names = [parameter.name for parameter in fit.problem.parameters]
+    places = {names[number]: place for place, number in enumerate(fit.free)}
+    if not {"friction.bristle_stiffness", "friction.bristle_damping"} <= places.keys():
+        return fit
+    late = fit.value("friction.bristle_stiffness") * fit.problem.inputs.sample_time
+    covariance = fit.covariance.copy()
+    place = places["friction.bristle_damping"]
+    covariance[place, place] += (late / fit.value("friction.bristle_damping") / COVERAGE) ** 2
+    return replace(fit, covariance=covariance)
+
+
 def _simulated_logs(
     once: OutputErrorFit, log: Log, part: slice, bandwidth: float, noise: float, progress: Progress
 ) -> Iterator[Problem]:

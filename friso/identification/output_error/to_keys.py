@@ -121,8 +121,16 @@ def _slopes(fit: OutputErrorFit) -> tuple[list[str], np.ndarray]:
 def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
     """What is possible of a key that is not shown: all that is believed of any bearing, since what a fit makes of such
     a parameter, it makes up for what the model lacks."""
-    parameter = next(one for one in fit.problem.parameters if one.name == owner)
-    if owner != RATIO:
-        return parameter.low, parameter.high
-    coulomb = fit.value("friction.coulomb")
-    return coulomb * parameter.low, coulomb * parameter.high
+    parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
+    parameter = parameters[owner]
+    if owner == RATIO:
+        level = parameters["friction.coulomb"]
+        number = list(parameters).index(level.name)
+        off = COVERAGE * float(np.sqrt(fit.covariance[fit.free.index(number), fit.free.index(number)]))
+        least, most = (float(level.outer(fit.inner[number] + end)) for end in (-off, off))
+        return least * parameter.low, most * parameter.high
+    if owner == "friction.bristle_damping":  # believed of a share of critical damping, whatever the stiffness
+        stiffness = parameters["friction.bristle_stiffness"]
+        softer, stiffer = (np.sqrt(end / fit.problem.flat[stiffness.name]) for end in (stiffness.low, stiffness.high))
+        return float(parameter.low * softer), float(parameter.high * stiffer)
+    return parameter.low, parameter.high

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from friso.errors import InputError
 from friso.identification.logs.log import Log
+from friso.identification.readings.passes import passes
 from friso.identification.response.period import find_periods
 
 BACK = 0.1
@@ -17,6 +18,12 @@ BACK = 0.1
 
 STILL = 0.01
 """Share of the travel within which a position rests."""
+
+MOSTLY = 0.75
+"""Share of the way that is most of it (our choice; of moves it is a sixth to a half that goes at constant speed)."""
+
+BLUR = 20
+"""Samples over which a position is averaged, for the way that it goes not to be that of its noise."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +64,19 @@ class Course:
         period = periods.cut(self.log[self.signal][part]).mean(axis=0)
         moved = self.log["position"][part][periods.start : periods.stop]
         return Repetition(periods.samples, _harmonics(period), _turns(period), _rest(moved, periods.samples))
+
+    @cached_property
+    def speeds(self) -> np.ndarray:
+        """The constant speeds [m/s], shape (n,), where most of the way goes at such, which no reference tells; none
+        where force or position has no SI unit."""
+        part, position = self.log.longest, self.log["position"]
+        try:
+            steady = [] if self.reference_moves else [stretch for stretch in passes(self.log) if stretch.steady]
+        except InputError:
+            return np.zeros(0)
+        way = float(np.abs(np.diff(uniform_filter1d(position[part], BLUR))).sum())
+        gone = sum(float(np.ptp(position[stretch.span])) for stretch in steady)
+        return np.array([abs(stretch.velocity) for stretch in steady if gone > MOSTLY * way])
 
     @property
     def repeats(self) -> str:

@@ -142,7 +142,8 @@ def _prediction_sentence(simulated: SimulatedLog) -> str:
     errors = simulated.errors
     return (
         f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
-        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}."
+        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; machines within the "
+        f"intervals differ from it by up to {percent(simulated.apart)} in position."
     )
 
 
@@ -169,7 +170,7 @@ VIEW = KindView[IdentifiedMoves](
     prediction=PredictionView[SimulatedLog](
         worst=lambda result: result.errors.force,
         sentence=_prediction_sentence,
-        numbers=lambda result: {"errors": asdict(result.errors)},
+        numbers=lambda result: {"errors": asdict(result.errors), "machines_within_intervals": result.apart},
         figures=_prediction_figures,
     ),
 )

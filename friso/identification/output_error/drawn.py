@@ -1,0 +1,52 @@
+"""Machines drawn from what a record leaves open: numbers that a fit takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
+from friso.intervals import COVERAGE
+
+DRAWS, SEED = 16, 5
+"""Machines that are drawn: two fillings of the lanes."""
+
+
+def drawn_from(
+    estimates: Sequence[Estimate], correlation: np.ndarray, parameters: Sequence[FitParameter], inner: np.ndarray
+) -> np.ndarray:
+    """Fitted numbers, shape (draws, parameters), of machines within the `estimates`, about those of the fit, `inner`.
+
+    What is determined is drawn as its intervals and their `correlation` say, what is not from the range that is left,
+    logarithms evenly; a parameter without a finite range stays as it was fitted.
+    """
+    rng = np.random.default_rng(SEED)
+    known = [estimate for estimate in estimates if estimate.determined]
+    roots = np.linalg.cholesky(correlation + 1e-9 * np.eye(len(known)))
+    steps = rng.standard_normal((DRAWS, len(known))) @ roots.T
+    values = {
+        estimate.name: np.clip(estimate.value + step * estimate.half_width / COVERAGE, estimate.low, estimate.high)
+        for estimate, step in zip(known, steps.T, strict=True)
+    }
+    for estimate in estimates:
+        if not estimate.determined and 0 < estimate.low < estimate.high < np.inf:
+            values[estimate.name] = np.exp(rng.uniform(np.log(estimate.low), np.log(estimate.high), DRAWS))
+    rows = np.tile(inner, (DRAWS, 1))
+    for number, parameter in enumerate(parameters):
+        drawn = _of_parameter(parameter.name, values)
+        if drawn is not None:
+            rows[:, number] = parameter.inner(np.clip(drawn, parameter.low, parameter.high))
+    return rows
+
+
+def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """A parameter of the machines drawn, whose keys have these values; None where these do not tell it."""
+    if name == MASS:
+        masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
+        return sum(masses[1:], masses[0]) if masses else None
+    if name == RATIO:
+        both = [values.get(f"friction.{key}") for key in ("static", "coulomb")]
+        return None if both[0] is None or both[1] is None else both[0] / both[1]
+    return values.get(name)
