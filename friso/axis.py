@@ -8,7 +8,7 @@ import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 AXIS_KIND = "axis.kind"
@@ -31,16 +31,26 @@ class AxisKind:
         """In a message about a unit."""
         return f'[axis] kind = "{self.name}"'
 
+    @property
+    def plain(self) -> bool:
+        """Whether units are those that everything is declared in."""
+        return (self.length, self.force) == (LENGTH, FORCE)
+
+    def per(self, unit: str) -> AxisKind:
+        """This axis with forces in another unit, as they were logged (amperes): masses are that unit times s^2 over
+        the length."""
+        return replace(self, force=unit, mass=f"{unit}*s^2/{self.length}")
+
     def unit(self, unit: str) -> str:
         """The unit on this axis for one of a linear axis: "N*s/m" is "N*m*s/rad" on a rotary one. A unit that is of
         this axis already stays as it is."""
-        if self.length == LENGTH or _TURNED.search(unit):
+        if self.plain or _TURNED.search(unit):
             return unit
         return _BELOW.sub(r"(\1)", _PARTS.sub(self._part, unit))
 
     def text(self, sentence: str) -> str:
         """A sentence with lengths, forces and masses in numbers, on this axis: "0.1 mm" is "0.1 mrad"."""
-        return sentence if self.length == LENGTH else _NUMBERS.sub(lambda match: self.unit(match[0]), sentence)
+        return sentence if self.plain else _NUMBERS.sub(lambda match: self.unit(match[0]), sentence)
 
     def with_units(self, dataset: Any) -> Any:
         """An xarray.Dataset on this axis, the units of whose variables are those of a linear one."""
@@ -55,10 +65,12 @@ class AxisKind:
 
     def suffix(self, key: str) -> str:
         """A key of a JSON document with the unit that it ends with, "force_n", as it is on this axis: "force_n_m"."""
-        if self.length == LENGTH:
+        if self.plain:
             return key
         name, unit = _SUFFIX.fullmatch(key).group("name", "unit")  # type: ignore[union-attr]
-        return name + "".join(_IN_KEYS.get(part, part) for part in re.split("(_)", unit))
+        length, force, mass = (_in_key(text) for text in (self.length, self.force, self.mass))
+        names = {"m": length, "n": force, "ns": f"{force}_s", "kg": mass}
+        return name + "".join(names.get(part, part) for part in re.split("(_)", unit))
 
 
 _TURNED = re.compile(r"rad|N[*· ]m|kg[*· ]m")
@@ -66,7 +78,12 @@ _PARTS = re.compile(r"(?<![A-Za-zµ^])(?P<prefix>[numµkM]??)(?P<base>kg|N|m)(?!
 _BELOW = re.compile(r"(?<=/)(N\*m|kg\*m\^2)")
 _NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z]|[*·]m)(?:/m?s)?")
 _SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
-_IN_KEYS: Mapping[str, str] = {"m": "rad", "n": "n_m", "ns": "n_m_s", "kg": "kg_m2"}
+
+
+def _in_key(unit: str) -> str:
+    """A unit as keys end with it: "kg*m^2" is "kg_m2"."""
+    return unit.lower().replace("^", "").replace("*", "_").replace("/", "_per_")
+
 
 LINEAR = AxisKind("linear")
 ROTARY = AxisKind("rotary", "rad", "N*m", "kg*m^2")

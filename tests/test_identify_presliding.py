@@ -215,6 +215,17 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
     assert np.median(widths) < 0.02
 
 
+def test_damping_found_without_the_viscous_friction_is_its_sum_with_that() -> None:
+    viscous = 0.02 * DAMPING
+    log = shaken()
+    moving = np.gradient(log["position"], DT)
+    slid = record("small", DT, position=log["position"], force=log["force"] + viscous * moving)
+    (damping,) = (one for one in identify([(slid, "presliding")]).estimates if one.name == "friction.bristle_damping")
+    assert damping.value == pytest.approx(DAMPING + viscous, rel=0.01)
+    assert damping.holds(DAMPING)
+    assert damping.value - damping.low > 2 * (damping.high - damping.value)
+
+
 def test_the_stage_file_takes_bristles_and_masses() -> None:
     machine = built(3)
     stage = locked_stage(machine.truth)

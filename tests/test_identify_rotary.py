@@ -73,6 +73,36 @@ def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -
     assert not LENGTHS.search(answer.stderr + " ".join(texts(json.loads(answer.stdout))))
 
 
+@pytest.mark.parametrize(("options", "unit"), [((), "A"), (("--scale", "force=0.08 N/A"), "N")])
+def test_a_break_away_in_amperes_is_answered_in_amperes(break_away: Path, options: tuple[str, ...], unit: str) -> None:
+    """In every text and key, unless the scale to newtons is told; a stage in newtons asks for that."""
+    rows = np.genfromtxt(break_away / "linear.csv", delimiter=",", skip_header=1)
+    csv(break_away / "amperes.csv", "time [s],position [m],current [A]", *(rows * [1, 1, 12.5]).T)
+    told = ("identify", "amperes.csv", "--as", "break-away", "--json", *options)
+    answer = friso_inside(break_away, *told, "--out", f"answer_{unit}")
+    assert answer.returncode == 0, answer.stderr
+    document = json.loads(answer.stdout)
+    (result,) = document["estimates"]
+    static = static_from_ramps(read_log(break_away / "linear.csv")).static.value
+    assert result["unit"] == unit
+    assert result["value"] == pytest.approx(static * (12.5 if unit == "A" else 1), rel=1e-6)
+    assert f"forces_{unit.lower()}" in document["experiments"][0]
+    if unit == "A":
+        stage = Path("examples/thesis_rig.toml").resolve()
+        beside = friso_inside(break_away, *told, "--stage", stage, "--out", "beside")
+        assert beside.returncode == 2
+        assert '--scale force="NUMBER N/A"' in beside.stderr
+
+
+def test_units_of_an_axis_whose_forces_are_in_another_unit() -> None:
+    amperes = LINEAR.per("A")
+    assert [amperes.unit(unit) for unit in ("N", "kN", "N*s/m", "kg", "m/s")] == ["A", "kA", "A*s/m", "A*s^2/m", "m/s"]
+    assert amperes.text("2 mm with 3 N of 5 kg") == "2 mm with 3 A of 5 A*s^2/m"
+    assert [amperes.suffix(key) for key in ("force_n", "rate_n_per_s", "x_m")] == ["force_a", "rate_a_per_s", "x_m"]
+    assert ROTARY.per("V").unit("kg") == "V*s^2/rad"
+    assert ROTARY.suffix("drag_ns_per_m") == "drag_n_m_s_per_rad"
+
+
 def test_a_stage_around_a_rotary_log_is_one_of_a_rotary_axis() -> None:
     log = axis()
     linear, turned = (made_up(one, inverse_model(one, 5.0)) for one in (log, replace(log, axis=ROTARY)))
@@ -89,6 +119,12 @@ def test_logs_and_stage_are_of_one_kind_of_axis(refused: Refused) -> None:
         axis_of_all([log, replace(log, name="other", axis=ROTARY)], None)
     with refused("--axis"):
         axis_of_all([replace(log, axis=ROTARY)], friso.load("examples/emps_axis.toml"))
+
+
+def test_forces_of_all_logs_are_in_one_unit(refused: Refused) -> None:
+    log = axis()
+    with refused("force"):
+        axis_of_all([log, replace(log, name="other", axis=LINEAR.per("A"))], None)
 
 
 def test_a_kind_of_axis_that_is_none_is_refused(tmp_path: Path, refused: Refused) -> None:

@@ -17,7 +17,7 @@ from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
 from friso.identification.method import Identification, Prediction, axis_of_all, check_predictions
-from friso.identification.sources import LogFile, read_all
+from friso.identification.sources import LogFile, per_unit_of_force, read_all
 from friso.intervals import Span
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
@@ -178,6 +178,7 @@ def identify(
     paths, other_paths = paths_of(logs), paths_of(predict)
     inputs = read_all([*paths, *other_paths], options, folder)
     keep({file.path: file.mapping for file in inputs})
+    inputs = [per_unit_of_force(file, assumed) for file in inputs]
     axis_kind = axis_of_all([file.source for file in inputs], assumed)
     speak_of(axis_kind)
     sources = [(file.source, file.kind) for file in inputs[: len(paths)]]

@@ -110,7 +110,8 @@ class ExperimentKind(Generic[Result]):
     `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
     about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
     uses. `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the
-    last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts). `partial`: whether a log
+    last. `si`: they have to be in SI units, but for the `foreign` ones (a force in volts); where the kind is
+    `per_unit`, its analysis is the same whatever the unit of the force, and then one per volt. `partial`: whether a log
     shows too little for a result of its own, such as one event; logs like that count as one log with gaps. `together`:
     all its logs are realisations of one experiment; `responses`: it takes frequency responses as somebody measured
     them, too. `claims` says why a log without a stated kind may be of this one, or None, `claims_together` the same of
@@ -126,6 +127,7 @@ class ExperimentKind(Generic[Result]):
     roles: tuple[str, ...] = ("position", "force")
     si: bool = True
     foreign: tuple[str, ...] = ()
+    per_unit: bool = False
     partial: Callable[[Log], bool] = lambda log: False
     together: bool = False
     responses: bool = False

@@ -138,6 +138,9 @@ def axis_of_all(sources: Sequence[Source], base: Stage | None) -> AxisKind:
         kinds = {base.name: base.axis_kind, **kinds}
     first = next(iter(kinds.values()), LINEAR)
     for name, kind in kinds.items():
+        if kind.force != first.force and kind.length == first.length:
+            example = f'--scale force="NUMBER {first.force}/{kind.force}"'
+            raise InputError("force", f"a force in {kind.force}", f"one in {first.force}, as beside it", example, name)
         if kind != first:
             actual = f"a {kind.name} axis, beside a {first.name} one"
             raise InputError("--axis", actual, "one kind of axis throughout", f"--axis {first.name}", name)

@@ -16,6 +16,7 @@ from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, pla
 from friso.identification.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
+from friso.stage import Stage
 
 MOVED = ("position", "force")
 """Roles by which the kind of an experiment is recognised."""
@@ -87,6 +88,22 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
                 for number, file in enumerate(files)
             ]
     return files
+
+
+def per_unit_of_force(file: LogFile, base: Stage | None) -> LogFile:
+    """A file whose force is not in newtons, of a kind that is analysed per unit of it: as a log on an axis with forces
+    in that unit. Raises InputError beside a stage, whose numbers are in newtons."""
+    unit = file.source.units.get("force") if isinstance(file.source, Log) else None
+    if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
+        return file
+    if base is not None:
+        newtons = base.axis_kind.force
+        example = f'--scale force="NUMBER {newtons}/{unit}"'
+        raise InputError(
+            "force", f"a channel in {unit}, beside a stage", f"its factor to {newtons}", example, str(file.path)
+        )
+    units = {role: text for role, text in file.source.units.items() if role != "force"}
+    return replace(file, source=replace(file.source, axis=file.source.axis.per(unit), units=units))
 
 
 def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:

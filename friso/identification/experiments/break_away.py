@@ -151,5 +151,7 @@ KIND = ExperimentKind[BreakAway](
     analyse=_analyse,
     estimates=lambda result, stage: (replace(result.static, name="friction.static"),),
     after=("frequency", "moves"),
+    foreign=("force",),
+    per_unit=True,
     partial=lambda log: len(static_from_ramps(log).times) < FEW,
 )

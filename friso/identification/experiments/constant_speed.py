@@ -71,6 +71,8 @@ KIND = ExperimentKind[FrictionAtSpeeds](
     _estimates,
     _correlated,
     after=("frequency", "moves"),
+    foreign=("force",),
+    per_unit=True,
     partial=_partial,
     claims=lambda course: _claims_together([course]),
     claims_together=_claims_together,

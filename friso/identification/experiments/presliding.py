@@ -63,6 +63,11 @@ UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
 
+VISCOUS = 0.05
+"""Share of the damping of bristles that viscous friction has at most (our choice; of the thesis's rig it is 0.2 %)."""
+
+SUM = "Viscous friction is not known: what there is of it counts as damping of the bristles, and the interval allows."
+
 
 @dataclass(frozen=True)
 class Presliding:
@@ -228,7 +233,14 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
     (log,) = logs
     assert isinstance(log, Log)
-    return bristles_from_presliding(log, believed_between(prior, log))
+    result = bristles_from_presliding(log, believed_between(prior, log))
+    return result if "friction.viscous" in prior.believed(log) else with_viscous_friction(result)
+
+
+def with_viscous_friction(result: Presliding) -> Presliding:
+    """The same where viscous friction is not known: the damping found is its sum with that of the bristles."""
+    damping = replace(result.damping, low=(1 - VISCOUS) * result.damping.low)
+    return replace(result, damping=damping, warnings=(*result.warnings, SUM))
 
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
@@ -244,4 +256,11 @@ def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated
     return certain, result.correlation[np.ix_(rows, rows)]
 
 
-KIND = ExperimentKind[Presliding](_analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"))
+KIND = ExperimentKind[Presliding](
+    _analyse,
+    _estimates,
+    _correlated,
+    after=("constant-speed", "frequency", "moves"),
+    foreign=("force",),
+    per_unit=True,
+)

@@ -8,6 +8,7 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from friso.axis import KINDS as AXES
 from friso.axis import axis_shown, unit_shown
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
@@ -98,6 +99,10 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
 def _why_no_stage(identification: Identification) -> str:
     if identification.failed or nothing_learnt(identification.estimates, False):
         return NOTHING_HOLDS
+    shown = axis_shown()
+    if shown != AXES[shown.name]:
+        newtons = AXES[shown.name].force
+        return f'{NO_NEWTONS.format(newtons)} --scale force="NUMBER {newtons}/{shown.force}" tells it.'
     logs = [log for experiment in identification.experiments for log in experiment.logs if isinstance(log, Log)]
     around = any(KINDS[experiment.kind].around is not None for experiment in identification.experiments)
     return NO_NEWTONS.format(unit_shown("N")) if around and any("force" in log.units for log in logs) else NO_STAGE
