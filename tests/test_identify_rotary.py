@@ -75,11 +75,11 @@ def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -
 
 @pytest.mark.parametrize(("options", "unit"), [((), "A"), (("--scale", "force=0.08 N/A"), "N")])
 def test_a_break_away_in_amperes_is_answered_in_amperes(break_away: Path, options: tuple[str, ...], unit: str) -> None:
-    """In every text and key, unless the scale to newtons is told; a stage in newtons asks for that."""
+    """In every text and key, unless the scale to newtons is command; a stage in newtons asks for that."""
     rows = np.genfromtxt(break_away / "linear.csv", delimiter=",", skip_header=1)
     csv(break_away / "amperes.csv", "time [s],position [m],current [A]", *(rows * [1, 1, 12.5]).T)
-    told = ("identify", "amperes.csv", "--as", "break-away", "--json", *options)
-    answer = friso_inside(break_away, *told, "--out", f"answer_{unit}")
+    command = ("identify", "amperes.csv", "--as", "break-away", "--json", *options)
+    answer = friso_inside(break_away, *command, "--out", f"answer_{unit}")
     assert answer.returncode == 0, answer.stderr
     document = json.loads(answer.stdout)
     (result,) = document["estimates"]
@@ -89,7 +89,7 @@ def test_a_break_away_in_amperes_is_answered_in_amperes(break_away: Path, option
     assert f"forces_{unit.lower()}" in document["experiments"][0]
     if unit == "A":
         stage = Path("examples/thesis_rig.toml").resolve()
-        beside = friso_inside(break_away, *told, "--stage", stage, "--out", "beside")
+        beside = friso_inside(break_away, *command, "--stage", stage, "--out", "beside")
         assert beside.returncode == 2
         assert '--scale force="NUMBER N/A"' in beside.stderr
 

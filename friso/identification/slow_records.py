@@ -33,26 +33,26 @@ def without_what_is_too_slow(
     and of Coulomb friction: dry friction there, of which the latter is at least a quarter. A mass is not shown where
     its inertia is less than what the model leaves, noise apart: any of that passes for inertia.
     """
-    known = {estimate.name: estimate for estimate in estimates if estimate.determined}
+    determined = {estimate.name: estimate for estimate in estimates if estimate.determined}
     reasons: dict[str, str] = {}
     top = float(np.abs(moved.velocity).max())
     if (
         "friction.stribeck_velocity" in flat
         and top < stribeck_up_to(flat)
-        and "friction.stribeck_velocity" not in known
+        and "friction.stribeck_velocity" not in determined
     ):
-        level = known.get("friction.coulomb")
+        level = determined.get("friction.coulomb")
         dry = f": {level.value:.3g} {unit} is dry friction there" if level else ""
         why = f"the log moves at {top * 1e3:.3g} mm/s at most, where the Stribeck effect may still act{dry}"
         reasons = dict.fromkeys(SLIDING, why)
-    masses = [name for name in ("masses.cart", "masses.stage") if name in known]
-    inertia = sum(known[name].value for name in masses) * float(np.sqrt(np.mean(moved.acceleration[counted] ** 2)))
+    masses = [name for name in ("masses.cart", "masses.stage") if name in determined]
+    inertia = sum(determined[name].value for name in masses) * float(np.sqrt(np.mean(moved.acceleration[counted] ** 2)))
     unexplained = quality.left * quality.lacking
     if masses and inertia < unexplained:
         left = f"{unexplained:.2g} {unit}"
         why = f"its inertia, {inertia:.2g} {unit}, is less than what the model leaves unexplained, {left}"
         reasons |= dict.fromkeys(masses, why)
-    kept = [name not in reasons for name in known]
+    kept = [name not in reasons for name in determined]
     answers = tuple(_withdrawn(estimate, reasons.get(estimate.name, "")) for estimate in estimates)
     return answers, correlation[np.ix_(kept, kept)]
 

@@ -48,6 +48,8 @@ _SPELLINGS = {
     "Ampere": "A",
     "Newton": "N",
     "hz": "Hz",
+    "rev": "turn",
+    "revs": "turn",
 }
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"

@@ -23,12 +23,12 @@ def drawn_from(
     logarithms evenly; a parameter without a finite range stays as it was fitted.
     """
     rng = np.random.default_rng(SEED)
-    known = [estimate for estimate in estimates if estimate.determined]
-    roots = np.linalg.cholesky(correlation + 1e-9 * np.eye(len(known)))
-    steps = rng.standard_normal((DRAWS, len(known))) @ roots.T
+    determined = [estimate for estimate in estimates if estimate.determined]
+    sizes, ways = np.linalg.eigh(correlation)
+    steps = rng.standard_normal((DRAWS, len(determined))) @ (ways * np.sqrt(np.clip(sizes, 0.0, None))).T
     values = {
         estimate.name: np.clip(estimate.value + step * estimate.half_width / COVERAGE, estimate.low, estimate.high)
-        for estimate, step in zip(known, steps.T, strict=True)
+        for estimate, step in zip(determined, steps.T, strict=True)
     }
     for estimate in estimates:
         if not estimate.determined and 0 < estimate.low < estimate.high < np.inf:
