@@ -143,7 +143,7 @@ def _prediction_sentence(simulated: SimulatedLog) -> str:
     return (
         f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
         f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; machines within the "
-        f"intervals differ from it by up to {percent(simulated.apart)} in position."
+        f"intervals differ from it by up to {percent(simulated.apart)} of the position."
     )
 
 
