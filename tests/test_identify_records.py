@@ -78,9 +78,11 @@ def test_each_stretch_between_gaps_is_integrated_from_0(tmp_path: Path) -> None:
 
 def test_a_velocity_is_not_integrated_beside_what_may_be_the_position(tmp_path: Path, refused: Refused) -> None:
     log = axis()
-    path = csv(tmp_path / "qm.csv", "time [s],velocity [m/s],qm [m]", log.time, log["velocity"], log["position"])
+    names, place = "time [s],velocity [m/s],qm [m]", log["position"]
+    path = csv(tmp_path / "qm.csv", names, log.time, log["velocity"], place)
+    assert NOTE not in read_log(path).warnings
     with refused("position"):
-        read_log(path)
+        read_log(csv(tmp_path / "two.csv", f"{names},qn [m]", log.time, log["velocity"], place, place))
     assert NOTE not in read_log(path, Mapping(roles={"position": "qm"})).warnings
     assert NOTE in read_log(path, Mapping(roles={"velocity": "velocity"})).warnings
 

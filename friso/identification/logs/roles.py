@@ -167,7 +167,8 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
         else:
             channel, word = matches[0]
             chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
-    for role in _TOLD_BY_UNIT.keys() - {*chosen, *rivals}:
+    integrated = {"position"} if "velocity" in assigned else set()
+    for role in _TOLD_BY_UNIT.keys() - {*chosen, *rivals, *integrated}:
         channel = _only_one(role, table, [choice.channel for choice in chosen.values()])
         if channel is not None:
             chosen[role] = AssignedRole(role, channel, f"the only channel in {channel.unit} without a role", False)
