@@ -434,6 +434,16 @@ def test_the_edge_of_hunting_is_drawn_over_a_map(served: Served, monkeypatch: py
     assert layout["xaxis"]["type"] == layout["yaxis"]["type"] == "log"
 
 
+def test_a_map_stays_where_there_is_no_edge(served: Served) -> None:
+    """A stage that cannot hunt: `friso.boundary` refuses it, in words that stand below the map."""
+    axes = {"x": "masses.stage=0.8 kg..1.2 kg", "y": "friction.static=6 N..12 N"}
+    part = served.ask("map", STICK_SLIP, **axes, edge=True)[-1]
+    assert part["kind"] == "answer"
+    assert part["figures"]
+    assert "cannot hunt" in part["sentences"][-1]
+    assert "log" not in part["command"] + part["python"]
+
+
 def test_a_report_has_page_figures_document_and_stage_file(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
     part = served.ask("check.zip", STICK_SLIP)[-1]

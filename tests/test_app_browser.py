@@ -291,9 +291,10 @@ def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
 def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     browsed.page.emulate_media(color_scheme=scheme)
-    for tab in ("run", "map", "remedies", "logs"):
+    there = {"run": ".plot .main-svg", "map": ".plot .heatmaplayer image", "remedies": "#tune", "logs": ".drop"}
+    for tab, content in there.items():
         browsed.page.click(f"#tab-{tab}")
-        browsed.page.wait_for_timeout(300)
+        browsed.page.wait_for_selector(f"#picture {content}", timeout=60_000)
         violations = axe.run(browsed.page).response["violations"]
         assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
 

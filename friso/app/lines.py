@@ -16,7 +16,7 @@ def command_line(command: str, machine: Machine, options: Mapping[str, Any]) -> 
     words = ["friso", command, machine.name]
     for name, value in [*sets, *options.items()]:
         option = f"--{name.strip('_').replace('_', '-')}"
-        words += [] if value is False else [option] if value is True else [option, str(value)]
+        words += [option] if value is True else [option, str(value)]
     return " ".join(map(shell_word, words))
 
 

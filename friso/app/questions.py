@@ -27,6 +27,7 @@ from friso.views.drawing.figure import Figure
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
+    from friso.answers.sweep import SweepAnswer
     from friso.app.work import Work
 
 AnswerPart = dict[str, Any]
@@ -157,27 +158,35 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     stands = [("this machine", asked.machine.stage)]
     stands += [("pinned", asked.pinned.stage)] if asked.pinned else []
 
-    edge: Answer | None = None
+    def ranges(count: int) -> dict[str, Any]:
+        return {name: f"{text}:{count}" for name, text in axes.items()}
 
-    def drawn(figure: Figure) -> Figure:
-        return with_edge(with_places(figure, stands, [*keys.values()]), edge)
+    def swept(count: int) -> SweepAnswer:
+        return friso.sweep(asked.machine.stage, **ranges(count), **shown, progress=work.progress)
 
-    def part(count: int) -> AnswerPart:
-        ranges: dict[str, Any] = {name: f"{text}:{count}" for name, text in axes.items()}
-        answer = friso.sweep(asked.machine.stage, **ranges, **shown, progress=work.progress)
+    def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
+        def drawn(figure: Figure) -> Figure:
+            return with_edge(with_places(figure, stands, [*keys.values()]), edge)
+
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
-        more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges, **shown}, "sweep")}
+        more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges(count), **shown}, "sweep")}
         return parts_of(asked, answer, drawn, **more)
 
     *coarse, finest = COARSE_TO_FINE
     for count in coarse:
-        yield {**part(count), "kind": "partly"}
-    whole = part(finest)
+        yield {**part(swept(count), count), "kind": "partly"}
+    answer = swept(finest)
+    whole = part(answer, finest)
     if options.get("edge"):
         yield {**whole, "kind": "partly"}
-        edge = friso.boundary(asked.machine.stage, x=axes["x"], y=axes["y"], log=shown["log"], progress=work.progress)
-        whole = part(finest)
-        whole["sentences"] += edge.sentences()
+        try:
+            edge = friso.boundary(
+                asked.machine.stage, x=axes["x"], y=axes["y"], log=shown["log"], progress=work.progress
+            )
+            whole = part(answer, finest, edge)
+            whole["sentences"] += edge.sentences()
+        except InputError as error:  # such as a stage that cannot hunt: its map is shown all the same
+            whole["sentences"] += [str(error)]
     yield whole
 
 
@@ -291,7 +300,7 @@ def report(function: Callable[..., Answer], asked: PageRequest, work: Work) -> I
 def _lines(
     command: str, asked: PageRequest, options: Mapping[str, Any] | None = None, function: str = ""
 ) -> AnswerPart:
-    chosen = options or {}
+    chosen = {name: value for name, value in (options or {}).items() if value is not False}
     line = python_line(function or command, asked.machine, chosen)
     of = "the stage file saved here" if asked.machine.is_of_page else f"{asked.machine.name} as it was opened"
     return {"command": command_line(command, asked.machine, chosen), "python": line, "of": of}

@@ -128,6 +128,7 @@ export class Pictures {
   arrived(answer) {
     if (answer.kind === "message" || answer.kind === "progress") return this.tell.progress(answer);
     if (answer.kind === "refused" || answer.kind === "failed") {
+      this.tell.progress(null);
       this.below.replaceChildren(...paragraphs([answer.text]));
       if (!this.plots.children.length) return;
       return stale($("picture"));
@@ -159,18 +160,28 @@ export class Pictures {
       this.timer = setTimeout(() => this.ask(), AT_REST);
     };
     const metric = el("select", { id: "metric" }, ...["outcome", "verdict", "peak_to_peak", "settling_time", "largest_force"].map((name) => el("option", { value: name }, words(name))));
-    const log = el("input", { id: "log", type: "checkbox", checked: chosen.every((key) => key.range.log) });
-    const edge = el("input", { id: "edge", type: "checkbox" });
-    const metrics = this.shown === "map" ? [el("label", {}, "Shown", metric), el("label", { class: "tick" }, edge, "Edge of hunting (about a minute)")] : [];
-    const form = el("div", { class: "form" }, ...fields.flatMap((item) => item.elements), el("label", { class: "tick" }, log, "Logarithmic"), ...metrics);
+    const log = this.tick("log", () => fields.every((item) => numeric.find((key) => key.path === item.key.value).range.log));
+    const edge = this.tick("edge", () => false);
+    for (const item of fields) item.key.addEventListener("change", log.again);
+    const metrics = this.shown === "map" ? [el("label", {}, "Shown", metric), el("label", { class: "tick" }, edge.box, "Edge of hunting (about a minute)")] : [];
+    const form = el("div", { class: "form" }, ...fields.flatMap((item) => item.elements), el("label", { class: "tick" }, log.box, "Logarithmic"), ...metrics);
     form.addEventListener("change", start);
     place.append(form);
     return () => {
       this.kept.set("axes", fields.map((item) => item.key.value));
       const options = Object.fromEntries(fields.map((item, k) => ["xy"[k], `${item.key.value}=${item.low.value}..${item.high.value}`]));
-      const ranges = { ...options, log: log.checked };
-      return this.shown === "map" ? { ...ranges, metric: metric.value, edge: edge.checked } : ranges;
+      const ranges = { ...options, log: log.box.checked };
+      return this.shown === "map" ? { ...ranges, metric: metric.value, edge: edge.box.checked } : ranges;
     };
+  }
+
+  /** A tick that stays as the user sets it, and is `usual` until he does. */
+  tick(id, usual) {
+    const box = el("input", { id, type: "checkbox" });
+    const again = () => (box.checked = this.kept.get(id) ?? usual());
+    box.addEventListener("change", () => this.kept.set(id, box.checked));
+    again();
+    return { box, again };
   }
 
   axis(numeric, chosen, name) {
