@@ -84,8 +84,9 @@ class Starts:
             self._add(owners, stuck(self.stages.take(owners), distances[owners, which]))
 
     def seen(self, owner: int, state: np.ndarray) -> None:
-        """In a state (kept,) in which a run of the stage with a number ended, and farther from and nearer to rest."""
-        states = np.outer(1 + np.array([0.0, *ASIDE]), state[: self.stages.kernel.initial_size])
+        """Farther from and nearer to rest than a state (kept,) in which a run of the stage with a number ended; on from
+        there itself, a run might stay on a cycle that hardly repels."""
+        states = np.outer(1 + np.array(ASIDE), state[: self.stages.kernel.initial_size])
         self._add(np.full(len(states), owner), states)
 
     def _add(self, owners: np.ndarray, states: np.ndarray) -> None:

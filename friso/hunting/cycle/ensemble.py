@@ -124,13 +124,15 @@ class Ensemble:
 
     @cached_property
     def balancing(self) -> np.ndarray:
-        """Force of the actuator that balances the constant forces on a stage [N], shape (count,)."""
+        """Force of the actuator [N] about which a stage sticks, shape (count,): none where friction alone holds the
+        constant forces, else what balances them."""
         constant = sum(np.asarray(self.flat[f"bias.{name}"]) for name in self.structure.biased)
-        return np.broadcast_to(-constant, (self.count,)).astype(float)
+        held = np.abs(constant) < self.number("breakaway")
+        return np.where(held, 0.0, -constant) + np.zeros(self.count)
 
     def unbalanced(self, states: np.ndarray) -> np.ndarray:
-        """By how much the integrators are off the state in which the actuator balances the constant forces on a stage
-        at rest where it sticks, shape (count,), in states (count, states)."""
+        """By how much the integrators are off the state in which the actuator balances what friction does not hold of
+        the constant forces on a stage at rest where it sticks, shape (count,), in states (count, states)."""
         balanced = self.relaxed * states[:, self.sticking] + self.per_newton * self.balancing
         return states[:, self.integral] - balanced
 

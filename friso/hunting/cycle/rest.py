@@ -10,8 +10,8 @@ from friso.hunting.cycle.ensemble import Ensemble
 
 def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
     """States, shape (count, states), of stages at rest that are displaced [m] (count,), the bristles relaxed and the
-    integrator such that the actuator balances constant forces, and exerts none without these; but integrals of outer
-    loops have `wound` up for a time [s].
+    integrator such that the actuator exerts no force, or balances constant forces that friction does not hold; but
+    integrals of outer loops have `wound` up for a time [s].
 
     A stage that sticks winds up from here until it breaks away, and has forgotten by then how it came to stick: these
     states are a line through all hunting cycles with sticking, and the distance to the reference alone tells what
