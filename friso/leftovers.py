@@ -3,15 +3,55 @@ a leftover."""
 
 from __future__ import annotations
 
+import errno
 import shutil
 import stat
+import tempfile
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from friso.system import foreign_writers
+from friso.system import MOVES_OPEN_FOLDERS, foreign_writers
+
+YOUNG = 60.0
+"""Age [s] up to which a folder is no leftover: its process may be about to lock it."""
+
+_TRIES = 3
+
+
+@contextmanager
+def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
+    """A new folder that only this user may open, locked and thus no leftover within, and removed in the end. Raises
+    OSError."""
+    folder, held = _made_and_locked(root, prefix, lock, _TRIES)
+    try:
+        yield folder
+    finally:
+        held.release()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
+    """The folder and its lock. Before that is held another process may remove the folder, and filelock makes it again,
+    for others to read: then it is another folder that is tried."""
+    folder = Path(tempfile.mkdtemp(prefix=prefix, dir=root))
+    held = FileLock(folder / lock)
+    try:
+        made = folder.lstat()
+        held.acquire()
+        now = folder.lstat()
+        if (now.st_mode, now.st_uid) != (made.st_mode, made.st_uid):  # inodes are used again, or change on a network
+            raise FileNotFoundError(errno.ENOENT, "another process removed it", str(folder))
+        return folder, held
+    except BaseException as error:
+        held.release()
+        shutil.rmtree(folder, ignore_errors=True)
+        if isinstance(error, FileNotFoundError) and tries > 1:
+            return _made_and_locked(root, prefix, lock, tries - 1)
+        raise
 
 
 def is_leftover(folder: Path, lock: str) -> bool:
@@ -25,7 +65,7 @@ def remove_leftover(folder: Path, lock: str) -> None:
     with _unless_locked(folder, lock) as free:
         if free:
             shutil.rmtree(folder, ignore_errors=True)
-    if free and folder.exists():  # Windows deletes no file that is open, such as the lock
+    if free and not MOVES_OPEN_FOLDERS:  # where a file that is open stays, such as the lock
         with suppress(OSError):
             (folder / lock).unlink(missing_ok=True)
             folder.rmdir()
@@ -33,13 +73,14 @@ def remove_leftover(folder: Path, lock: str) -> None:
 
 def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
     """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; what others put
-    there, to have a lock made in a folder of this user, stays."""
+    there, to have a lock made in a folder of this user, stays, and what is young."""
     for folder in root.glob(f"{prefix}*"):
         try:
             status = folder.lstat()
         except OSError:  # another process was quicker
             continue
-        if stat.S_ISDIR(status.st_mode) and not foreign_writers(status):
+        old = time.time() - status.st_mtime > YOUNG
+        if old and stat.S_ISDIR(status.st_mode) and not foreign_writers(status):
             remove_leftover(folder, lock)
 
 

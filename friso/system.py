@@ -21,11 +21,16 @@ def _quoted(word: str) -> str:
     return re.sub(r"([\w.]+=)?(.*)", r'\1"\2"', word, count=1, flags=re.DOTALL)
 
 
+def path_of(error: OSError) -> str:
+    """The path at which an error arose, of two the one to be written; "" where there is none."""
+    path = error.filename2 or error.filename
+    return os.fsdecode(path) if isinstance(path, str | bytes | os.PathLike) else ""
+
+
 if sys.platform == "win32":
     import _thread
     import ctypes
     import errno
-    import subprocess
 
     PATIENCE = 2.0
     """How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
@@ -86,25 +91,30 @@ if sys.platform == "win32":
         return next((part for part in path.parts if part.split(".")[0].rstrip().upper() in _DEVICES), "")
 
     def shell_word(word: str) -> str:
-        """A word of a command as cmd and PowerShell take it: cmd knows no quotes but "..."."""
+        """A word of a command as cmd and PowerShell take it: cmd knows no quotes but "...". Within these cmd still
+        replaces %NAME%, and PowerShell $NAME and what follows a backtick: no quotes keep such a word in both."""
         if re.fullmatch(r"[\w.:/\\=+-]+", word):
             return word
-        if word and '"' not in word and not word.endswith("\\"):
-            return _quoted(word)
-        text = subprocess.list2cmdline([word])
-        return text if text.startswith('"') else f'"{text}"'
+        return _quoted(re.sub(r'(\\*)(?="|\Z)', r"\1\1", word).replace('"', '\\"'))
 
-    def is_closed_pipe(error: BaseException) -> bool:
-        """Whether what is written is no longer read. Windows calls that an invalid argument, which of a file has a
-        name."""
-        return isinstance(error, OSError) and error.errno in (errno.EPIPE, errno.EINVAL) and error.filename is None
+    @contextmanager
+    def closed_pipes_told() -> Iterator[None]:
+        """Writing within to a stream that nobody reads any more raises BrokenPipeError: Windows calls it an invalid
+        argument."""
+        try:
+            yield
+        except OSError as error:
+            if error.errno == errno.EINVAL:
+                raise BrokenPipeError(errno.EPIPE, "nobody reads it any more") from error
+            raise
 
     def cause_of(error: OSError) -> str:
         """Why a file or a folder could not be used. Of a path that is too long Windows says that it is not there."""
-        cause, length = error.strerror or str(error), len(os.path.abspath(error.filename or ""))
+        cause, path = error.strerror or str(error), path_of(error)
+        length = len(os.path.abspath(path)) if path else 0
         if length <= _LONGEST or not isinstance(error, FileNotFoundError):
             return cause
-        return f"{cause}; a path of {length} characters, which Windows takes with long paths switched on alone"
+        return f"{cause}; a path of {length} characters, which Windows takes only if long paths are enabled"
 
     def foreign_writers(status: os.stat_result) -> str:
         """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
@@ -156,9 +166,10 @@ else:
             return word
         return shlex.quote(word) if set('"$`\\!') & set(word) or not word else _quoted(word)
 
-    def is_closed_pipe(error: BaseException) -> bool:
-        """Whether what is written is no longer read."""
-        return isinstance(error, BrokenPipeError)
+    @contextmanager
+    def closed_pipes_told() -> Iterator[None]:
+        """Writing within to a stream that nobody reads any more raises BrokenPipeError, as it does anyway."""
+        yield
 
     def cause_of(error: OSError) -> str:
         """Why a file or a folder could not be used."""

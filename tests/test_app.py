@@ -8,6 +8,7 @@ import errno
 import http.client
 import io
 import json
+import os
 import socket
 import struct
 import threading
@@ -328,6 +329,8 @@ def test_what_a_killed_server_left_goes_with_the_next(tmp_path: Path, monkeypatc
     left, alive = tmp_path / f"{uploads.PREFIX}left", uploads.Uploads()
     (left / "1").mkdir(parents=True)
     (left / "1" / "log.csv").write_bytes(b"1")
+    for folder in (left, alive.folder):
+        os.utime(folder, (0, 0))
     second = uploads.Uploads()
     assert {*tmp_path.iterdir()} == {alive.folder, second.folder}
     alive.remove()

@@ -13,6 +13,7 @@ from inside import friso_inside
 from refusals import Refused
 
 import friso
+from friso.cli.app import _failed
 from friso.hunting.cycle.find import NO_RETURN
 
 ROOT = Path(__file__).parent.parent
@@ -148,3 +149,12 @@ def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     document = json.loads(run("check", RIG, "--json", *wild).stdout)
     assert document["cases"]["given"]["verdict"] == "failed"
     assert document["cases"]["given"]["peak_to_peak_m"] is None
+
+
+def test_what_comes_next_can_be_copied(tmp_path: Path) -> None:
+    assert 'then: friso check "my stage.toml"' in run("init", "my stage.toml", cwd=tmp_path).stdout
+
+
+def test_a_failed_rename_names_its_target(capsys: pytest.CaptureFixture[str]) -> None:
+    assert _failed(PermissionError(13, "Permission denied", "draft", None, "page.html")) == 1
+    assert capsys.readouterr().err.rstrip().endswith("Permission denied: page.html")

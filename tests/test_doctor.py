@@ -27,6 +27,19 @@ def test_a_long_text_in_a_table_leaves_room_for_the_names(capsys: pytest.Capture
     assert "processor" in capsys.readouterr().out
 
 
+def test_a_name_as_wide_as_the_terminal_leaves_room_for_the_others(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    name = "".join(chr(ord("A") + k % 26) for k in range(80))
+    print_table("", ["Unit", "Role"], [(name, ["um", "position"])])
+    lines = capsys.readouterr().out.splitlines()
+    first = "".join(line.split("│")[1].strip() for line in lines if line.startswith("│"))
+    assert first == name
+    assert max(map(len, lines)) <= 80
+    assert {"um", "position"} <= {*"".join(lines).split()}
+
+
 def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
     from friso.engine.cache import cache_folder
 

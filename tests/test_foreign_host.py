@@ -191,12 +191,19 @@ def test_what_windows_alone_calls_otherwise(axis: Path) -> None:
 WORDS = r"""
 from friso.app.names import plain_name
 from friso.engine import building
-from friso.system import shell_word
+from friso.system import cause_of, path_of, shell_word
 
 assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
 assert shell_word("position=Act Pos") == 'position="Act Pos"'
 assert shell_word("a&b,c") == '"a&b,c"'
 assert shell_word(r"C:\logs\x.csv") == r"C:\logs\x.csv"
+assert shell_word("a,b\\") == r'"a,b\\"'
+assert shell_word('a\\"b') == r'"a\\\"b"'
+assert shell_word("") == '""'
+
+assert cause_of(OSError(22, "Invalid argument", 3)) == "Invalid argument"
+moved = FileNotFoundError(2, "none", "a", 3, "b" * 300)
+assert cause_of(moved).endswith("only if long paths are enabled") and path_of(moved) == "b" * 300
 
 class Request:
     builder, task = "none", b"0" * 100_000

@@ -510,6 +510,6 @@ def test_an_interrupted_guideline_says_what_is_kept_and_leaves_nothing_else(
     with pytest.raises(SystemExit) as left:
         main()
     assert left.value.code == 130
-    assert ("1 parts" in capsys.readouterr().err) == bool(parts)
+    assert ("1 part of the sweeps is kept" in capsys.readouterr().err) == bool(parts)
     assert len([*tmp_path.rglob("*.npz")]) == parts
     assert (tmp_path / "new").exists() == bool(parts)

@@ -238,6 +238,7 @@ def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -
     left = [folder / f"{DRAFTS}left" for folder in (tmp_path, tmp_path / "out", tmp_path / "out" / "a")]
     for draft in left:
         draft.mkdir(mode=0o700)
+        os.utime(draft, (0, 0))
     write({tmp_path / "out" / "a" / "page.html": None})
     assert not any(draft.exists() for draft in left)
 
@@ -249,8 +250,10 @@ def test_what_others_may_have_put_there_is_no_draft(tmp_path: Path) -> None:
     mine.mkdir(mode=0o700)
     (mine / "lock").write_text("precious")
     (tmp_path / f"{DRAFTS}link").symlink_to(mine)
+    os.utime(tmp_path / f"{DRAFTS}link", (0, 0), follow_symlinks=False)
     (tmp_path / f"{DRAFTS}open").mkdir()
     (tmp_path / f"{DRAFTS}open").chmod(0o777)
+    os.utime(tmp_path / f"{DRAFTS}open", (0, 0))
     write({tmp_path / "page.html": ""})
     assert (mine / "lock").read_text() == "precious"
     assert [*(tmp_path / f"{DRAFTS}open").iterdir()] == []
@@ -281,6 +284,8 @@ def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
         draft.mkdir(mode=0o700)
         (draft / "0.txt").write_text("half")
     with FileLock(alive / "lock"):
+        for draft in (left, alive):
+            os.utime(draft, (0, 0))
         write(contents(folder))
     assert (left.exists(), alive.exists()) == (False, True)
 

@@ -159,8 +159,9 @@ def test_overrides_of_another_type_are_refused(changes: object) -> None:
 
 @pytest.mark.parametrize("elements", ["6", b"3", None, True, 2.5, pytest.param(10**5000, id="long")])
 def test_a_whole_number_of_another_type_is_refused(elements: object) -> None:
-    with pytest.raises(InputError):
+    with pytest.raises(InputError) as refusal:
         friso.convert(EXAMPLES / "thesis_rig.toml", "gms", elements=elements)  # type: ignore[arg-type]
+    assert ("from 1 to 12" in refusal.value.expected) == (type(elements) is int)
 
 
 @pytest.mark.parametrize(

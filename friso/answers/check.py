@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, correlations_of, read_stage, tolerance_of, whole_number
+from friso.answers.inputs import Changes, StageLike, Whole, correlations_of, read_stage, tolerance_of, whole_number
 from friso.engine.simulate import simulate
 from friso.errors import InputError
 from friso.hunting.check import LONG, RTOL, Case
@@ -124,8 +124,8 @@ def check(
     rtol: float | str = RTOL,
     *,
     set: Changes = None,
-    draws: int | None = None,
-    seed: int = 0,
+    draws: Whole | None = None,
+    seed: Whole = 0,
     laws: bool = False,
     progress: Progress = silent,
 ) -> CheckAnswer:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, read_stage, stem_of, whole_number
+from friso.answers.inputs import Changes, StageLike, Whole, read_stage, stem_of, whole_number
 from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def convert(
     stage: StageLike,
     friction: str,
     *,
-    elements: int = 6,
+    elements: Whole = 6,
     set: Changes = None,
     progress: Progress = silent,
 ) -> ConvertAnswer:

@@ -15,6 +15,7 @@ from friso.design_method.prepare import assumed, by_rules
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
+from friso.system import shell_word
 
 if TYPE_CHECKING:
     from friso.views.drawing.figure import Figure
@@ -54,7 +55,7 @@ class DesignAnswer(Answer):
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """The check of the design."""
-        return [f"friso check {files[0]}"] if files else []
+        return [f"friso check {shell_word(str(files[0]))}"] if files else []
 
     def figures(self) -> Sequence[Figure]:
         """Window of crossovers, leaves, map of hunting, moves."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from functools import partial
@@ -13,10 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from filelock import FileLock
-
 from friso.interrupts import hold_interrupts
-from friso.leftovers import remove_leftovers
+from friso.leftovers import locked_folder, remove_leftovers
 from friso.system import replace_file
 
 if TYPE_CHECKING:
@@ -36,7 +33,7 @@ class Drafts:
 
     def __init__(self) -> None:
         self.folders: dict[Path, Path] = {}
-        self.locks, self.held = ExitStack(), ExitStack()
+        self.made, self.held = ExitStack(), ExitStack()
         self.drafts: list[tuple[Path | None, Path]] = []
         self.tidied: set[Path] = set()
         self.numbers = count()
@@ -46,9 +43,7 @@ class Drafts:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         with self.held, hold_interrupts():
-            self.locks.close()
-            for folder in self.folders.values():
-                shutil.rmtree(folder, ignore_errors=True)
+            self.made.close()
 
     def add(self, path: Path, content: Content) -> None:
         """The draft of a file; None: an earlier one is deleted in the end."""
@@ -101,8 +96,7 @@ class Drafts:
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
             with hold_interrupts():
-                folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
-                self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
+                self.folders[root] = self.made.enter_context(locked_folder(root, DRAFTS, _LOCK))
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
 
 

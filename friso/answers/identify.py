@@ -21,6 +21,7 @@ from friso.identification.sources import LogFile, per_unit_of_force, read_all
 from friso.intervals import Span
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
+from friso.system import shell_word
 
 if TYPE_CHECKING:
     from friso.views.drawing.figure import Figure
@@ -76,7 +77,8 @@ class IdentifyAnswer(Answer):
         """The check of the stage that was identified."""
         if self.result.stage is None or not files:
             return []
-        return [f"friso check {files[0]}{' --draws 1000' if self.result.stage.uncertain() else ''}"]
+        draws = " --draws 1000" if self.result.stage.uncertain() else ""
+        return [f"friso check {shell_word(str(files[0]))}{draws}"]
 
     def figures(self) -> Sequence[Figure]:
         """Logs beside what the models say of them."""

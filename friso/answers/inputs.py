@@ -24,6 +24,9 @@ StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
 Changes: TypeAlias = Mapping[str, Any] | Iterable[str] | None
 """Keys to be overridden: a dictionary, or texts KEY=VALUE."""
 
+Whole: TypeAlias = int
+"""A whole number whose limits `whole_number` checks, however large it is."""
+
 _NAMED = 3
 """Uncertain keys that are named, at most, where there are more."""
 

@@ -25,6 +25,7 @@ from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import Study, study_of
+from friso.system import shell_word
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -103,7 +104,7 @@ def stored_study(store: Path, metric: str | None) -> tuple[Study, str]:
     metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
     if metric in METRICS and metric not in study.metrics:
         actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a new map"
-        example = f"friso map STAGE.toml ... --metric {metric} --out {store.stem}-{metric}.zarr"
+        example = f"friso map STAGE.toml ... --metric {metric} --out {shell_word(f'{store.stem}-{metric}.zarr')}"
         raise InputError("metric", actual, expected, example)
     _check_metric(metric, study.metrics)
     return study, metric
@@ -126,7 +127,9 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
     lacking = [name for name in study.metrics if name not in stored.metrics]
     if lacking and not overwrite:
         actual = f"{store}, which holds no {metric if metric in lacking else ', '.join(lacking)}"
-        raise InputError("--out", actual, "another --out, or --overwrite", f"--out {store.stem}-{metric}.zarr")
+        raise InputError(
+            "--out", actual, "another --out, or --overwrite", f"--out {shell_word(f'{store.stem}-{metric}.zarr')}"
+        )
     return study if lacking else stored
 
 
@@ -160,7 +163,10 @@ def view_files(runs: xr.Dataset, store: Path, metric: str, progress: Progress = 
     from friso.views.map.page import map_files
 
     files = map_files(
-        runs, metric, f"friso simulate --cell {store} {{indices}}", drawn_runs(study_of(runs), runs, progress)
+        runs,
+        metric,
+        f"friso simulate --cell {shell_word(str(store))} {{indices}}",
+        drawn_runs(study_of(runs), runs, progress),
     )
     return {_path_beside(store, form): content for form, content in files.items()}
 

@@ -17,7 +17,7 @@ from friso.interrupts import hold_interrupts
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
 from friso.stage.files import parsed, text_of
-from friso.system import cause_of, device_in
+from friso.system import cause_of, device_in, shell_word
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -46,7 +46,9 @@ class OutputFolder:
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
         refuse_place("--out", folder)
         if self.unfinished.is_symlink():
-            raise InputError("--out", f"{folder}, where {UNFINISHED} is a link", "no link", f"rm {self.unfinished}")
+            raise InputError(
+                "--out", f"{folder}, where {UNFINISHED} is a link", "no link", f"rm {shell_word(str(self.unfinished))}"
+            )
         _check_writable(folder)
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
@@ -65,11 +67,11 @@ class OutputFolder:
         for name in existing:
             if any(file.exists() and (self.folder / name).samefile(file) for file in self.inputs):
                 actual = f"{self.folder}, where {name} is read"
-                raise InputError("--out", actual, "another folder", f"--out {self.folder}-2")
+                raise InputError("--out", actual, "another folder", _beside(self.folder))
         others = [name for name in existing if name not in self.files]
         if others and not self.overwrite:
             actual = f"{self.folder}, with {_first_names(others)}, which friso {self.command} has not written"
-            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", f"--out {self.folder}-2")
+            raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(self.folder))
 
     def write(
         self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
@@ -178,7 +180,12 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:
     """That a folder is not new, empty or the command's own; `expected` is what else it may be."""
     holds = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
-    return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", f"--out {folder}-2")
+    return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", _beside(folder))
+
+
+def _beside(folder: Path) -> str:
+    """The option for another folder."""
+    return f"--out {shell_word(f'{folder}-2')}"
 
 
 def _entries(folder: Path) -> list[str]:
@@ -206,4 +213,4 @@ def _check_writable(folder: Path) -> None:
         expected = f"a folder that can be written ({cause_of(error)})"
         raise InputError("--out", str(folder), expected, "--out report") from None
     if folder.exists() and not os.access(folder, os.W_OK):
-        raise InputError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")
+        raise InputError("--out", str(folder), "a folder that can be written", _beside(folder))

@@ -37,7 +37,7 @@ from friso.studies.store import Store, check_store, in_memory
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
 from friso.studies.verify import WANTED, checked_share, loosest_rtol
-from friso.system import usable_cores
+from friso.system import shell_word, usable_cores
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,7 +88,9 @@ class SweepAnswer(Answer):
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """How a cell is run by itself."""
-        return [f"friso simulate --cell {self.store} {' '.join('0' * len(self.study.shape))}"] if self.store else []
+        if self.store is None:
+            return []
+        return [f"friso simulate --cell {shell_word(str(self.store))} {' '.join('0' * len(self.study.shape))}"]
 
     def figures(self) -> Sequence[Figure]:
         """The map."""
@@ -251,7 +253,8 @@ def whole(store: str | os.PathLike[str]) -> dict[str, Any]:
 
 def _another_study(store: Path) -> InputError:
     problem = "a store together with options that would make it another study"
-    return InputError(str(store), problem, "the store alone: it contains its study", f"friso map {store}")
+    resumed = f"friso map {shell_word(str(store))}"
+    return InputError(str(store), problem, "the store alone: it contains its study", resumed)
 
 
 def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
@@ -314,7 +317,8 @@ def _filled(
             return runs
     except (KeyboardInterrupt, OSError, RuntimeError):
         if store.exists():
-            LOGGER.warning(f"{stored} of {study.cells} cells are stored; to resume: friso map {store}")
+            resumed = f"friso map {shell_word(str(store))}"
+            LOGGER.warning(f"{stored} of {study.cells} cells are stored; to resume: {resumed}")
         raise
 
 

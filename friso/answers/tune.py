@@ -7,13 +7,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, choice, correlations_of, read_stage, text_of, whole_number, wrong
+from friso.answers.inputs import (
+    Changes,
+    StageLike,
+    Whole,
+    choice,
+    correlations_of,
+    read_stage,
+    text_of,
+    whole_number,
+    wrong,
+)
 from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.quantities import Bound, Quantity, positive
 from friso.remedies import Changeable
 from friso.remedies.goal import Goal
 from friso.stage import Stage
+from friso.system import shell_word
 
 if TYPE_CHECKING:
     from friso.remedies.method import Advice
@@ -69,7 +80,7 @@ class TuneAnswer(Answer):
         except InputError:
             return []
         isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"]]
-        return [f"friso design {file}" for file in isolators]
+        return [f"friso design {shell_word(str(file))}" for file in isolators]
 
     def figures(self) -> Sequence[Figure]:
         """Responses, settling times, sensitivities."""
@@ -100,7 +111,7 @@ def tune(
     bandwidth_limit: float | str | None = None,
     only: Changeable | None = None,
     keep: Changeable | None = None,
-    seed: int = 1,
+    seed: Whole = 1,
     set: Changes = None,
     progress: Progress = silent,
 ) -> TuneAnswer:

@@ -6,13 +6,12 @@ import itertools
 import shutil
 import tempfile
 from collections.abc import AsyncIterable
+from contextlib import ExitStack
 from pathlib import Path
-
-from filelock import FileLock
 
 from friso.app.names import plain_name
 from friso.errors import InputError
-from friso.leftovers import remove_leftovers
+from friso.leftovers import locked_folder, remove_leftovers
 
 MOST_BYTES = 64_000_000
 """Size of a log at most."""
@@ -30,10 +29,9 @@ class Uploads:
     is deleted by the next."""
 
     def __init__(self) -> None:
-        remove_leftovers(Path(tempfile.gettempdir()), PREFIX, LOCK)
-        self.folder = Path(tempfile.mkdtemp(prefix=PREFIX))
-        self.lock = FileLock(self.folder / LOCK)
-        self.lock.acquire()
+        root, self.held = Path(tempfile.gettempdir()), ExitStack()
+        remove_leftovers(root, PREFIX, LOCK)
+        self.folder = self.held.enter_context(locked_folder(root, PREFIX, LOCK))
         self.files: dict[str, Path] = {}
         self.numbers = itertools.count(1)
 
@@ -70,5 +68,4 @@ class Uploads:
 
     def remove(self) -> None:
         """Delete all of them."""
-        self.lock.release()
-        shutil.rmtree(self.folder, ignore_errors=True)
+        self.held.close()

@@ -21,7 +21,7 @@ from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import escaping
 from friso.errors import InputError, shortened
-from friso.system import cause_of, is_closed_pipe
+from friso.system import cause_of, path_of
 from friso.version import VERSION
 
 
@@ -103,6 +103,7 @@ def _status() -> int:
         with interrupts.raising():
             try:
                 status = _run()
+                sys.stdout.flush()
             finally:
                 signal = interrupts.came()
     except BaseException as error:
@@ -141,7 +142,8 @@ def _failed(error: BaseException) -> int:
     """Say what went wrong; the status with which the process ends. Raises what nobody should meet."""
     if isinstance(error, typer.Exit):
         return error.exit_code
-    if is_closed_pipe(error):
+    exits = isinstance(error, SystemExit)  # which typer makes of it
+    if isinstance(error.__context__ if exits else error, BrokenPipeError):
         sys.stderr.close()
         return 1
     if isinstance(error, InputError):
@@ -154,8 +156,8 @@ def _failed(error: BaseException) -> int:
         return 2
     if isinstance(error, RuntimeError | OSError | MemoryError):
         cause = cause_of(error) if isinstance(error, OSError) else error
-        place = f": {error.filename}" if isinstance(error, OSError) and error.filename else ""
-        say(f"the computation could not be completed: {cause}{place}")
+        path = path_of(error) if isinstance(error, OSError) else ""
+        say(f"the computation could not be completed: {cause}{': ' if path else ''}{path}")
         return 1
     raise error
 

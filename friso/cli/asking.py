@@ -116,7 +116,7 @@ class UnfinishedWork(Protocol):
 
 
 @contextmanager
-def kept_until_done(work: UnfinishedWork, pieces: str) -> Iterator[None]:
+def kept_until_done(work: UnfinishedWork, piece: str, pieces: str) -> Iterator[None]:
     """Within, finished `pieces` are kept, from which the same command resumes; where none is finished, no folder is
     left."""
     assert work.folder is not None
@@ -125,7 +125,8 @@ def kept_until_done(work: UnfinishedWork, pieces: str) -> Iterator[None]:
         yield
     except BaseException as error:
         if work.count and isinstance(error, KeyboardInterrupt):
-            say(f"{work.count} {pieces} are kept in {work.folder}; the same command resumes from there")
+            kept = f"1 {piece} is" if work.count == 1 else f"{work.count} {pieces} are"
+            say(f"{kept} kept in {work.folder}; the same command resumes from there")
         elif not work.count and missing:
             with hold_interrupts():
                 work.clear()

@@ -38,14 +38,15 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
     texts, title = [[*map(one_line, column)] for column in lines], one_line(title)
     names, *others = map(_narrow, texts)
     room = screen.width - 1
-    narrow = [names, *(min(width, room - names - 2 * _BORDER) for width in others)]
+    names = min(names, room // 2)
+    narrow = [names, *(min(width, max(_LEAST, room - names - 2 * _BORDER)) for width in others)]
     for part in _side_by_side(narrow, room):
         table = Table(title=title or None, title_justify="left")
         spare = max(0, room - sum(narrow[k] + _BORDER for k in part))
         for k in part:
             width = min(max(map(len, texts[k])), narrow[k] + spare)
             spare -= width - narrow[k]
-            table.add_column(texts[k][0], width=width)
+            table.add_column(texts[k][0], width=width, overflow="fold")
         for row in zip(*(texts[k][1:] for k in part), strict=True):
             table.add_row(*row)
         screen.print(table)
@@ -54,6 +55,9 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
 
 _BORDER = 3
 """Width of what separates two columns of a table."""
+
+_LEAST = 8
+"""Width that a column beside the names may always have."""
 
 
 def _narrow(texts: Sequence[str]) -> int:

@@ -86,6 +86,7 @@ _KINDS: dict[str, ArgumentKind] = {
         "a whole number",
         "64",
     ),
+    "Whole": ArgumentKind(_is_whole, "a whole number", "6"),
     "float": ArgumentKind(_is_number, "a number"),
     "bool": ArgumentKind(lambda value: isinstance(value, bool | np.bool_), "True or False", "True"),
     "os.PathLike[str]": ArgumentKind(_is_path, "a path", '"report"'),

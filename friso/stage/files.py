@@ -16,7 +16,7 @@ from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.arguments import check_arguments
 from friso.stage.stage import Stage, changed
-from friso.system import cause_of
+from friso.system import cause_of, shell_word
 from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
@@ -49,7 +49,7 @@ def load(path: str | os.PathLike[str]) -> Stage:
     try:
         return loads(text_of(Path(path), _EXPECTED), origin=str(path))
     except InputError as error:
-        hint = _HINTS.get(Path(path).suffix.lower(), "").format(path)
+        hint = _HINTS.get(Path(path).suffix.lower(), "").format(shell_word(str(path)))
         if hint:
             error = InputError(error.key, error.actual, f"{error.expected}; or {hint}", "", str(path))
         raise StageError.of(error) from None

@@ -38,7 +38,7 @@ def guideline(
     checked_samples(samples)
     keep = Keep(out / UNFINISHED)
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
-    with kept_until_done(keep, "parts of the sweeps"):
+    with kept_until_done(keep, "part of the sweeps", "parts of the sweeps"):
         ask("guideline", question, samples=samples, folder=keep.folder, **shown)
 
 

@@ -11,6 +11,7 @@ from friso.cli.asking import named_as_options
 from friso.cli.command import MACHINE, Command
 from friso.cli.common import Overrides
 from friso.cli.output import Overwrite
+from friso.system import shell_word
 
 SourceArgument = Annotated[
     Path | None,
@@ -49,8 +50,9 @@ def init(
     options = {"spec": spec_of, "from_": source, "axis": axis, "set": overrides}
     with named_as_options(options):
         written = write_start(path, overwrite, **options)
-    then = f"friso check {written}" if spec_of is None else f"friso design {spec_of} {written}"
-    print(f"wrote {written}; {'look at it' if source else 'edit it'}, then: {then}")
+    then = ["check"] if spec_of is None else ["design", str(spec_of)]
+    command = " ".join(map(shell_word, ["friso", *then, str(written)]))
+    print(f"wrote {written}; {'look at it' if source else 'edit it'}, then: {command}")
 
 
 COMMAND = Command(init, 10, MACHINE)

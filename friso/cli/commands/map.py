@@ -32,6 +32,7 @@ from friso.cli.map_options import (
 )
 from friso.cli.output import print_document
 from friso.cli.progress import ProgressBar
+from friso.system import shell_word
 
 
 def map_cells(
@@ -97,7 +98,7 @@ def _check(store: Path, as_json: bool) -> None:
     if as_json:
         print_document(state)
     else:
-        damage = f"damaged: {', '.join(damaged)} (friso map {store} recomputes the damaged blocks)"
+        damage = f"damaged: {', '.join(damaged)} (friso map {shell_word(str(store))} recomputes the damaged blocks)"
         done = f"blocks done: {state['done']} of {state['blocks']}"
         print(f"{store}: {done}; {damage if damaged else 'nothing is damaged'}")
     if damaged:

@@ -48,7 +48,7 @@ def reproduce(
     kept = Kept(folder / UNFINISHED)
     shown = {"out": folder, "overwrite": overwrite, "as_json": as_json, "details": details, "lines": LINES}
     asked = {"points": points, "only": only, "draws": draws, "rtol": rtol, "laws": laws}
-    with kept_until_done(kept, "pieces of the work"):
+    with kept_until_done(kept, "piece of the work", "pieces of the work"):
         ask("reproduce", question, names, **asked, folder=kept.folder, **shown)
 
 

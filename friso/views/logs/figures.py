@@ -16,14 +16,14 @@ MOST = 12
 
 
 def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
-    """A figure for each file of channels, those with a role first."""
+    """A figure for each file of channels are drawn, those with a role first."""
     return [_figure(content, number) for number, content in enumerate(contents, 1) if content.channels]
 
 
 def _figure(content: LogContent, number: int) -> Figure:
     channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)
-    left = len(channels) - MOST
-    caption = "As they stand in the file, in its own units." + (f" Not drawn: the last {left}." if left > 0 else "")
+    left = f" {MOST} of {len(channels)} channels are drawn, those with a role first." if len(channels) > MOST else ""
+    caption = f"As they stand in the file, in its own units.{left}"
     panels = tuple(_panel(channel) for channel in channels[:MOST])
     return Figure(f"logs_{number}", title(content), caption, panels, columns=2 if len(panels) > 1 else 1)
 

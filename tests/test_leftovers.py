@@ -1,0 +1,55 @@
+"""Folders that are locked for as long as they are used, and those that killed processes left."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+from filelock import FileLock
+from systems import posix
+
+from friso.leftovers import is_leftover, locked_folder, remove_leftovers
+
+LOCK = "lock"
+
+
+@posix
+@pytest.mark.parametrize("locked", [False, True])
+def test_a_folder_that_is_removed_while_it_is_locked_is_made_anew(
+    locked: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By another process, to which it is a leftover until then. filelock makes it again, for others to read."""
+    real, folders = FileLock.acquire, []
+
+    def acquire(lock: FileLock, *arguments: Any, **named: Any) -> Any:
+        folders.append(Path(lock.lock_file).parent)
+        if len(folders) == 1 and not locked:
+            folders[0].rmdir()
+        held = real(lock, *arguments, **named)
+        if len(folders) == 1 and locked:
+            (folders[0] / LOCK).unlink()
+            folders[0].rmdir()
+        return held
+
+    monkeypatch.setattr(FileLock, "acquire", acquire)
+    before = os.umask(0o022)
+    try:
+        with locked_folder(tmp_path, "a-", LOCK) as folder:
+            assert [folder] == [*tmp_path.iterdir()] == folders[1:]
+            assert folder.stat().st_mode & 0o777 == 0o700
+            assert not is_leftover(folder, LOCK)
+    finally:
+        os.umask(before)
+    assert [*tmp_path.iterdir()] == []
+
+
+def test_a_folder_that_was_just_made_is_no_leftover(tmp_path: Path) -> None:
+    """Its process may be about to lock it."""
+    young, old = tmp_path / "a-young", tmp_path / "a-old"
+    for folder in (young, old):
+        folder.mkdir(mode=0o700)
+    os.utime(old, (0, 0))
+    remove_leftovers(tmp_path, "a-", LOCK)
+    assert [*tmp_path.iterdir()] == [young]
