@@ -129,8 +129,11 @@ equations are compiled first; warm every time after that. CPU time is that of al
 |{"---|" * len(HEAD)}
 {rows}
 
-Measured by `python -m benchmarks.command --write` on {time.strftime("%d %B %Y")}: {machine}. What a step of the
-simulation costs is told in [engine.md](engine.md), what large studies cost in [scaling.md](scaling.md).
+The table is made by `python -m benchmarks.command --write`, last on {time.strftime("%d %B %Y")}
+({machine}).
+
+What a step of the simulation costs is told in [engine.md](engine.md), what
+large studies cost in [scaling.md](scaling.md).
 """
 
 

@@ -64,4 +64,6 @@ def machine(libraries: Sequence[ModuleType]) -> str:
     lines = file.read_text().splitlines() if file.exists() else []
     names = [line.split(":")[1].strip() for line in lines if line.startswith("model name")]
     processor = names[0] if names else "unknown processor"
-    return ", ".join([*versions, processor, f"{usable_cores()} cores, load before {os.getloadavg()[0]:.1f}"])
+    return ", ".join(
+        [*versions, processor, f"{usable_cores()} cores, load average {os.getloadavg()[0]:.1f} beforehand"]
+    )

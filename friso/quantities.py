@@ -55,6 +55,11 @@ def as_toml(value: Any) -> str:
     return names.get(type(value)) or f"{' '.join(str(value).split())} (a {type(value).__name__})"
 
 
+def exactly(value: float, unit: str) -> str:
+    """A number and its unit as a stage file has them, read again as the same number: "19000000 N/m"."""
+    return f"{repr(float(value) + 0.0).removesuffix('.0')} {unit}"  # + 0.0: no minus before a zero
+
+
 def quoted(value: Any, hint: str = "") -> str:
     """What was given, for an error message: printable, one line, not long; and what is wrong with it."""
     text = as_toml(value).encode(errors="backslashreplace").decode()

@@ -258,8 +258,10 @@ def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     """The higher what stands above the axes, the higher the figure; no line is wider than the axes."""
     lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"a line with a long name, {k}", GREY) for k in range(4))
     panel = Panel("A title that is too long for the width of a telephone", Axis("x", ""), Axis("y", ""), lines)
-    figure = Figure("f", "", "", (panel, panel), columns=2)
+    figure = Figure("f", "", "", (panel, panel), columns=2, note="a long note, " * 8)
     narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
-    assert "<br>" in narrow["annotations"][0]["text"]
+    note, title = (text["text"].split("<br>") for text in narrow["annotations"][:2])
+    assert len(title) > 1
+    assert max(map(len, note)) < plotly_renderer.NARROW / 6
     assert narrow["height"] > wide["height"]
-    assert narrow["annotations"][0]["yshift"] >= 4 * plotly_renderer.KEY_ROW
+    assert narrow["annotations"][1]["yshift"] >= 4 * plotly_renderer.KEY_ROW

@@ -96,6 +96,10 @@ def test_what_is_determined_has_an_interval_of_some_width_in_numbers_and_in_prin
         assert " 0 N" not in estimate_text(estimate).partition("+/-")[2]
 
 
+def test_a_value_that_is_rounded_to_zero_has_no_sign() -> None:
+    assert estimate_text(Estimate.normal("bias.cart", "N", -0.001, 0.2, "a")).startswith("0.00 N +/- ")
+
+
 def test_a_mean_of_estimates_is_never_of_no_width() -> None:
     one = Estimate.normal("masses.cart", "kg", 2.0, 0.0, "a")
     assert not one.determined

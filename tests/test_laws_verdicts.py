@@ -1,6 +1,7 @@
 """The verdict across friction laws: which are tried, whether it depends on the law, and what would decide."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -130,6 +131,14 @@ def test_a_law_that_is_certain_with_some_of_what_is_open(wording: Wording) -> No
     assert laws.hunts("given") is None
     assert laws.deciding("given") == [friction_law("gms").decided_by["friction.attraction"]]
     wording(laws_sentences(laws)[0])
+
+
+def test_no_law_that_gives_one_answer(wording: Wording) -> None:
+    """Nothing is said of the stage before the first law; values that differ look different."""
+    gms = under("gms", ("hunts", 9.1), ("settles", 7.0))
+    (key,), trials = gms.conversion.open, gms.trials
+    close = tuple(replace(trial, drawn={key: value}) for trial, value in zip(trials, (1.0, 1.0004), strict=True))
+    wording(laws_sentences(across(replace(gms, trials=close)))[0])
 
 
 def test_edges_that_were_given_up_are_not_told_as_absent(wording: Wording) -> None:

@@ -162,6 +162,13 @@ def test_round_trip(path: Path, tmp_path: Path) -> None:
     assert stage.source
 
 
+def test_numbers_are_written_as_people_do_and_read_again_as_the_same(rig: Stage) -> None:
+    numbers = {"joint.limiter_stiffness": 1.9e7, "joint.stroke": 0.1 + 0.2, "joint.damping": -0.0}
+    stage = rig.with_numbers(numbers)
+    assert [line for line in stage.to_toml().splitlines() if "-0" in line or ".0 " in line] == []
+    assert {key: stage.flat()[key] for key in numbers} == numbers
+
+
 def test_template_with_its_optional_lines_loads() -> None:
     """All of it but the controller's other form."""
     lines = TEMPLATE.read_text(encoding="utf-8").splitlines()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias
 
 from friso.errors import InputError, StageError
-from friso.quantities import Quantity, positive, quoted
+from friso.quantities import Quantity, exactly, positive, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.files import load_changed
@@ -111,7 +111,7 @@ def tolerance_of(value: str | float) -> float:
 
 def text_of(value: str | float, unit: str) -> str:
     """A quantity as a file would have it: a text as it is, a number with its unit."""
-    return value if isinstance(value, str) else f"{float(value)!r} {unit}"
+    return value if isinstance(value, str) else exactly(value, unit)
 
 
 def quantity_of(value: str | float, name: str, quantity: Quantity, example: str = "") -> float:

@@ -20,6 +20,7 @@ from friso.app.uploads import Uploads
 from friso.axis import speaking_of
 from friso.errors import InputError
 from friso.identification.logs.mapping import MAPPABLE
+from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 from friso.views.check.cases import case_labels
@@ -333,4 +334,4 @@ def _cases(stage: Stage) -> tuple[str, dict[str, Any]]:
         cases = {name: values[name] for name in stage.variants() if name in values}
         return "joint.locked", cases
     key, flat = "masses.stage" if stage.masses.stage is not None else "masses.cart", stage.flat()
-    return key, {"given": f"{flat[key]!r} {numeric_keys(flat)[key].unit}"}
+    return key, {"given": exactly(flat[key], numeric_keys(flat)[key].unit)}

@@ -9,6 +9,7 @@ from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, controll
 from friso.errors import InputError
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.materials import materials
+from friso.quantities import exactly
 from friso.stage import Stage
 
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
@@ -26,20 +27,20 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     section = spec.leaves
     low, high = (min(map(float, section.thickness)), section.stroke.high)
     masses: dict[str, str | None] = {
-        f"masses.{name}": f"{mass.centre!r} kg"
+        f"masses.{name}": exactly(mass.centre, "kg")
         for name in ("cart", "stage")
         if (mass := getattr(spec.masses, name)) is not None
     }
     if masses and "tuned_mass" in stage.controller.as_written():
         masses[TUNED_MASS] = None  # it follows the masses
-    sizes = {f"flexure.{name}": f"{section.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
+    sizes = {f"flexure.{name}": exactly(section.space(name)[1], "m") for name in ("length", "width", "spacing")}
     leaves = {
         "flexure.leaves": section.leaves[0],
-        "flexure.thickness": f"{low!r} m",
+        "flexure.thickness": exactly(low, "m"),
         "flexure.material": section.materials[0],
         "joint.locked": False,
-        "joint.stroke": f"{high!r} m",
-        CROSSOVER: f"{spec.limit!r} Hz",
+        "joint.stroke": exactly(high, "m"),
+        CROSSOVER: exactly(spec.limit, "Hz"),
     }
     joint = stage.joint
     removed = {"joint.stiffness": None} if joint and joint.stiffness is not None else {}

@@ -110,7 +110,7 @@ def estimate_text(estimate: Estimate) -> str:
     if not estimate.determined:
         return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
     half, digits = round_uncertainty(estimate.half_width)
-    value = f"{estimate.value:.{digits}f}" if digits > 0 else f"{round(estimate.value, digits):.0f}"
+    value = f"{round(estimate.value, digits) + 0.0:.{max(digits, 0)}f}"  # + 0.0: no minus before a zero
     return f"{value}{unit} +/- {half}{unit}"
 
 

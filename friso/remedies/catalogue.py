@@ -12,6 +12,7 @@ from friso.design_method.isolator import isolated
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
+from friso.quantities import exactly
 from friso.remedies import variables
 from friso.remedies.goal import Goal
 from friso.remedies.variables import Variable, bandwidth_factor, of_key
@@ -84,7 +85,12 @@ def _notch(stage: Stage) -> Iterator[Remedy]:
         return
     frequency = flat["parasitic.frequency"]
     filters = [*stage.as_written()["controller"].get("filters", [])]
-    notch = {"kind": "notch", "frequency": f"{frequency!r} Hz", "width": f"{frequency / 2!r} Hz", "depth": DEPTH}
+    notch = {
+        "kind": "notch",
+        "frequency": exactly(frequency, "Hz"),
+        "width": exactly(frequency / 2, "Hz"),
+        "depth": DEPTH,
+    }
     try:
         with_notch = stage.replace({FILTERS_KEY: [*filters, notch]})
     except InputError:  # as many filters as there may be
@@ -109,7 +115,7 @@ def _restructured(stage: Stage, changes: Mapping[str, Any]) -> Stage:
     """A stage with keys of its controller changed: numbers [SI], texts, or None for those that go."""
     numbers = {key: value for key, value in changes.items() if isinstance(value, float)}
     keys = numeric_keys({key: value for key, value in {**stage.flat(), **changes}.items() if value is not None})
-    texts = {key: f"{value!r} {keys[key].unit}" if keys[key].unit else value for key, value in numbers.items()}
+    texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
     return stage.replace({**changes, **texts})
 
 

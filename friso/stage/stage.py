@@ -11,7 +11,7 @@ from pydantic import field_validator, model_validator
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
-from friso.quantities import Number, Quantity, as_toml, quoted
+from friso.quantities import Number, Quantity, as_toml, exactly, quoted
 from friso.stage.conditions import Conditions
 from friso.stage.controllers import (
     ANTI_WINDUP,
@@ -269,9 +269,7 @@ class Stage(Section):
         """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
         without some tables. Raises StageError."""
         keys = numeric_keys({**self.flat(), **numbers})
-        texts = {
-            key: f"{float(value)!r} {keys[key].unit}" if keys[key].unit else value for key, value in numbers.items()
-        }
+        texts = {key: exactly(value, keys[key].unit) if keys[key].unit else value for key, value in numbers.items()}
         return self.replace(texts | dict.fromkeys(without))
 
     def variants(self) -> "Mapping[str, Stage]":

@@ -112,7 +112,7 @@ class Store:
                 encoding[name]["_FillValue"] = np.nan
         template = xr.Dataset(variables, coords=coordinates, attrs=study.attributes())
         try:
-            template.to_zarr(folder, "w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+            template.to_zarr(folder, mode="w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
         except OSError:
             _let_zarr_finish()
             raise

@@ -11,6 +11,7 @@ import numpy as np
 from friso.equations.friction.measured import MeasuredFriction
 from friso.errors import InputError
 from friso.frequency.friction import steady_force
+from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
@@ -146,7 +147,7 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
 
 def _text(value: float, unit: str) -> Any:
     """A value as a stage file has it, read again as the same number."""
-    return f"{value!r} {unit}" if unit else value
+    return exactly(value, unit) if unit else value
 
 
 def _number(kind: MeasuredKind, unit: str, before: float, after: float) -> MeasuredChange:

@@ -10,7 +10,7 @@ from friso.quantities import percent
 from friso.stage.stage import declared_keys
 from friso.views.check.cases import case_labels
 from friso.views.convert.words import SHOWN
-from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
+from friso.views.drawing.prefixes import NOTHING, digits_that_differ, listed, range_with_unit, with_unit
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -50,12 +50,13 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
         alike = [verdict for verdict in laws.verdicts if verdict.hunts(case) is answer]
         if alike:
             does = _does({name for verdict in alike for name in verdict.verdicts(case)})
-            parts.append(f"{does} under {listed([verdict.law for verdict in alike], 'and')}")
+            subject = "" if parts else "the stage "
+            parts.append(f"{subject}{does} under {listed([verdict.law for verdict in alike], 'and')}")
     parts += [_open(verdict, case) for verdict in laws.verdicts if verdict.hunts(case) is None]
     depends = "the verdict depends on the friction law: " if laws.depends_on_law(case) else ""
     measure = listed(laws.deciding(case), "and")
     decide = f" To decide, measure {measure}." if measure else ""
-    return f"{depends}the stage {'; '.join(parts)}{edges}.{decide}"
+    return f"{depends}{'; '.join(parts)}{edges}.{decide}"
 
 
 def _all(laws: VerdictsByLaw) -> str:
@@ -94,8 +95,11 @@ def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
     texts = []
     for key in verdict.conversion.open:
         unit = getattr(fields[key], "unit", "")
-        values = sorted({trial.drawn.get(key, converted[key]) for trial in trials})
-        shown = listed([with_unit(value, unit) if unit else f"{value:.3g}" for value in values], "and")
+        every, values = (
+            sorted({trial.drawn.get(key, converted[key]) for trial in some}) for some in (verdict.trials, trials)
+        )
+        digits = digits_that_differ(every)
+        shown = listed([with_unit(value, unit, digits) if unit else f"{value:.{digits}g}" for value in values], "and")
         texts.append(f"{key.removeprefix('friction.').replace('_', ' ')} {shown}")
     return listed(texts, "and")
 

@@ -118,9 +118,11 @@ def _moves(case: Case) -> str:
 def _peaks(case: Case) -> str:
     """The peak count, and why it contradicts the verdict where it does; none where the run ends too early."""
     if case.stage.motion.duration <= COUNTED_AFTER:
-        return f"{NOTHING} (counted only after {COUNTED_AFTER:g} s)"
+        return (
+            f"{NOTHING} (counted from {COUNTED_AFTER:g} s on, and the run ends at {case.stage.motion.duration:.4g} s)"
+        )
     remarks = {
-        ("hunts", False): f" (counted only after {COUNTED_AFTER:g} s and above {with_unit(COUNTED_ABOVE, 'm')})",
+        ("hunts", False): f" (counted from {COUNTED_AFTER:g} s on, if higher than {with_unit(COUNTED_ABOVE, 'm')})",
         ("bistable", False): " (another motion hunts)",
         ("bistable", True): " (a long transient)",
         ("transient", True): " (a long transient)",

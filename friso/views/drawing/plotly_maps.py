@@ -16,7 +16,7 @@ from friso.views.drawing.figure import GREY, INK, Array, Axis, Coloured, Figure,
 BAR = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
 LINE = 17  # [px] one line of the note
 KEY = 30  # [px] the legend
-_LETTERS = 118  # to a line of the note
+_LETTER = 6.1  # [px] of the note
 
 DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
 SYMBOLS: dict[str, dict[str, Any]] = {
@@ -114,9 +114,10 @@ def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
     return [{**unseen, "name": html.escape(label), **style} for label, style in styles]
 
 
-def footer(figure: Figure, legend: str) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
-    """Height [px] of the area below the panels, its legend by name, and the note as annotations."""
-    lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, _LETTERS)]
+def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
+    """Height [px] of the area below the panels, its legend by name, and the note, broken at a width [px], as
+    annotations."""
+    lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, int(width / _LETTER))]
     note = LINE * len(lines) + 6 if lines else 0
     below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}
     text = "<br>".join(html.escape(line) for line in lines)

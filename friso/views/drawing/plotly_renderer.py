@@ -99,7 +99,7 @@ def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
     row = header + plot + FOOTER
     height = row * prepared.rows
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
-    below, legend, note = footer(prepared, key)
+    below, legend, note = footer(prepared, key, width)
     layout: dict[str, Any] = {
         "height": height + TOP + below,
         "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},

@@ -65,6 +65,11 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     return f"{number:.{digits - 1}e} {text}"
 
 
+def digits_that_differ(values: Sequence[float]) -> int:
+    """Significant digits with which numbers that differ look different: three, or as many as that takes."""
+    return next(digits for digits in range(3, 18) if len({f"{x:.{digits - 1}e}" for x in values}) == len({*values}))
+
+
 def rounded_up(value: float, digits: int = 3) -> float:
     """A positive value rounded to so many significant digits, never downward."""
     unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)

@@ -110,7 +110,7 @@ def answer(tuning: Advice) -> list[str]:
         lines += _works(fastest, tuning, "What settles soonest")
     elif len(tuning.working) > 1:
         lines += _works(tuning.working[1], tuning, "The next best")
-    return [*lines, *unknown(tuning)]
+    return [*lines, f"The goal: {goal_words(tuning.goal)}.", *unknown(tuning)]
 
 
 def unknown(tuning: Advice) -> list[str]:
