@@ -46,7 +46,7 @@ class AxisKind:
         this axis already stays as it is."""
         if self.plain or _TURNED.search(unit):
             return unit
-        return _BELOW.sub(r"(\1)", _PARTS.sub(self._part, unit))
+        return _PARTS.sub(self._part, unit)
 
     def text(self, sentence: str) -> str:
         """A sentence with lengths, forces and masses in numbers, on this axis: "0.1 mm" is "0.1 mrad"."""
@@ -60,8 +60,9 @@ class AxisKind:
         return dataset
 
     def _part(self, match: re.Match[str]) -> str:
-        prefix, base = match["prefix"], match["base"]
-        return prefix + {LENGTH: self.length, FORCE: self.force, MASS: self.mass}[base]
+        part = match["prefix"] + {LENGTH: self.length, FORCE: self.force, MASS: self.mass}[match["base"]]
+        below = match.string[: match.start()].endswith("/")
+        return f"({part})" if below and re.search("[*/]", part) else part
 
     def suffix(self, key: str) -> str:
         """A key of a JSON document with the unit that it ends with, "force_n", as it is on this axis: "force_n_m"."""
@@ -75,7 +76,6 @@ class AxisKind:
 
 _TURNED = re.compile(r"rad|N[*· ]m|kg[*· ]m")
 _PARTS = re.compile(r"(?<![A-Za-zµ^])(?P<prefix>[numµkM]??)(?P<base>kg|N|m)(?![A-Za-z])")
-_BELOW = re.compile(r"(?<=/)(N\*m|kg\*m\^2)")
 _NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z]|[*·]m)(?:/m?s)?")
 _SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
 

@@ -355,6 +355,12 @@ def test_moves_of_a_locked_joint_that_swings(designed: Design, snapshots: Snapsh
     assert "never" in brings(replace(designed, verification=replace(designed.verification, locked=never)))
 
 
+def test_laws_that_a_corner_loses_are_named(designed: Design, wording: Wording) -> None:
+    other = replace(designed, lost={"dahl": [1, 2]})
+    wording(headline(other)[-1][1])
+    assert design_document(other)["friction_laws_lost_in_corners"] == {"dahl": [1, 2]}
+
+
 # ---------------------------------------------------------------- figures and page
 
 

@@ -100,6 +100,9 @@ def test_units_of_an_axis_whose_forces_are_in_another_unit() -> None:
     assert amperes.text("2 mm with 3 N of 5 kg") == "2 mm with 3 A of 5 A*s^2/m"
     assert [amperes.suffix(key) for key in ("force_n", "rate_n_per_s", "x_m")] == ["force_a", "rate_a_per_s", "x_m"]
     assert ROTARY.per("V").unit("kg") == "V*s^2/rad"
+    volts = LINEAR.per("V")
+    assert [volts.unit(unit) for unit in ("N/kg", "m/N")] == ["V/(V*s^2/m)", "m/V"]
+    assert [ROTARY.unit(unit) for unit in ("N/kg", "m/kN", "1/kg")] == ["N*m/(kg*m^2)", "rad/(kN*m)", "1/(kg*m^2)"]
     assert ROTARY.suffix("drag_ns_per_m") == "drag_n_m_s_per_rad"
 
 

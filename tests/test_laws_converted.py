@@ -16,10 +16,12 @@ from variants import stage as stage_with
 import friso
 from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction
+from friso.equations.friction.gms import STIFFNESS
 from friso.errors import InputError
 from friso.frequency.friction import steady_force
 from friso.identification.readings.common import stribeck_curve
 from friso.stage import Stage
+from friso.stage.lists import element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert, convertible, measure_friction
 from friso.views.drawing import matplotlib_renderer
@@ -172,3 +174,4 @@ def test_a_law_converted_to_itself_stays_as_it_is(friction: str) -> None:
         more = convert(stage, law, 6)
         assert more.stage.flat()["friction.attraction"] == stage.flat()["friction.attraction"]
         assert not more.lost
+        assert len(element_keys(convert(more.stage, law, 4).stage.flat(), STIFFNESS)) == 4

@@ -163,13 +163,26 @@ def test_an_edge_that_is_not_certain_says_so(wording: Wording) -> None:
 def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:
     """What a law leaves open follows the friction: bristles that hold 1 N elastically would be too much for 0.15 N."""
     machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((3.0, 1.0), (1.0, 0.15))]
-    frictions = frictions_that_keep(machines)
+    frictions = frictions_that_keep(machines).frictions
     assert {name.split(",")[0] for name in frictions} == {"elasto_plastic", "gms", "rolling"}
     for friction in frictions.values():
         assert not violations({**RIGID.flat(), **friction})
         assert friction["friction.static"] == pytest.approx([3.0, 1.0])
     most = frictions["elasto_plastic, most breakaway_deflection"]["friction.breakaway_deflection"]
     assert most[1] < most[0]
+
+
+def test_ends_that_only_some_machines_have_are_tried_and_laws_that_only_some_lose_are_named() -> None:
+    """Hardly any Coulomb friction leaves the bristles nothing to hold; dahl has no friction that falls."""
+    machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((1.0, 1e-3), (3.0, 3.0))]
+    laws = frictions_that_keep(machines)
+    assert laws.lost == {"dahl": [0]}
+    given, most = (
+        laws.frictions[name]["friction.breakaway_deflection"]
+        for name in ("elasto_plastic", "elasto_plastic, most breakaway_deflection")
+    )
+    assert most[0] == given[0]
+    assert most[1] > given[1]
 
 
 def test_nothing_hunts_without_an_integrator() -> None:

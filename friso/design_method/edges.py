@@ -6,8 +6,8 @@ Coarser than `friso.hunting.edges`, which tells how hunting ends and closes orbi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -90,6 +90,15 @@ def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
     several = [*by_law.values()]
     edges = np.max([corners.edges for corners in several], axis=0)
     return replace(several[0], edges=edges, unknown=sum(corners.unknown for corners in several))
+
+
+@dataclass(frozen=True)
+class OtherLaws:
+    """Flat keys of the friction of stages under other laws by name, arrays of shape (stages,) where they differ; and
+    the laws that are `lost`, with the numbers of the stages in which they do not keep what is measured."""
+
+    frictions: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    lost: Mapping[str, Sequence[int]] = field(default_factory=dict)
 
 
 def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from friso.design_method.controller import (
     comfortable_below,
     dampings,
 )
-from friso.design_method.edges import Corners, edges_over, rigid, under_law, worst_edges
+from friso.design_method.edges import Corners, OtherLaws, edges_over, rigid, under_law, worst_edges
 from friso.design_method.front import Candidate, front
 from friso.design_method.hunting_map import HuntingMap, hunting_map
 from friso.design_method.modal import Modal
@@ -53,17 +53,13 @@ ALIKE = 0.98
 """Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
 
 
-Frictions = Callable[[Sequence[Stage]], Mapping[str, Mapping[str, Any]]]
-"""Flat keys of the friction of stages that differ in its numbers, under other laws by name; arrays of shape (stages,)
-where they differ."""
+Frictions = Callable[[Sequence[Stage]], OtherLaws]
+"""The friction of stages that differ in its numbers, under other laws."""
 
 
-def own_law(stages: Sequence[Stage]) -> dict[str, dict[str, Any]]:
+def own_law(stages: Sequence[Stage]) -> OtherLaws:
     """No laws beside that of the stages."""
-    return {}
-
-
-"""No other friction law than the stage's own."""
+    return OtherLaws()
 
 
 class NoDesign(Exception):
@@ -94,6 +90,7 @@ class Design:
     `map`: hunting over crossover and stroke. `verification`: the moves simulated. `stage`: the design as a stage.
     `damped`: the joint damping with which the crossover could be `faster` [Hz], where margins hold it down.
     `by_law`: the edges without isolator and with it under each friction law; `without` and `edges` are the worst.
+    `lost`: the laws that were not tried, with the numbers of the corners in which they do not keep what is measured.
     """
 
     spec: Spec
@@ -109,6 +106,7 @@ class Design:
     damped: Relaxation | None
     faster: float
     by_law: Mapping[str, tuple[Corners, Corners]]
+    lost: Mapping[str, Sequence[int]]
 
     @property
     def stage(self) -> Stage:
@@ -143,7 +141,9 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
     others = laws([base.with_numbers(_friction_of(population, n)) for n in range(population.count)])
-    over = partial(_by_law, laws={flat["friction.model"]: {}, **others}, population=population, progress=progress)
+    over = partial(
+        _by_law, laws={flat["friction.model"]: {}, **others.frictions}, population=population, progress=progress
+    )
     without = over(rigid(flat), FIRST * limit, BEYOND * limit, "hunting without isolator")
     friction = float(np.min(least_breakaway(population.over(flat))))
     if friction <= 0:
@@ -166,7 +166,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
     damped, faster = with_damping(fit)
     results = (worst_edges(without), tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
-    return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without})
+    return Design(spec, stage, *results, {law: (without[law], isolated[law]) for law in without}, others.lost)
 
 
 def _friction_of(population: Population, number: int) -> dict[str, float]:

@@ -112,7 +112,7 @@ def identify(
 def with_laws(
     identification: Identification, logs: Sequence[Source], base: Stage | None, progress: Progress = silent
 ) -> Identification:
-    """The same with the friction laws that its logs support, begun from the estimates and from `base`. Raises
+    """The same with the friction laws that its logs support, begun from `base` where its law allows that. Raises
     InputError without a base, and as `compare_laws`."""
     if base is None:
         raise InputError(

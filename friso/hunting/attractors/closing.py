@@ -49,7 +49,7 @@ def _where_they_stick(pending: Pending, times: np.ndarray) -> np.ndarray:
         runs, step = pending.take(group), float(times[group].min()) / SAMPLES
         paths = runs.stages.run(runs.states, 2 * times[group], pending.rtol, interval=step).samples
         for k, path in zip(group, paths, strict=True):
-            residuals = stages.take(np.full(len(path), k)).unbalanced(path)
+            residuals = stages.unbalanced(path, k)
             ahead[k] = step * _balanced(residuals, path[:, stages.sticking])
     return stages.run(pending.states, np.maximum(ahead, 1e-9 * times), pending.rtol).ends[:, :size]
 

@@ -71,7 +71,7 @@ class Swinging:
     `time` in which it repeats itself [s] (NaN: it does not) and its `period` [s], twice that if it is its mirror image
     by then (of one that does not repeat itself, about the time from one swing to the next but one); a `distance` [m] at
     which it sticks; the number of `swings`, to one side or the other, in a period; and the cycle, closed as an orbit,
-    with its number among `cycles` (None: it was observed, in a simulation)."""
+    with its number among `cycles` (None: it was observed, in a simulation, and last `seen` in a state, (states,))."""
 
     stage: int
     amplitude: float

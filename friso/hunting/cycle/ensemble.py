@@ -130,10 +130,12 @@ class Ensemble:
         held = np.abs(constant) < self.number("breakaway")
         return np.where(held, 0.0, -constant) + np.zeros(self.count)
 
-    def unbalanced(self, states: np.ndarray) -> np.ndarray:
+    def unbalanced(self, states: np.ndarray, number: int | None = None) -> np.ndarray:
         """By how much the integrators are off the state in which the actuator balances what friction does not hold of
-        the constant forces on a stage at rest where it sticks, shape (count,), in states (count, states)."""
-        balanced = self.relaxed * states[:, self.sticking] + self.per_newton * self.balancing
+        the constant forces on a stage at rest where it sticks, shape (count,), in states (count, states); or in states
+        (n, states) of the stage with that number alone, shape (n,)."""
+        of = slice(None) if number is None else number
+        balanced = self.relaxed[of] * states[:, self.sticking] + self.per_newton[of] * self.balancing[of]
         return states[:, self.integral] - balanced
 
     @cached_property

@@ -58,13 +58,14 @@ class LawPrediction:
 
 @dataclass(frozen=True)
 class LawComparison:
-    """The laws, the best first; the names of the logs; those that were left out, with the reason; and how many parts
-    were predicted."""
+    """The laws, the best first; the names of the logs; those that were left out, with the reason; how many parts were
+    predicted; and whether fits began from the stage as it was known before any log (`unseen`)."""
 
     predictions: tuple[LawPrediction, ...]
     logs: tuple[str, ...]
     left_out: Mapping[str, str]
     parts: int
+    unseen: bool = True
 
     @property
     def explained(self) -> bool:
@@ -102,13 +103,16 @@ def comparable() -> list[str]:
 
 
 def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Progress = silent) -> LawComparison:
-    """Fit every law to the same logs, and let each predict what it was not fitted to. Raises InputError where no log
-    shows friction before sliding, and for a stage whose law does not stick."""
+    """Fit every law to the same logs, and let each predict what it was not fitted to: begun from the stage before any
+    log (`prior`), or from the `stage` that all logs show where no fit can begin from its law. Raises InputError where
+    no log shows friction before sliding, and for a stage whose law does not stick."""
     records, left_out = _records(logs, prior)
     if not records:
         reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "no log over time"
         raise InputError("--laws", reasons, "a log of position and force that shows friction", "presliding.csv")
-    flat = {**stage.flat(), **{key: estimate.value for key, estimate in prior.estimates.items()}}
+    known = prior.stage.flat() if prior.stage else {}
+    unseen = known.get("friction.model") in comparable()
+    flat = known if unseen else stage.flat() | {key: estimate.value for key, estimate in prior.estimates.items()}
     if f"{MOTOR_FRICTION}.model" in flat:
         raise InputError("--laws", "a stage with friction at the motor too", "the friction of one bearing", "no --laws")
     model = flat["friction.model"]
@@ -124,7 +128,7 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
         predictions.append(_prediction(LawProblem(law, mass, before, records), parts))
     progress(len(laws), len(laws), "laws")
     ordered = tuple(sorted(predictions, key=lambda prediction: prediction.error))
-    return LawComparison(ordered, tuple(record.name for record in records), left_out, len(parts))
+    return LawComparison(ordered, tuple(record.name for record in records), left_out, len(parts), unseen)
 
 
 def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], dict[str, str]]:
@@ -143,7 +147,7 @@ def _records(logs: Sequence[Log], prior: Prior) -> tuple[list[DraggedRecord], di
 
 
 def _prediction(problem: LawProblem, parts: Sequence[Sequence[np.ndarray]]) -> LawPrediction:
-    starts = problem.everywhere()  # not the fit to all records: it has seen what is left out
+    starts = problem.everywhere()  # not the fit to all records, which has seen what is left out
     whole = problem.fitted([np.ones(len(r.force), bool) for r in problem.records], starts)
     errors = []
     for out in parts:

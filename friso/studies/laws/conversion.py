@@ -104,7 +104,7 @@ def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
     flat, keys = stage.flat(), friction_law(law).keeping(before, elements)
     if law == flat["friction.model"]:  # nothing is left open
-        if len(keys) == sum(key in flat for key in keys):
+        if _elements_of(law, flat) <= keys.keys() <= flat.keys():
             return compared(stage, stage, before)
         keys |= {key: flat[key] for key in friction_law(law).left_open(before)}
     return compared(stage, with_friction(stage, law, keys), before)
@@ -143,6 +143,12 @@ def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
         if values:
             table[name] = [_text(float(value), getattr(several.on(kind).of, "unit", "")) for value in values]
     return table
+
+
+def _elements_of(law: str, flat: Mapping[str, Any]) -> set[str]:
+    """The keys of the law's lists among flat keys, but those that are 0, as if they were not there."""
+    lists = tuple(f"friction.{name}." for name in list_fields(friction_law(law)))
+    return {key for key in flat if key.startswith(lists) and flat[key]}
 
 
 def _text(value: float, unit: str) -> Any:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.design_method.edges import OtherLaws
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
@@ -210,26 +211,26 @@ def kept_laws(stage: Stage, elements: int) -> tuple[list[LawConversion], dict[st
     return kept, left_out
 
 
-def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> dict[str, dict[str, Any]]:
-    """Flat keys of the friction of stages that differ in its numbers, under every other law that keeps what is measured
-    of each of them: as converted and at both ends of what that leaves open, by the name of the law and of what is open;
-    arrays of shape (stages,) where they differ. Raises InputError for a law that does not declare what is measured of
-    it."""
+def frictions_that_keep(stages: Sequence[Stage], elements: int = ELEMENTS) -> OtherLaws:
+    """The friction of stages that differ in its numbers under every other law that keeps what is measured of each of
+    them: as converted and at both ends of what that leaves open, by the name of the law and of what is open. Laws that
+    keep it of some alone are lost. Raises InputError for a law that does not declare what is measured of it."""
     kept = [{conversion.law: conversion for conversion in kept_laws(stage, elements)[0][1:]} for stage in stages]
-    frictions = {}
-    for law in kept[0]:
-        if not all(law in conversions for conversions in kept):
+    frictions, lost = {}, {}
+    for law in dict.fromkeys(law for conversions in kept for law in conversions):
+        if lacking := [number for number, conversions in enumerate(kept) if law not in conversions]:
+            lost[law] = lacking
             continue
         conversions = [conversions[law] for conversions in kept]
         trials = [trials_left_open(conversion) for conversion in conversions]
-        for end, changes in trials[0].items():
-            flats = [
-                {**conversion.stage.flat(), **trial.get(end, {})}
-                for conversion, trial in zip(conversions, trials, strict=True)
-            ]
-            name = ", ".join([law, *(f"{end} {key.removeprefix('friction.')}" for key in changes)])
-            frictions[name] = {key: _together([flat[key] for flat in flats]) for key in flats[0] if "friction." in key}
-    return frictions
+        for end in dict.fromkeys(end for trial in trials for end in trial):
+            drawn = [trial.get(end, {}) for trial in trials]
+            flats = [{**made.stage.flat(), **changes} for made, changes in zip(conversions, drawn, strict=True)]
+            opened = dict.fromkeys(key for changes in drawn for key in changes)
+            name = ", ".join([law, *(f"{end} {key.removeprefix('friction.')}" for key in opened)])
+            keys = [key for key in flats[0] if key.startswith("friction.")]
+            frictions[name] = {key: _together([flat[key] for flat in flats]) for key in keys}
+    return OtherLaws(frictions, lost)
 
 
 def _together(values: Sequence[Any]) -> Any:

@@ -37,7 +37,9 @@ def design_document(design: Design) -> dict[str, Any]:
         "controller": _controller(design),
         "verification": _verification(design),
     }
-    return plain_json(document | ({"friction_laws": _by_law(design)} if len(design.by_law) > 1 else {}))
+    laws = {"friction_laws": _by_law(design)} if len(design.by_law) > 1 else {}
+    lost = {"friction_laws_lost_in_corners": design.lost} if design.lost else {}
+    return plain_json(document | laws | lost)
 
 
 def _by_law(design: Design) -> dict[str, Any]:

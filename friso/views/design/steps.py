@@ -101,7 +101,7 @@ def _worst(corners: Corners, design: Design) -> list[str]:
     sentences = []
     if corners.hunts:
         count = corners.population.count
-        sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat())}.")
+        sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat(), corners.worst)}.")
     if corners.unknown:
         sentences.append(
             f"In {corners.unknown} of {corners.population.count} corners the edge is not certain: simulations below it "

@@ -45,6 +45,7 @@ def headline(design: Design) -> list[tuple[str, str]]:
         ),
         _verified(design),
         *([(GREEN, across_laws(design))] if len(design.by_law) > 1 else []),
+        *([(ORANGE, lost_laws(design))] if design.lost else []),
     ]
 
 
@@ -57,6 +58,16 @@ def across_laws(design: Design) -> str:
         ends.append(f"{name} {hertz(edges[least])} ({least}) to {hertz(edges[worst])} ({worst})")
     moves = f"the moves are simulated under {next(iter(design.by_law))}"
     return f"Edges of hunting are the worst of {len(design.by_law)} friction laws: {'; '.join(ends)}; {moves}."
+
+
+def lost_laws(design: Design) -> str:
+    """Which laws were not tried, and in which corners they do not keep what is measured."""
+    corners, flat = design.without, design.stage.flat()
+    laws = "; ".join(
+        f"{law}, not in {len(where)} of {corners.population.count} corners (such as {corner(corners, flat, where[0])})"
+        for law, where in design.lost.items()
+    )
+    return f"Not tried, since they keep what is measured in some corners only: {laws}. Edges may be worse under them."
 
 
 def need(design: Design) -> str:
@@ -150,9 +161,9 @@ def edge(corners: Corners) -> str:
     return f"hunts, in its worst corner, up to {hertz(corners.highest)}"
 
 
-def corner(corners: Corners, flat: Mapping[str, Any]) -> str:
-    """The corner that hunts up to the highest crossover."""
-    keys = corners.population.of(corners.worst)
+def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
+    """The corner with a number."""
+    keys = corners.population.of(number)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
     return ", ".join(f"{in_sentence(key)} {plain(keys[key], units[key])}" for key in order)

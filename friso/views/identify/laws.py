@@ -42,8 +42,10 @@ def how(comparison: LawComparison) -> str:
     """How they were compared, in a sentence."""
     whole = comparison.parts == len(comparison.logs)
     parts = "each of the logs" if whole else f"each of {comparison.parts} pieces of the logs"
+    begun = "the stage file" if comparison.unseen else "all logs, since none can from the law of the stage file"
     return (
-        f"Left out by turns: {parts}. Errors are RMS, as shares of the standard deviation of the friction; a law is "
+        f"Left out by turns: {parts}. Fits begin from mass and friction of {begun}; what lies between force and guide "
+        "is that which all logs show. Errors are RMS, as shares of the standard deviation of the friction; a law is "
         "supported unless it predicts worse than the best by more than 1 % and by more than chance would have it."
     )
 
