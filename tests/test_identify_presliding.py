@@ -215,15 +215,19 @@ def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
     assert np.median(widths) < 0.02
 
 
-def test_damping_found_without_the_viscous_friction_is_its_sum_with_that() -> None:
-    viscous = 0.02 * DAMPING
+def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that(wording: Wording) -> None:
+    """However much of the sum is viscous friction."""
+    viscous = DAMPING / 3
     log = shaken()
     moving = np.gradient(log["position"], DT)
     slid = record("small", DT, position=log["position"], force=log["force"] + viscous * moving)
-    (damping,) = (one for one in identify([(slid, "presliding")]).estimates if one.name == "friction.bristle_damping")
-    assert damping.value == pytest.approx(DAMPING + viscous, rel=0.01)
-    assert damping.holds(DAMPING)
-    assert damping.value - damping.low > 2 * (damping.high - damping.value)
+    for logs in ([slid], [slid, slid]):
+        found = identify([(log, "presliding") for log in logs]).estimates
+        (damping,) = (one for one in found if one.name == "friction.bristle_damping")
+        assert not damping.determined
+        assert damping.low == 0
+        assert damping.high == pytest.approx(DAMPING + viscous, rel=0.02)
+        wording(damping.reason)
 
 
 def test_the_stage_file_takes_bristles_and_masses() -> None:

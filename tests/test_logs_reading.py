@@ -233,10 +233,27 @@ def test_headings() -> None:
     assert split_heading("v in mm/s") == ("v", "mm/s")
     assert split_heading("v/(mm/s)") == ("v", "mm/s")
     assert split_heading("mm/s") == ("mm/s", "")
+    assert split_heading("Weg s/mm") == ("Weg s", "mm")
     assert split_heading("on/off") == ("on/off", "")
     assert split_heading("x [flurbs]") == ("x", "flurbs")
     assert split_heading("test space (1)") == ("test space (1)", "")
     assert split_heading("[m]") == ("[m]", "")
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("Velocity mm/s", "Velocity", "mm/s"),
+        ("Speed m/s", "Speed", "m/s"),
+        ("omega rad/s", "omega", "rad/s"),
+        ("vel_mm/s", "vel", "mm/s"),
+        ("Stiffness N/m", "Stiffness", "N/m"),
+        ("Damping N*s/mm", "Damping N*s/mm", ""),
+        ("Gain A/V", "Gain A/V", ""),
+    ],
+)
+def test_a_stroke_within_a_unit_is_not_the_one_before_a_unit(heading: str, name: str, unit: str) -> None:
+    assert split_heading(heading) == (name, unit)
 
 
 @settings(max_examples=40, deadline=None)

@@ -13,6 +13,9 @@ from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.quality import Quality, halves, whole_error
 from friso.quantities import percent
 
+CLEARLY = 0.5
+"""Times what an inverse model without a cause leaves, below which a whole model is better without that cause."""
+
 POOR = 0.3
 """Relative error of the force from which on a model does not describe the record."""
 
@@ -37,19 +40,19 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
     """How good a fit is, with what is wrong with it in sentences.
 
     Of a stage that sticks much of the time, which the inverse model cannot know, the whole model may describe a record
-    that is `beyond` the inverse one; what this explains of it counts then only if it is more than the whole does."""
+    that is `beyond` the inverse one; a cause is no doubt then if the whole model is `CLEARLY` better than it."""
     left = fit.left
     noise_left = noise * fit.problem.passes
     flat, unit = fit.stage, log.unit("force")
     plain = Quality(noise, left, noise_left, inverse.error, whole_error(flat, inverse))
     if fit.problem.closed and fit.explains(noise):
         return plain
-    force = float(np.sqrt(np.mean(log["force"][log.longest] ** 2)))
+    force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
     beyond = inverse.error > POOR and left < UNSETTLED * force
     doubts, poor = [], inverse.error > POOR and not beyond
     reasons = causes(log, inverse, cart_share) if plain.lacks_something or poor else []
     if beyond:
-        reasons = [cause for cause in reasons if cause.without is None or cause.without.error * force < left]
+        reasons = [cause for cause in reasons if cause.without is None or CLEARLY * cause.without.error * force < left]
     worse = not beyond and plain.whole_error > max(CONTRADICTS * inverse.error, FINE)
     rejected = worse and plain.lacks_something and not poor
     if rejected:

@@ -35,7 +35,7 @@ from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, noise_of
-from friso.identification.slow_records import without_what_is_too_slow
+from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.progress import Progress, silent
 from friso.stage.controllers import CONTROLLER
 
@@ -119,10 +119,13 @@ def identify_moves(
     estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
     estimates = with_halves(estimates, flat, quality)
     estimates, correlation = with_possible_values(estimates, correlation, flat)
-    counted = answer.fit.problem.counted > 0
-    estimates, correlation = without_what_is_too_slow(
-        estimates, correlation, flat, moved, counted, quality, log.unit("force")
-    )
+    top = float(np.abs(moved.velocity).max())
+    estimates, correlation = without_sliding(estimates, correlation, flat, top, log.unit("force"))
+    if quality.rejected:
+        acceleration, left = inverse.columns[:, 0], float(np.std(inverse.measured - inverse.fitted))
+    else:
+        acceleration, left = moved.acceleration[answer.fit.problem.counted > 0], quality.left * quality.lacking
+    estimates, correlation = with_unexplained_inertia(estimates, correlation, acceleration, left, log.unit("force"))
     simulated = (loop or fit.problem).record(fit.inner)
     return IdentifiedMoves(
         log, part, inverse, by_direction, fit, answer.profiles, estimates, correlation, covered, simulated,
@@ -166,8 +169,9 @@ def _with_changes(
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """Another log of the same axis, simulated: the samples used, the record, and its errors; and how far machines drawn
-    from the intervals go from that record at most, `apart`, as a share of the position."""
+    """Another log of the same axis, simulated: the samples used, the record, and its errors; and how far the farthest
+    of the machines drawn from the estimates goes from that record, `apart`, as a share of the position: infinitely far
+    where one does not keep to finite numbers."""
 
     part: slice
     simulated: Simulated
@@ -189,13 +193,13 @@ def simulated_log(moves: IdentifiedMoves, log: Log, set_up: Mapping[str, Any] | 
     simulated = problem.record(moves.fit.inner)
     drawn = drawn_from(moves.estimates, moves.correlation, problem.parameters, moves.fit.inner)
     others = [np.linalg.norm(record.position - simulated.position, axis=1) for _, record in problem.simulated(drawn)]
-    away = np.concatenate(others)
+    away = np.nan_to_num(np.concatenate(others), nan=np.inf)
     errors = errors_of(log, part, simulated, moves.inverse.bandwidth)
     return SimulatedLog(
         part,
         simulated,
         errors,
-        float(away[np.isfinite(away)].max(initial=0.0)) / float(np.linalg.norm(log["position"][part])),
+        float(away.max()) / float(np.linalg.norm(log["position"][part])),
     )
 
 

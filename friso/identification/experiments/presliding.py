@@ -63,10 +63,7 @@ UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
 
-VISCOUS = 0.05
-"""Share of the damping of bristles that viscous friction has at most (our choice; of the thesis's rig it is 0.2 %)."""
-
-SUM = "Viscous friction is not known: what there is of it counts as damping of the bristles, and the interval allows."
+VISCOUS = "friction.viscous"
 
 
 @dataclass(frozen=True)
@@ -233,14 +230,19 @@ def _equation(record: BearingRecord, between: Between, cutoff: float, mass: floa
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
     (log,) = logs
     assert isinstance(log, Log)
-    result = bristles_from_presliding(log, believed_between(prior, log))
-    return result if "friction.viscous" in prior.believed(log) else with_viscous_friction(result)
+    between = believed_between(prior, log)
+    if VISCOUS in prior.estimates or (prior.from_user and VISCOUS in prior.flat(log)):
+        return bristles_from_presliding(log, between)
+    result = bristles_from_presliding(log, replace(between, viscous=(0.0, 0.0)))
+    return replace(result, damping=_at_most(result.damping))
 
 
-def with_viscous_friction(result: Presliding) -> Presliding:
-    """The same where viscous friction is not known: the damping found is its sum with that of the bristles."""
-    damping = replace(result.damping, low=(1 - VISCOUS) * result.damping.low)
-    return replace(result, damping=damping, warnings=(*result.warnings, SUM))
+def _at_most(total: Estimate) -> Estimate:
+    """The damping of the bristles where viscous friction is not known: at most the `total` of the two."""
+    if not total.determined:
+        return total
+    why = f"its sum with viscous friction, which is not known, is {total.low:.4g} to {total.high:.4g} {total.unit}"
+    return Estimate.unknown(total.name, total.unit, total.method, why, 0.0, total.high)
 
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:

@@ -57,6 +57,8 @@ _GLUED = re.compile(
 )
 _OVER = re.compile(r"(?P<name>[^/\[(]*?[^/\[(\s])(?:\s*/\s*|\s+in\s+)(?P<unit>\([^()]+\)|[^\s()\[\]]+)")
 """Headings of ISO 80000, a quantity over its unit, and their like in words."""
+_QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\s*/\s*(?P<under>[^\s_/\[(]+)")
+"""Headings whose last part is, or may be, a unit over a unit: "Speed m/s"."""
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
 """Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
 _MEASURED_IN = {
@@ -107,6 +109,7 @@ _KINDS = (
     "N/V",
     "m/N",
     "V/m",
+    "N/m",
     "K",
 )
 
@@ -114,8 +117,14 @@ _KINDS = (
 def split_heading(heading: str) -> tuple[str, str]:
     """Name and unit of a heading: "Position (mm)" is ("Position", "mm"). A text in square brackets is always a unit
     unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none), as one
-    behind a stroke or "in": "x/mm", "Kraft in N". Else a name may end with its unit, and keeps it: "angle_deg"."""
+    behind a stroke or "in": "x/mm", "Kraft in N"; of "Speed m/s" the stroke is in the unit, and "Gain A/V" has none.
+    Else a name may end with its unit, and keeps it: "angle_deg"."""
     heading = heading.strip()
+    quotient = _QUOTIENT.fullmatch(heading)
+    if quotient is not None and is_unit(unit := f"{quotient['over']}/{quotient['under']}"):
+        return quotient["name"], unit
+    if quotient is not None and quotient["over"] != "s" and ("*" in quotient["over"] or is_unit(quotient["over"])):
+        return heading, ""  # but of "Weg s/mm"
     over = _OVER.fullmatch(heading)
     if over is not None and is_unit(over["unit"].strip("()")) and not is_unit(heading):
         return over["name"], over["unit"].strip("()")

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
+from friso.identification.output_error.parameters import MASS, RATIO, SHARE, FitParameter
 from friso.intervals import COVERAGE
 
 DRAWS, SEED = 16, 5
@@ -19,8 +19,8 @@ def drawn_from(
 ) -> np.ndarray:
     """Fitted numbers, shape (draws, parameters), of machines within the `estimates`, about those of the fit, `inner`.
 
-    What is determined is drawn as its intervals and their `correlation` say, what is not from the range that is left,
-    logarithms evenly; a parameter without a finite range stays as it was fitted.
+    What is determined is drawn as its intervals and their `correlation` say, what is not evenly from the range that is
+    left, or of the logarithm; a parameter of which nothing is known from all of its own range.
     """
     rng = np.random.default_rng(SEED)
     determined = [estimate for estimate in estimates if estimate.determined]
@@ -31,21 +31,29 @@ def drawn_from(
         for estimate, step in zip(determined, steps.T, strict=True)
     }
     for estimate in estimates:
-        if not estimate.determined and 0 < estimate.low < estimate.high < np.inf:
-            values[estimate.name] = np.exp(rng.uniform(np.log(estimate.low), np.log(estimate.high), DRAWS))
+        if not estimate.determined and np.isfinite([estimate.low, estimate.high]).all():
+            range_left = FitParameter(estimate.name, "", np.nan, estimate.low, estimate.high, estimate.low > 0)
+            values[estimate.name] = _evenly(range_left, rng)
     rows = np.tile(inner, (DRAWS, 1))
     for number, parameter in enumerate(parameters):
         drawn = _of_parameter(parameter.name, values)
-        if drawn is not None:
-            rows[:, number] = parameter.inner(np.clip(drawn, parameter.low, parameter.high))
+        drawn = _evenly(parameter, rng) if drawn is None else np.clip(drawn, parameter.low, parameter.high)
+        rows[:, number] = parameter.inner(drawn)
     return rows
+
+
+def _evenly(parameter: FitParameter, rng: np.random.Generator) -> np.ndarray:
+    """Values from all of the range of a parameter, shape (draws,)."""
+    return parameter.outer(rng.uniform(parameter.inner(parameter.low), parameter.inner(parameter.high), DRAWS))
 
 
 def _of_parameter(name: str, values: Mapping[str, np.ndarray]) -> np.ndarray | None:
     """A parameter of the machines drawn, whose keys have these values; None where these do not tell it."""
-    if name == MASS:
+    if name in (MASS, SHARE):
         masses = [values[key] for key in ("masses.cart", "masses.stage") if key in values]
-        return sum(masses[1:], masses[0]) if masses else None
+        if not masses or (name == SHARE and len(masses) < 2):
+            return None
+        return sum(masses[1:], masses[0]) if name == MASS else masses[0] / (masses[0] + masses[1])
     if name == RATIO:
         both = [values.get(f"friction.{key}") for key in ("static", "coulomb")]
         return None if both[0] is None or both[1] is None else both[0] / both[1]

@@ -5,10 +5,13 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from friso.axis import axis_shown, unit_shown
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, SimulatedLog
+from friso.identification.output_error.drawn import DRAWS
 from friso.identification.output_error.profile import Profile
 from friso.quantities import percent
 from friso.views.documents import unit_suffix
@@ -139,11 +142,12 @@ def _headline(moves: IdentifiedMoves) -> str:
 
 
 def _prediction_sentence(simulated: SimulatedLog) -> str:
-    errors = simulated.errors
+    errors, apart = simulated.errors, simulated.apart
+    farthest = f"differs from it by {percent(apart)} of the position" if np.isfinite(apart) else "runs away"
     return (
         f"relative errors of position {percent(errors.position, 3)}, velocity {percent(errors.velocity, 3)}, "
-        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; machines within the "
-        f"intervals differ from it by up to {percent(simulated.apart)} of the position."
+        f"acceleration {percent(errors.acceleration, 3)}, force {percent(errors.force, 3)}; of {DRAWS} machines "
+        f"drawn from the intervals, and from the ranges of what is not identified, the farthest {farthest}."
     )
 
 
