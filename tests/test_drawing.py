@@ -91,6 +91,7 @@ def test_values_in_sentences():
     assert plus_minus(0.52e-3, "m") == "±0.52 mm"
     assert plus_minus(0.345e-3, "m") == "±345 µm"
     assert range_with_unit(0.233e-3, 2.07e-3, "m") == "0.233 to 2.07 mm"
+    assert range_with_unit(520.1e-6, 520.4e-6, "m") == "520 µm"
 
 
 def test_shares_in_percent_have_no_exponents():

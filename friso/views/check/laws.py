@@ -17,13 +17,16 @@ if TYPE_CHECKING:
 
     from friso.studies.laws.verdicts import LawVerdict, Trial, VerdictsByLaw
 
+SAME = 1e-3
+"""Share by which edges differ that are told as one."""
+
 COUNTS = {3: "three", 4: "four", 5: "five", 6: "six", 7: "seven", 8: "eight", 9: "nine"}
 
 
 def laws_sentences(laws: VerdictsByLaw) -> list[str]:
     """Case by case whether the verdict depends on the law, and what would decide; then which laws were not tried."""
     labels = case_labels(laws.stage)
-    says = [f"{labels[case]}: {_sentence(laws, case)}" for case in labels]
+    says = [f"{labels[case]}: {_sentence(laws, case)}{_beyond(laws, case)}" for case in labels]
     if laws.left_out:
         lost = [f"{law} ({listed([SHOWN[kind] for kind in kinds], 'and')})" for law, kinds in laws.left_out.items()]
         says.append(f"Not tried, because they cannot reproduce the measurements: {'; '.join(lost)}.")
@@ -117,12 +120,21 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
     return f", edge {_span(laws, (low, high))}{doubt}{', ' + missing if missing else ''}"
 
 
+def _beyond(laws: VerdictsByLaw, case: str) -> str:
+    """That the edge of the stage's own law, which advice keeps a distance from, is not the highest."""
+    own, *others = (verdict.edges(case) for verdict in laws.verdicts)
+    highest = max((edges[1] for edges in others if edges), default=0.0)
+    if own is None or highest <= own[1] * (1 + SAME):
+        return ""
+    return f" What is advised keeps clear of the edge under {laws.verdicts[0].law}: keep clear of the highest."
+
+
 def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
     """Edges in hertz, or in factors of the bandwidth."""
     low, high = ends
     if laws.in_hertz:
-        return with_unit(low, "Hz") if high - low < 1e-3 * high else range_with_unit(low, high, "Hz")
-    return f"at {low:.3g}" + ("" if high - low < 1e-3 * high else f" to {high:.3g}") + " times the bandwidth"
+        return range_with_unit(low, high, "Hz")
+    return f"at {low:.3g}" + ("" if high - low < SAME * high else f" to {high:.3g}") + " times the bandwidth"
 
 
 def laws_columns(laws: VerdictsByLaw) -> list[str]:

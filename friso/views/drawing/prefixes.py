@@ -83,11 +83,13 @@ def rounded_down(value: float, digits: int = 3) -> float:
 
 
 def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
-    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"; a wide one has two prefixes."""
+    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"; a wide one has two prefixes, and one whose ends
+    have the same digits is a single number."""
     factor, text = choose(np.array([low, high]), unit)
     if 0 < low * factor < 0.01:
         return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
-    return f"{_significant(low * factor, digits)} to {_significant(high * factor, digits)} {text}"
+    first, last = _significant(low * factor, digits), _significant(high * factor, digits)
+    return f"{first} {text}" if first == last else f"{first} to {last} {text}"
 
 
 def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
