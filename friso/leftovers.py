@@ -7,7 +7,6 @@ import errno
 import shutil
 import stat
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -15,9 +14,6 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.system import MOVES_OPEN_FOLDERS, foreign_writers
-
-YOUNG = 60.0
-"""Age [s] up to which a folder is no leftover: its process may be about to lock it."""
 
 _TRIES = 3
 
@@ -73,14 +69,13 @@ def remove_leftover(folder: Path, lock: str) -> None:
 
 def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
     """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; what others put
-    there, to have a lock made in a folder of this user, stays, and what is young."""
+    there, to have a lock made in a folder of this user, stays."""
     for folder in root.glob(f"{prefix}*"):
         try:
             status = folder.lstat()
         except OSError:  # another process was quicker
             continue
-        old = time.time() - status.st_mtime > YOUNG
-        if old and stat.S_ISDIR(status.st_mode) and not foreign_writers(status):
+        if stat.S_ISDIR(status.st_mode) and not foreign_writers(status):
             remove_leftover(folder, lock)
 
 

@@ -222,8 +222,8 @@ def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that
     moving = np.gradient(log["position"], DT)
     slid = record("small", DT, position=log["position"], force=log["force"] + viscous * moving)
     for logs in ([slid], [slid, slid]):
-        found = identify([(log, "presliding") for log in logs]).estimates
-        (damping,) = (one for one in found if one.name == "friction.bristle_damping")
+        estimates = identify([(log, "presliding") for log in logs]).estimates
+        (damping,) = (one for one in estimates if one.name == "friction.bristle_damping")
         assert not damping.determined
         assert damping.low == 0
         assert damping.high == pytest.approx(DAMPING + viscous, rel=0.02)

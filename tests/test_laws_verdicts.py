@@ -177,12 +177,12 @@ def test_ends_that_only_some_machines_have_are_tried_and_laws_that_only_some_los
     machines = [RIGID.with_numbers({"friction.static": s, "friction.coulomb": c}) for s, c in ((1.0, 1e-3), (3.0, 3.0))]
     laws = frictions_that_keep(machines)
     assert laws.lost == {"dahl": [0]}
-    given, most = (
+    least, most = (
         laws.frictions[name]["friction.breakaway_deflection"]
         for name in ("elasto_plastic", "elasto_plastic, most breakaway_deflection")
     )
-    assert most[0] == given[0]
-    assert most[1] > given[1]
+    assert most[0] == least[0]
+    assert most[1] > least[1]
 
 
 def test_nothing_hunts_without_an_integrator() -> None:

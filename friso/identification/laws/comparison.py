@@ -110,9 +110,9 @@ def compare_laws(logs: Sequence[Log], stage: Stage, prior: Prior, progress: Prog
     if not records:
         reasons = "; ".join(f"{name}: {why}" for name, why in left_out.items()) or "no log over time"
         raise InputError("--laws", reasons, "a log of position and force that shows friction", "presliding.csv")
-    known = prior.stage.flat() if prior.stage else {}
-    unseen = known.get("friction.model") in comparable()
-    flat = known if unseen else stage.flat() | {key: estimate.value for key, estimate in prior.estimates.items()}
+    base = prior.stage.flat() if prior.stage else {}
+    unseen = base.get("friction.model") in comparable()
+    flat = base if unseen else stage.flat() | {key: estimate.value for key, estimate in prior.estimates.items()}
     if f"{MOTOR_FRICTION}.model" in flat:
         raise InputError("--laws", "a stage with friction at the motor too", "the friction of one bearing", "no --laws")
     model = flat["friction.model"]

@@ -121,12 +121,13 @@ def _edges(laws: VerdictsByLaw, case: str) -> str:
 
 
 def _beyond(laws: VerdictsByLaw, case: str) -> str:
-    """That the edge of the stage's own law, which advice keeps a distance from, is not the highest."""
-    own, *others = (verdict.edges(case) for verdict in laws.verdicts)
-    highest = max((edges[1] for edges in others if edges), default=0.0)
-    if own is None or highest <= own[1] * (1 + SAME):
+    """That advice keeps clear of the edge under the stage's own law, where that is not the highest."""
+    own, *others = laws.verdicts
+    edges = own.edges(case)
+    highest = max((other[1] for verdict in others if (other := verdict.edges(case))), default=0.0)
+    if own.hunts(case) is not True or edges is None or highest <= edges[1] * (1 + SAME):
         return ""
-    return f" What is advised keeps clear of the edge under {laws.verdicts[0].law}: keep clear of the highest."
+    return f" The advice keeps clear of the edge under {own.law} alone; keep clear of the highest of these."
 
 
 def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
