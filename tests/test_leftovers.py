@@ -45,11 +45,11 @@ def test_a_folder_that_is_removed_while_it_is_locked_is_made_anew(
     assert [*tmp_path.iterdir()] == []
 
 
-def test_a_folder_that_was_just_made_is_no_leftover(tmp_path: Path) -> None:
-    """Its process may be about to lock it."""
-    young, old = tmp_path / "a-young", tmp_path / "a-old"
-    for folder in (young, old):
-        folder.mkdir(mode=0o700)
-    os.utime(old, (0, 0))
-    remove_leftovers(tmp_path, "a-", LOCK)
-    assert [*tmp_path.iterdir()] == [young]
+def test_a_lock_decides_what_is_left_over(tmp_path: Path) -> None:
+    """At whatever age: a process that has not locked its folder yet makes another."""
+    for name in ("a-young", "a-old", "b-other"):
+        (tmp_path / name).mkdir(mode=0o700)
+    os.utime(tmp_path / "a-old", (0, 0))
+    with locked_folder(tmp_path, "a-", LOCK) as folder:
+        remove_leftovers(tmp_path, "a-", LOCK)
+        assert {*tmp_path.iterdir()} == {folder, tmp_path / "b-other"}
