@@ -32,7 +32,7 @@ from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
 from friso.app.serve import listening
 from friso.app.server import application
-from friso.app.work import Workshop
+from friso.app.work import Work, Workshop
 from friso.engine.overtaken import Overtaken, ended_by, go_on
 from friso.errors import InputError, LogError
 from friso.studies.execute import local_crew
@@ -506,11 +506,13 @@ def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> N
     async def asked() -> list[bytes]:
         workshop, go = Workshop(), threading.Event()
         waiting = [
-            asyncio.create_task(anext(workshop.answer("", str(k), lambda _: iter([{}][: go.wait(60)]))))
+            asyncio.create_task(anext(workshop.answer("", str(k), 0, lambda _: iter([{}][: go.wait(60)]))))
             for k in range(20)
         ]
         try:
-            return [frame async for frame in workshop.answer("", "quick", lambda _: iter([{"kind": "answer"}]), True)]
+            return [
+                frame async for frame in workshop.answer("", "quick", 0, lambda _: iter([{"kind": "answer"}]), True)
+            ]
         finally:
             go.set()
             await asyncio.gather(*waiting)
@@ -518,6 +520,33 @@ def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> N
 
     (frame,) = asyncio.run(asked())
     assert b"answer" in frame
+
+
+def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:
+    """Two connections are read in any order."""
+
+    async def asked() -> list[list[bytes]]:
+        workshop, go = Workshop(), threading.Event()
+
+        async def answer(number: int) -> list[bytes]:
+            def job(work: Work) -> Iterator[dict[str, Any]]:
+                assert go.wait(60)
+                go_on()
+                yield {"kind": f"answer {number}"}
+
+            return [frame async for frame in workshop.answer("", "run", number, job)]
+
+        newer = asyncio.create_task(answer(2))
+        await asyncio.sleep(0)
+        late = await answer(1)
+        go.set()
+        answers = [late, await newer]
+        workshop.close()
+        return answers
+
+    (late,), (newer,) = asyncio.run(asked())
+    assert b"overtaken" in late
+    assert b"answer 2" in newer
 
 
 def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> None:

@@ -6,12 +6,13 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from threading import Event
-from types import SimpleNamespace
+from threading import Event, Timer
 from typing import Any
 
+import numpy as np
 import pytest
 from filelock import FileLock
 from inside import friso_inside
@@ -19,6 +20,7 @@ from systems import posix
 
 from friso import interrupts
 from friso.engine import building
+from friso.engine.overtaken import Overtaken, ended_by
 
 pytestmark = posix  # elsewhere a process cannot send itself such a signal, but is ended
 
@@ -148,10 +150,26 @@ class Builder:
         return "ended"
 
 
+@dataclass(frozen=True)
+class Request:
+    """What is to be built, with a lock of its own."""
+
+    file: Path
+    title: str = "a kernel"
+    plug_ins: str = ""
+
+    def lock(self) -> FileLock:
+        return FileLock(self.file)
+
+    def entry(self) -> None:
+        return None
+
+    def answer(self, name: str) -> None:
+        pass
+
+
 def requests(folder: Path, count: int) -> list[Any]:
-    """What is to be built, each with a lock of its own."""
-    shared = {"entry": lambda: None, "answer": print, "title": "a kernel", "plug_ins": ""}
-    return [SimpleNamespace(lock=lambda n=n: FileLock(folder / f"{n}.lock"), **shared) for n in range(count)]
+    return [Request(folder / f"{n}.lock") for n in range(count)]
 
 
 def test_compiling_that_is_given_up_is_not_begun_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -166,8 +184,32 @@ def test_compiling_that_is_given_up_is_not_begun_again(tmp_path: Path, monkeypat
     monkeypatch.setattr(building, "_taken", lambda surroundings: waiting.pop() if waiting else None)
     monkeypatch.setattr(building, "_Builder", Failing)
     with pytest.raises(RuntimeError, match="could not be compiled"):
-        building._Work(requests(tmp_path, 2)).finish()
+        building._Work().finish(requests(tmp_path, 2))
     assert len(started) == 1  # the builder that was killed is not replaced
+
+
+def test_what_is_compiled_when_its_question_is_overtaken_is_there_for_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, go = [], Event()
+
+    class Building(Builder):
+        def build(self, request: object) -> str:
+            begun.append(request)
+            go.wait(10)
+            return "name"
+
+    monkeypatch.setattr(building, "_taken", lambda surroundings: None)
+    monkeypatch.setattr(building, "_waiting", [])
+    monkeypatch.setattr(building, "_Builder", Building)
+    work, flag = building._Work(), np.zeros(1, np.int64)
+    asked = requests(tmp_path, 1)
+    Timer(0.3, lambda: flag.fill(1)).start()
+    with pytest.raises(Overtaken), ended_by(flag):
+        work.finish(asked)
+    Timer(0.3, go.set).start()
+    work.finish(asked)
+    assert len(begun) == 1
 
 
 def test_who_waits_for_another_that_compiles_can_be_interrupted(
@@ -176,4 +218,4 @@ def test_who_waits_for_another_that_compiles_can_be_interrupted(
     monkeypatch.setattr(building, "usable_cores", lambda: 1)
     interrupts.signal_later(0.3, lambda *_: os.kill(os.getpid(), signal.SIGINT))
     with FileLock(tmp_path / "0.lock"), pytest.raises(KeyboardInterrupt), interrupts.raising():
-        building._Work(requests(tmp_path, 1)).finish()
+        building._Work().finish(requests(tmp_path, 1))

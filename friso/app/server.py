@@ -45,7 +45,9 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         except InputError as error:
             return _refused(str(error), 422)
         page, lane = str(data.get("page", ""))[:80], str(data.get("lane", name))[:80]
-        frames = workshop.answer(page, lane, partial(job, asked), name in QUICK)
+        number = data.get("number")
+        number = number if isinstance(number, int) else 0
+        frames = workshop.answer(page, lane, number, partial(job, asked), name in QUICK)
         return StreamingResponse(frames, media_type=BINARY)
 
     async def started_with(request: Request) -> Response:

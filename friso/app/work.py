@@ -31,9 +31,10 @@ THREADS = 16
 
 @dataclass(eq=False)
 class Work:
-    """A question at work. `flag` ends it: another thread sets it."""
+    """A question at work, the page's `number`th. `flag` ends it: another thread sets it."""
 
     put: Callable[[dict[str, Any] | None], object]
+    number: int = 0
     flag: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     last: float = 0.0
     notes: list[str] = field(default_factory=list)
@@ -92,14 +93,15 @@ class Messages(logging.Handler):
 
 
 class Workshop:
-    """The questions at work, one on every lane of a page: a newer one overtakes the one before it."""
+    """The questions at work, one on every lane of a page: a newer one, which has a larger number, overtakes the one
+    before it, in whatever order they arrive."""
 
     def __init__(self) -> None:
         self.pool = ThreadPoolExecutor(THREADS, thread_name_prefix="friso-app")
         self.quick = ThreadPoolExecutor(2, thread_name_prefix="friso-app-quick")
         self.lanes: dict[tuple[str, str], Work] = {}
 
-    async def answer(self, page: str, lane: str, job: Job, quick: bool = False) -> AsyncIterator[bytes]:
+    async def answer(self, page: str, lane: str, number: int, job: Job, quick: bool = False) -> AsyncIterator[bytes]:
         """The frames of an answer, as they come. Whoever stops reading ends the work. A `quick` question computes
         nothing, and does not wait for those that do."""
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
@@ -108,9 +110,12 @@ class Workshop:
             if not loop.is_closed():
                 loop.call_soon_threadsafe(parts.put_nowait, part)
 
-        work, place = Work(put), (page, lane)
-        if place in self.lanes:
-            self.lanes[place].overtake()
+        work, place = Work(put, number), (page, lane)
+        if before := self.lanes.get(place):
+            if before.number > number:
+                yield frame({"kind": "overtaken"})
+                return
+            before.overtake()
         self.lanes[place] = work
         try:
             context = copy_context()

@@ -12,31 +12,33 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections import deque
 from collections.abc import Iterable, Iterator
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_EXCEPTION, Future, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from threading import Lock
+from threading import Lock, Semaphore, Thread
 
 from filelock import Timeout
 
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
+from friso.engine.overtaken import Overtaken, go_on
 from friso.engine.prune import prune
 from friso.system import usable_cores
 
 _PATIENCE = 0.1
-"""How long [s] another process that builds the same is waited for before it is looked whether there is still need."""
+"""How long [s] is waited before it is looked whether there is still need."""
 
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
-    Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written."""
+    Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written, Overtaken
+    where nobody waits for them any more: what is being built is, to its end, for whoever asks next."""
     requests = list(requests)
     compiled = {request: request.entry() for request in requests}
     if missing := [request for request, entry in compiled.items() if entry is None]:
-        _Work(missing).finish()
+        _work(os.getpid()).finish(missing)
         prune(cache_folder())
         compiled |= {request: request.entry() for request in missing}
     if dropped := [request.title for request, entry in compiled.items() if entry is None]:
@@ -45,43 +47,92 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
 
 
 class _Work:
-    """Requests that are still to be met, taken by builders one by one."""
+    """What a process is building, each request once for all of its threads that wait for it, as many at a time as
+    there are cores."""
 
-    def __init__(self, requests: list[CodeRequest]) -> None:
-        self._count, self._waiting = len(requests), deque(enumerate(requests, 1))
-        self._busy: list[_Builder] = []
+    def __init__(self) -> None:
+        self._cores, self._turn = Semaphore(usable_cores()), Lock()
+        self._jobs: dict[CodeRequest, _Job] = {}
+
+    def finish(self, requests: list[CodeRequest]) -> None:
+        """Meet all requests. What ends this early ends the jobs that it began, unless it was overtaken."""
+        with self._turn:
+            began = [
+                _Job(request, f"{number} of {len(requests)}")
+                for number, request in enumerate(requests, 1)
+                if request not in self._jobs
+            ]
+            self._jobs |= {job.request: job for job in began}
+            jobs = [self._jobs[request] for request in requests]
+        for job in began:  # in threads that keep nobody from leaving
+            Thread(target=self._do, args=[job], daemon=True).start()
+        try:
+            _wait(jobs)
+        except Overtaken:
+            raise
+        except BaseException:
+            for job in began:  # all, before any has ended: one that starts now ends itself
+                job.give_up()
+            wait(job.met for job in began)
+            raise
+
+    def _do(self, job: _Job) -> None:
+        with self._cores:
+            try:
+                job.meet()
+                error = None
+            except BaseException as raised:
+                error = raised
+            with self._turn:
+                del self._jobs[job.request]
+        if error is None:
+            job.met.set_result(None)
+        else:
+            job.met.set_exception(error)
+
+
+@cache
+def _work(process: int) -> _Work:
+    """The work of a process: one that was forked has none of its own."""
+    return _Work()
+
+
+def _wait(jobs: list[_Job]) -> None:
+    """Wait until all jobs are done. Raises what the first of them to fail has raised."""
+    waiting = {job.met for job in jobs}
+    while waiting:
+        go_on()
+        done, waiting = wait(waiting, _PATIENCE, FIRST_EXCEPTION)
+        for met in done:
+            met.result()
+
+
+class _Job:
+    """A request that is to be met, and at last is; `place`: which of how many."""
+
+    def __init__(self, request: CodeRequest, place: str) -> None:
+        self.request, self.met = request, Future[None]()
+        self._place = place
+        self._builder: _Builder | None = None
         self._given_up = False
 
-    def finish(self) -> None:
-        """Meet all of them. Whatever ends it early ends the builders too."""
-        cores = min(self._count, usable_cores())
-        with ThreadPoolExecutor(cores) as pool:
-            try:
-                for job in as_completed([pool.submit(self._meet) for _ in range(cores)]):
-                    job.result()
-            except BaseException:
-                self._given_up = True  # before any is ended: one that starts now ends itself
-                for builder in list(self._busy):
-                    builder.kill()
-                raise
+    def give_up(self) -> None:
+        """Have it end as soon as may be."""
+        self._given_up = True  # before the builder is ended: one that starts now ends itself
+        if builder := self._builder:
+            builder.kill()
 
-    def _meet(self) -> None:
-        while not self._given_up:
-            try:
-                number, request = self._waiting.popleft()
-            except IndexError:
-                return
-            with self._turn(request):
-                if request.entry() is None:  # no other process has built it meanwhile
-                    place = f"{number} of {self._count}"
-                    logger.warning("compiling, once on this machine, %s: %s", place, request.title)
-                    request.answer(self._built(request))
+    def meet(self) -> None:
+        """Meet the request."""
+        with self._turn():
+            if self.request.entry() is None:  # no other process has built it meanwhile
+                logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
+                self.request.answer(self._built())
 
     @contextmanager
-    def _turn(self, request: CodeRequest) -> Iterator[None]:
-        """Hold the lock of what is requested, once no other process does. Raises RuntimeError where the work is given
-        up meanwhile."""
-        lock = request.lock()
+    def _turn(self) -> Iterator[None]:
+        """Hold the lock of what is requested, once no other process does."""
+        lock = self.request.lock()
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
@@ -95,17 +146,16 @@ class _Work:
         if self._given_up:
             raise RuntimeError("the kernels were not compiled: interrupted")
 
-    def _built(self, request: CodeRequest) -> str:
+    def _built(self) -> str:
         """Build what is requested, by a builder that waits where there is one; the name of the entry."""
-        surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(filter(None, sys.path)), request.plug_ins)
+        surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(filter(None, sys.path)), self.request.plug_ins)
         while True:
             waiting = _taken(surroundings)
-            builder = waiting or _Builder(surroundings)
-            self._busy.append(builder)
+            self._builder = builder = waiting or _Builder(surroundings)
             if self._given_up:
                 builder.kill()
-            name = builder.build(request)
-            self._busy.remove(builder)
+            name = builder.build(self.request)
+            self._builder = None
             if name:
                 _waiting.append(builder)
                 return name

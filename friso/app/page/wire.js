@@ -3,6 +3,7 @@ import { token } from "./dom.js";
 
 const page = token();
 const lanes = new Map();
+let asked = 0;
 
 /** Ask a question; `part` is called with every part of the answer. Resolves to the last part, or null if overtaken. */
 export async function ask(question, body, lane = question, part = () => {}) {
@@ -13,7 +14,7 @@ export async function ask(question, body, lane = question, part = () => {}) {
     const response = await fetch(`ask/${question}`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
-      body: JSON.stringify({ ...body, page, lane }),
+      body: JSON.stringify({ ...body, page, lane, number: ++asked }),
       signal: abort.signal,
     });
     if (!response.ok) return refusal(response);

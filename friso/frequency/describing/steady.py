@@ -53,7 +53,7 @@ class Imposition:
         motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
         return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)
 
-    @cached_property
+    @property
     def kernel(self) -> Kernel:
         first = {key: value[0] if np.ndim(value) else value for key, value in self.flat.items()}
         return kernel(imposed_form(first))

@@ -53,7 +53,7 @@ class Ensemble:
     def structure(self) -> Structure:
         return self.form or shared_structure(self.flat)
 
-    @cached_property
+    @property
     def kernel(self) -> Kernel:
         return kernel(self.structure)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -82,7 +81,7 @@ class Problem:
     counted: np.ndarray
     unsettled: tuple[Inputs, ...] = ()
 
-    @cached_property
+    @property
     def kernel(self) -> Kernel:
         return kernel(self.form)
 
