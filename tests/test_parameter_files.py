@@ -126,6 +126,33 @@ def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force
     assert back["MAX_ERROR_I"] == pytest.approx(0.01)
 
 
+@pytest.mark.parametrize(
+    ("usual", "written", "times"),
+    [
+        ("P = 50", "P = 50   # was 30", 1),
+        ("SERVO_PERIOD = 1000000", "SERVO_PERIOD = 1000000 ; ns", 1),
+        ("[JOINT_0]", "[JOINT_0]  # X", 1),
+        ("LINEAR_UNITS = mm", "LINEAR_UNITS = 1.0", 1),
+        ("LINEAR_UNITS = mm", "LINEAR_UNITS = 0.03937007874016", 25.4),
+        ("[TRAJ]", "#INCLUDE traj.inc\n[TRAJ]", 1),
+    ],
+)
+def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: str, times: float) -> None:
+    """Comments behind values and sections, units by their number in a millimetre, other files taken in."""
+    path = ini(tmp_path, {"P": 50, "I": 100})
+    plain = path.read_text()
+    assert usual in plain
+    answers = {**MACHINE, "force_per_output": "20 N"}
+    expected = stage_from(path, None, answers)
+    path.write_text(plain.replace(usual, written))
+    drawn = stage_from(path, None, answers)
+    flat, before = (of.stage.flat() for of in (drawn, expected))
+    assert flat["controller.kp"] == pytest.approx(before["controller.kp"] / times)
+    assert flat["motion.acceleration"] == pytest.approx(before["motion.acceleration"] * times)
+    assert flat["drive.sample_time"] == pytest.approx(before["drive.sample_time"])
+    assert any("traj.inc" in sentence for sentence in drawn.left_out) == ("INCLUDE" in written)
+
+
 def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
     """With an output in machine units per second, as FF1 = 1 says."""
     gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001, "BIAS": 0.5}
@@ -208,6 +235,14 @@ def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
         {name: config[name] for name in names}
     )
     assert back["encoder.config.bandwidth"] == pytest.approx(1000.0)
+    lines = tmp_path / "parameters.txt"
+    lines.write_text(
+        f"# kept\n{FORMATS['odrive'].text(back)}odrv0.axis0.controller.config.enable_gain_scheduling = False\n"
+    )
+    again = stage_from(lines, None, {**labels, "motion.kind": "hold", "motion.duration": "1 s"})
+    assert not any("gain_scheduling" in sentence for sentence in again.left_out)
+    repeated = gains_of(friso.loads(again.text()), {"travel_per_turn": travel}, "odrive").parameters
+    assert repeated == pytest.approx({**back, "controller.config.inertia": 0.0})  # of a reference that the drive makes
     assert back["motor.config.torque_lim"] == pytest.approx(0.04 * 20)
 
 
@@ -295,7 +330,8 @@ BAD: dict[str, tuple[str | bytes, str]] = {
     "binary": (bytes(range(256)), "is not UTF-8"),
     "no gains": ("[JOINT_0]\nTYPE = LINEAR\n", "an axis whose loop LinuxCNC closes"),
     "stepper": ("[JOINT_0]\nP = 1000\nSTEPGEN_MAXVEL = 20\n", "a stepper"),
-    "no number": ("[JOINT_0]\nP = 50 # high\n", "a number"),
+    "no number": ("[JOINT_0]\nP = 50,5\n", "a number"),
+    "elsewhere": ("[TRAJ]\nLINEAR_UNITS = mm\n#INCLUDE joints.inc\n", "joints.inc"),
     "endless": ("[JOINT_0]\nP = 1e400\n", "a number of at most"),
     "not a number": ("[JOINT_0]\nP = nan\n", "a number of at most"),
     "two axes": ("[JOINT_0]\nP = 50\n[JOINT_1]\nP = 50\n", "--axis JOINT_0"),

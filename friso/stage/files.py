@@ -149,7 +149,7 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
         raise InputError("", str(error), f"{expected}, {most}", example, str(path)) from None
     except UnicodeDecodeError as error:
         text = f"byte {error.start + 1} is not UTF-8"
-        raise InputError("", text, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
+        raise InputError("", text, "a text file saved as UTF-8", example, str(path)) from None
     except (OSError, ValueError) as error:
         text = "a folder" if os.path.isdir(path) else _reason(error)
         raise InputError("", text, expected, example, str(path)) from None

@@ -13,6 +13,7 @@ import re
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
+from math import isclose
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
 from friso.drives.format import AsStage, AxisParameters, FlatStage, ParameterFormat, Parameters, lacks, si
@@ -48,6 +49,14 @@ MOST_LINES = 100_000
 _AXIS = r"(?:JOINT|AXIS)_[0-9]{1,3}"
 """The name of a section with the parameters of an axis."""
 
+_COMMENT = re.compile(r"\s[#;]")
+"""How a comment begins behind a value."""
+
+_INCLUDE = re.compile(r"^#INCLUDE[ \t]+(\S{1,200})", re.MULTILINE)
+"""A line that takes in another file."""
+
+INCLUDED = "#INCLUDE"
+
 HELD = frozenset(
     {
         "kp",
@@ -65,17 +74,19 @@ HELD_OF_CASCADE = frozenset(("kv", "position_integral_time", "velocity_feedforwa
 
 
 def recognises(name: str, text: str) -> bool:
-    """By a section of a joint or an axis."""
-    return re.search(rf"^[ \t]*\[{_AXIS}\]", text, re.MULTILINE) is not None
+    """By a section of a joint, an axis or the whole machine."""
+    return re.search(rf"^[ \t]*\[(?:{_AXIS}|EMC|EMCMOT|TRAJ)\]", text, re.MULTILINE) is not None
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:
     """Joints (2.8 and later) or axes with a P. Raises InputError where there is none, or a file is no INI file."""
     sections = _sections(text)
+    included = _INCLUDE.findall(text)[:3]
     machine = {
         "unit": sections.get("TRAJ", {}).get("LINEAR_UNITS"),
         "angle": sections.get("TRAJ", {}).get("ANGULAR_UNITS"),
         "SERVO_PERIOD": sections.get("EMCMOT", {}).get("SERVO_PERIOD"),
+        INCLUDED: ", ".join(included) or None,
     }
     with_gains = [
         AxisParameters(f"[{name}]", values, {key: value for key, value in machine.items() if value is not None})
@@ -84,7 +95,10 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
     ]
     joints = [axis for axis in with_gains if axis.name.startswith("[JOINT")]
     if not with_gains:
-        raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", "an axis whose loop LinuxCNC closes", "P = 50")
+        expected = "an axis whose loop LinuxCNC closes"
+        if included:
+            expected += f"; what #INCLUDE names ({machine[INCLUDED]}) is not read and has to stand in the file"
+        raise InputError("", "no [JOINT_n] or [AXIS_n] with a P", expected, "P = 50")
     letters = re.sub(r"\s", "", sections.get("TRAJ", {}).get("COORDINATES", "")).upper()
     named = [replace(axis, name=axis.name.strip("[]")) for axis in joints or with_gains]
     counts = Counter(letters)
@@ -109,11 +123,11 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
         if not line or line[0] in "#;":
             continue
         if line.startswith("["):
-            section = sections.setdefault(line.strip("[]").strip(), {})
+            section = sections.setdefault(line[1:].partition("]")[0].strip(), {})
             continue
         key, equals, value = line.partition("=")
         if equals:
-            section.setdefault(key.strip(), value.strip())
+            section.setdefault(key.strip(), _COMMENT.split(value, maxsplit=1)[0].strip())
     return sections
 
 
@@ -145,6 +159,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     kind = _kind(axis)
     unit = _metres(axis, answers, kind)
     left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.is_set(key)]
+    if INCLUDED in axis.machine:
+        left.append(f"what #INCLUDE names: {axis.machine[INCLUDED]}")
     in_torque = FORCE in answers
     controller, more = (_torque if in_torque else _velocity)(axis, answers, kind, unit)
     if axis.is_set("DEADBAND"):
@@ -240,9 +256,18 @@ def _kind(axis: AxisParameters) -> AxisKind:
 
 
 def _unit_of(axis: AxisParameters) -> str | None:
-    """The machine unit of an axis, as the file says."""
-    name = axis.machine.get("unit" if _kind(axis) == LINEAR else "angle", axis.values.get("UNITS"))
-    return None if name is None else str(name).lower()
+    """The machine unit of an axis, as the file says: by its name, or, as older files do, by how many of it are a
+    millimetre or a degree."""
+    kind = _kind(axis)
+    name = axis.machine.get("unit" if kind == LINEAR else "angle", axis.values.get("UNITS"))
+    if name is None:
+        return None
+    try:
+        per_unit = 1 / float(name)
+    except (ValueError, ZeroDivisionError):
+        return str(name).lower()
+    known, base = (LENGTHS, 1e-3) if kind == LINEAR else (ANGLES, ANGLES["deg"])
+    return next((unit for unit, size in known.items() if isclose(size, per_unit * base, rel_tol=1e-4)), str(name))
 
 
 def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:

@@ -8,6 +8,7 @@ phase-locked loop, which has a double pole at its bandwidth. Earlier firmware co
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from math import inf, pi
 from typing import Any
@@ -81,13 +82,45 @@ HELD = frozenset(
 """Names in [controller] that the parameters hold; a velocity fed forward by the drive's own trajectories, or not."""
 
 
+_LINE = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.(axis[0-9]{1,3}\.[\w.]{1,180})[ \t]*=[ \t]*([^#\s]{1,200})", re.MULTILINE)
+"""A line for odrivetool that sets a parameter."""
+
+IN_TURNS = "motor.config.torque_constant"
+"""A parameter that firmware has whose gains are in turns and N m."""
+
+
 def recognises(name: str, text: str) -> bool:
-    """By being JSON with gains of an axis."""
-    return text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text
+    """By being JSON with gains of an axis, or lines for odrivetool."""
+    return (text.lstrip().startswith("{") and '"axis' in text and "vel_integrator_gain" in text) or bool(
+        _LINE.search(text)
+    )
 
 
 def axes(text: str) -> tuple[AxisParameters, ...]:
-    """Axes with gains. Raises InputError for what is no JSON, and for firmware whose units are others."""
+    """Axes with gains. Raises InputError for what is no JSON and no lines for odrivetool, and for firmware whose units
+    are others."""
+    in_lines = not text.lstrip().startswith("{")
+    values = dict(_LINE.findall(text)) if in_lines else _entries(text)
+    held: dict[str, dict[str, Any]] = {}
+    for key, value in values.items():
+        name, _, inside = key.partition(".")
+        held.setdefault(name, {})[inside] = {"True": True, "False": False}.get(value, value) if in_lines else value
+    axes = tuple(
+        AxisParameters(name, held[name])
+        for name in sorted(held)
+        if name.startswith("axis") and f"{CONFIG}.pos_gain" in held[name]
+    )
+    if not axes:
+        raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
+    for axis in axes:
+        if IN_TURNS not in axis.values and not in_lines:
+            actual = f"{axis.name} without a {IN_TURNS}, which firmware 0.5.1 to 0.5.6 has"
+            raise InputError("", actual, "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6")
+    return axes
+
+
+def _entries(text: str) -> dict[str, Any]:
+    """The entries of a JSON document by their places. Raises InputError for what is none."""
     try:
         document = json.loads(text)
     except RecursionError:
@@ -106,22 +139,7 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
             values[place] = entry
         if len(values) + len(waiting) > MOST_KEYS:
             raise InputError("", f"more than {MOST_KEYS} entries", "a configuration as odrivetool writes it")
-    held: dict[str, dict[str, Any]] = {}
-    for key, value in values.items():
-        name, _, inside = key.partition(".")
-        held.setdefault(name, {})[inside] = value
-    axes = tuple(
-        AxisParameters(name, held[name])
-        for name in sorted(held)
-        if name.startswith("axis") and f"{CONFIG}.pos_gain" in held[name]
-    )
-    if not axes:
-        raise InputError("", "no axis with a controller.config.pos_gain", "a configuration as odrivetool writes it")
-    for axis in axes:
-        if f"{MOTOR}.torque_constant" not in axis.values:
-            actual = f"{axis.name} without a motor.config.torque_constant, which firmware 0.5.1 to 0.5.6 has"
-            raise InputError("", actual, "firmware whose gains are in turns and N m: 0.5.1 to 0.5.6")
-    return axes
+    return values
 
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
@@ -180,9 +198,10 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
 
 def _torque_limit(axis: AxisParameters) -> float:
     """Torque [N m] that the motor gives at most."""
-    current = axis.number(f"{MOTOR}.current_lim", 0.0) if axis.is_set(f"{MOTOR}.current_lim") else inf
     torque = axis.number(f"{MOTOR}.torque_lim") if axis.is_set(f"{MOTOR}.torque_lim") else inf
-    return min(current * axis.number(f"{MOTOR}.torque_constant"), torque)
+    if not axis.is_set(f"{MOTOR}.current_lim"):
+        return torque
+    return min(axis.number(f"{MOTOR}.current_lim") * axis.number(IN_TURNS), torque)
 
 
 def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Mapping[str, Any]]:
@@ -205,6 +224,10 @@ def _motion(axis: AxisParameters, kind: AxisKind, travel: float) -> dict[str, Ma
 def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ...]:
     """What a stage cannot say of the axis, in sentences."""
     left = ["the position is the estimate of a phase-locked loop too, which follows a steady motion without an error"]
+    if IN_TURNS not in axis.values:
+        left.append(
+            f"the firmware, which no {IN_TURNS} tells: gains in turns and N m are assumed, as 0.5.1 to 0.5.6 has"
+        )
     if axis.values.get(f"{CONFIG}.enable_gain_scheduling"):
         width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
         left.append(
