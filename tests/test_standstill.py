@@ -15,6 +15,7 @@ from friso.equations.blocks import Loop
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
+from friso.frequency.parts import compensator
 from friso.hunting.cycle.hunting import DITHERS
 from friso.hunting.cycle.hunting import hunting as hunting_of
 from friso.stage import Stage
@@ -185,6 +186,14 @@ def test_nothing_is_sure_beyond_a_wide_dead_zone() -> None:
     wide = hunting_of(machine({"error_deadband": "3.5 mm"}))
     assert (wide.attracting, wide.observed, wide.certain) == ((), (), False)
     assert "error_deadband" in wide.reason
+
+
+@pytest.mark.parametrize("name", [name for name in SETTINGS if name != "leak"])
+def test_small_motions_away_from_rest_know_none_of_them(name: str) -> None:
+    """Bode plots are of the controller without them, but for a leak."""
+    s = 2j * pi * np.array([0.1, 3.0, 200.0])
+    seen, plain = (compensator(machine(settings).flat(), 1).at(s) for settings in (SETTINGS[name], {}))
+    assert seen == pytest.approx(plain, rel=1e-12)
 
 
 def test_dither_leaves_the_answer_to_runs() -> None:

@@ -20,6 +20,7 @@ from friso.frequency.loops import response
 from friso.frequency.members import concatenate_families, limit_cases, member
 from friso.frequency.parts import plant
 from friso.hunting import feeding as hunting_feeding
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import cannot_hunt, hunting
 from friso.hunting.feeding import Decline, Feeding, dry_friction, feeding
 from friso.hunting.loop import unstable
@@ -311,6 +312,18 @@ def test_bode_across_a_transmission() -> None:
     assert highest is not None
     edge = [spectral_abscissa(faster(flat, highest * f), settled_members(flat)).max() for f in (0.99, 1.01)]
     assert edge[0] < 0 < edge[1]
+
+
+def test_steady_friction_is_that_of_both_sides() -> None:
+    """The search for small cycles asks for it: the Stribeck curves of guide and motor, forward and back."""
+    flat, speeds = machine().flat(), np.array([-3e-3, -1e-4, 1e-4, 3e-3])
+    expected = np.zeros(4)
+    for table in ("friction", "motor_friction"):
+        static, coulomb, at, viscous = (
+            flat[f"{table}.{name}"] for name in ("static", "coulomb", "stribeck_velocity", "viscous")
+        )
+        expected += np.sign(speeds) * (coulomb + (static - coulomb) * np.exp(-((speeds / at) ** 2))) + viscous * speeds
+    assert Ensemble.held(flat, 4).steady_friction(speeds) == pytest.approx(expected, rel=1e-12)
 
 
 def test_what_bode_says_of_a_backlash() -> None:

@@ -23,8 +23,8 @@ class _Case(ExprCondPair):
 class Piecewise(sp.Piecewise):
     """The first of some expressions whose condition holds: ``Piecewise((1, x > 0), (-1, x < 0), (0, True))``.
 
-    Conditions that never hold, and what follows one that always does, are left out. Raises TypeError where no condition
-    may hold.
+    Conditions that never hold, what follows one that always does, and cases before that with the same expression (such
+    as a derivative has) are left out. Raises TypeError where no condition may hold.
     """
 
     def __new__(cls, *cases: Any, **options: Any) -> Any:
@@ -34,6 +34,8 @@ class Piecewise(sp.Piecewise):
             if kept[-1].cond == sp.false:
                 kept.pop()
             elif kept[-1].cond == sp.true:
+                while len(kept) > 1 and kept[-2].expr == kept[-1].expr:
+                    del kept[-2]
                 break
         if not kept:
             raise TypeError("cases given: none that may hold, expected: at least one")

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple, cast
 from friso.equations.conditions import LEVELS, friction_level, has_conditions
 from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
 from friso.stage import FrictionSection, Rule
+from friso.stage.transmission import STATE_PREFIX
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -88,7 +89,8 @@ class Friction:
             slid: dict[Any, Any] = {**self.slid()}
         except ValueError:
             return None
-        side: dict[Any, Any] = {direction(velocity).beyond: Piecewise((1, velocity > 0), (0, True))}
+        ahead = Piecewise((1, velocity > 0), (0, True))
+        side: dict[Any, Any] = {kink.beyond: ahead for kink in self.component.kinks if _is_direction(kink)}
         return self.force.subs(slid).subs(side)
 
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
@@ -97,7 +99,7 @@ class Friction:
         from friso.equations.cases import Piecewise
         from friso.equations.component import Switch
 
-        kinks = [k for k in self.component.kinks if not isinstance(k, Switch) and k.name != DIRECTION]
+        kinks = [k for k in self.component.kinks if not isinstance(k, Switch) and not _is_direction(k)]
         return {kink.beyond: Piecewise((1, kink.surface.subs({**states}) >= 0), (0, True)) for kink in kinks}
 
 
@@ -120,6 +122,11 @@ def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
 
 DIRECTION = "forward"
 """Name of the kink of the direction."""
+
+
+def _is_direction(kink: Kink) -> bool:
+    """Whether a kink is that of the direction, at the guide or at the motor."""
+    return kink.name.removeprefix(STATE_PREFIX) == DIRECTION
 
 
 class StribeckCurve(NamedTuple):
