@@ -266,8 +266,8 @@ def _unit_of(axis: AxisParameters) -> str | None:
         per_unit = 1 / float(name)
     except (ValueError, ZeroDivisionError):
         return str(name).lower()
-    known, base = (LENGTHS, 1e-3) if kind == LINEAR else (ANGLES, ANGLES["deg"])
-    return next((unit for unit, size in known.items() if isclose(size, per_unit * base, rel_tol=1e-4)), str(name))
+    units, base = (LENGTHS, 1e-3) if kind == LINEAR else (ANGLES, ANGLES["deg"])
+    return next((unit for unit, size in units.items() if isclose(size, per_unit * base, rel_tol=1e-4)), str(name))
 
 
 def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:
