@@ -13,8 +13,11 @@ from variants import stage as variant
 
 from friso import Stage, load, loads
 from friso.design_method.isolator import isolated
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import kernel
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.settings import settings_named
+from friso.equations.structure import shared_structure
 from friso.errors import InputError
 from friso.frequency.bandwidth import loop_bandwidth, loop_bandwidths
 from friso.frequency.crossover import settled_margin
@@ -35,7 +38,9 @@ from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import Sensitivities, sensitivity
 from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
+from friso.remedies.variables import of_key
 from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals
+from friso.remedies.window import HALVINGS, POINTS, windows
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
@@ -43,7 +48,7 @@ from friso.views.tune.document import tune_document
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
-from friso.views.tune.words import DOUBTS, _without_friction, answer, changes, failing, rows
+from friso.views.tune.words import DOUBTS, _reasons, _without_friction, answer, changes, failing, rows
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6)
@@ -201,6 +206,8 @@ def test_other_structures_are_stages(rigid: Stage, kind: str) -> None:
     assert all(remedy.stage.flat() != stage.flat() for remedy in tried)
     assert "feedforward of the move" in listed
     (by_gains,) = [remedy for remedy in remedies(rigid, Goal(joint=False)) if "derivative" in remedy.name]
+    step = stage.replace({"motion": {"kind": "step", "size": "1 mm", "duration": "1 s"}})
+    assert "feedforward of the move" not in {remedy.name for remedy in remedies(step, Goal(joint=False))}
     gain = 1.7 * (2 * np.pi * 8.0) ** 2 * 0.1**0.5
     assert by_gains.stage.flat()["controller.kd"] == pytest.approx(gain * 10**0.5 / (2 * np.pi * 8.0))
 
@@ -314,6 +321,43 @@ def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) ->
     assert (margin.key, margin.value) == ("margin", 0.9)
     assert margin.needed < 0.9
     assert relaxed.factor == pytest.approx(0.9 / margin.needed)
+    strict = Goal(settle=1e-3, force_limit=1.0, bandwidth_limit=1.0, joint=False)
+    dithered = Remedy.settled_on("", rigid.replace({"controller": {**rigid.as_written()["controller"], **DITHER}}))
+    outcomes = [RemedyOutcome(remedy, None, None, None, (), (), search.points) for remedy in (search.remedy, dithered)]
+    (three,) = relaxations(outcomes, strict, machines)
+    assert {part.key for part in three.relaxations} == {"settle", "force_limit", "bandwidth_limit"}
+    assert all(f"{part.needed:.3g}" == f"{part.needed:.6g}" for part in three.relaxations)
+    assert three.remedy is search.remedy
+
+
+DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
+
+
+def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
+    """One setting settles without the margin, the other has it and does not settle."""
+    columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
+    columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2}
+    points = TriedPoints(np.zeros((2, 1)), *(np.array(column) for column in columns.values()))
+    both, one = (next(_reasons(some, SimpleNamespace(), Goal())) for some in (points, points.take(np.array([1]))))
+    assert "0.5" in both
+    assert "0.5" not in one
+
+
+def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
+    """One between two values of the grid, one that goes on to an end of the range."""
+    variables = of_key("first", 1.0, np.e), of_key("second", 1.0, np.e)
+
+    def measured(shares: np.ndarray) -> Any:
+        good = (np.abs(shares[:, 0] - 0.5) < 0.01) & (shares[:, 1] > 0.21)
+        return SimpleNamespace(meets=lambda goal: good)
+
+    search: Any = SimpleNamespace(remedy=SimpleNamespace(variables=variables), measured=measured, goal=None)
+    first, second = windows(search, np.array([0.5, 0.4]))
+    ends = np.log([first.low, first.high, second.low, second.high])
+    assert ends == pytest.approx([0.49, 0.51, 0.21, 1.0], abs=1 / (POINTS - 1) / 2**HALVINGS)
+    assert 0.49 < ends[0] < ends[1] < 0.51
+    assert ends[2] > 0.21
+    assert (second.open_below, second.open_above, first.open_above) == (False, True, False)
 
 
 def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -> None:
@@ -382,6 +426,31 @@ def test_a_margin_s_derivative_is_that_of_margins_nearby(rigid: Stage, sensitivi
     low, high = (settled_margin({**flat, name: flat[name] * (1 + change)}) for change in (-1e-3, 1e-3))
     exact = sensitivities.margin.by[KEYS.index(name)]
     assert (high - low) / (2e-3 * flat[name]) == pytest.approx(exact, rel=1e-4)
+
+
+def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage) -> None:
+    """To 1e-6 of the time, of a move and of a release, whose start depends on keys; jumps are as far as they look."""
+    released = {"motion": {"kind": "release", "displacement": "2 mm", "duration": "4 s"}}
+    for stage in (rigid, rigid.replace(released)):
+        settles = stage.replace({"controller.crossover": "20 Hz"})
+        exact = sensitivity(settles, KEYS, edge=search_bandwidths(rigid, True).margin, within=1e-6).settling
+        assert exact is not None
+        assert exact.jump > 1e-3
+        flat = {**settles.flat(), **as_tuned(settles.flat())}
+        for name in ("friction.bristle_stiffness", "masses.cart"):
+            times = settling_times({**flat, name: flat[name] * (1 + 1e-4 * np.array([-2, -1, 1, 2]))})
+            difference = (times[0] - 8 * times[1] + 8 * times[2] - times[3]) / 12e-4
+            assert difference / exact.time == pytest.approx(
+                exact.by[KEYS.index(name)] * flat[name] / exact.time, abs=1e-6
+            )
+    with pytest.raises(InputError, match="within"):
+        sensitivity(rigid, within=0.0)
+
+
+def settling_times(flat: dict[str, Any]) -> np.ndarray:
+    """When four stages are last outside of 1 um."""
+    (runs,) = run_chunks(kernel(shared_structure(flat)), flat, 4, RunOptions(rtol=1e-11))
+    return runs.statistic("inner_exit")
 
 
 def test_an_unknown_key_has_no_derivative(rigid: Stage) -> None:

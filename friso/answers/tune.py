@@ -74,12 +74,17 @@ class TuneAnswer(Answer):
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
         """The design of leaf springs for an isolator, where `friso design` knows the controller."""
         from friso.design_method.prepare import check_designable
+        from friso.views.tune.page import NOT_SURE
 
         try:
             check_designable(self.result.stage)
         except InputError:
             return []
-        isolators = [file for file in files if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"]]
+        isolators = [
+            file
+            for file in files
+            if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"] and NOT_SURE not in file.name
+        ]
         return [f"friso design {shell_word(str(file))}" for file in isolators]
 
     def figures(self) -> Sequence[Figure]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.design_method.isolator import isolated
 from friso.equations.breakaway import breakaway, least_breakaway
+from friso.equations.motion import pieces
 from friso.equations.settings import SETTINGS
 from friso.errors import InputError
 from friso.quantities import exactly
@@ -18,6 +19,8 @@ from friso.remedies.goal import Goal
 from friso.remedies.variables import Variable, bandwidth_factor, of_key
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of
+
+DITHER = "controller.dither_amplitude"
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch, as a share of its frequency, and its depth."""
@@ -40,6 +43,11 @@ class Remedy:
             change = variable.change({**flat, **changed}, variable.at(share))
             changed |= change
         return changed
+
+    @property
+    def verifiable(self) -> bool:
+        """Whether cycles can verify it: not where a dither keeps the stage from coming to rest."""
+        return not self.stage.flat().get(DITHER, 0.0)
 
     @classmethod
     def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:
@@ -103,7 +111,10 @@ def _notch(stage: Stage) -> Iterator[Remedy]:
 def _structures(stage: Stage) -> Iterator[Remedy]:
     """The other structures that the controller of the stage can have, each with all its gains."""
     flat = stage.flat()
+    stands = not pieces(flat, 1)[..., 2:].any()  # the reference jumps, or the stage is released
     for name, changes in controller_of(flat).structures(flat).items():
+        if stands and all(key.endswith("_feedforward") for key in changes):
+            continue
         try:
             other = _restructured(stage, changes)
         except InputError:  # an uncertain key, for instance, that the other one has not

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,11 +21,18 @@ ALIKE = 1e-6
 @dataclass(frozen=True, order=True)
 class ChangeSize:
     """Changes are compared by whether a part is `bought`, then by the number of `keys` of the controller that change,
-    come or go, then by the `factor` by which those change that had a value, all factors multiplied."""
+    come or go, then by the `factor` by which those change that had a value and have one, all factors multiplied;
+    `scaled` is how many these are."""
 
     bought: bool
     keys: int
     factor: float
+    scaled: int = field(default=0, compare=False)
+
+    @property
+    def mean(self) -> float:
+        """The factor by which each of these changes, on average: the geometric mean."""
+        return float(self.factor ** (1 / max(1, self.scaled)))
 
 
 def change_size(before: Stage, after: Stage) -> ChangeSize:
@@ -33,7 +40,8 @@ def change_size(before: Stage, after: Stage) -> ChangeSize:
     old, new = before.flat(), after.flat()
     bought = any(_differ(old.get(key), new.get(key)) for key in {*old, *new} if key.startswith(PARTS))
     keys = [key for key in {*old, *new} if key.startswith(f"{CONTROLLER}.") and _differ(old.get(key), new.get(key))]
-    return ChangeSize(bought, len(keys), float(np.exp(sum(_octaves(old, new, key) for key in sorted(keys)))))
+    octaves = [octave for key in sorted(keys) if (octave := _octaves(old, new, key))]
+    return ChangeSize(bought, len(keys), float(np.exp(sum(octaves))), len(octaves))
 
 
 def _octaves(old: Mapping[str, Any], new: Mapping[str, Any], key: str) -> float:

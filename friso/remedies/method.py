@@ -272,8 +272,9 @@ class _Session:
 
 def pairs(outcomes: Sequence[RemedyOutcome], goal: Goal) -> list[Remedy]:
     """The settings against friction that came closest to the goal, or met it, each together with the bandwidth."""
-    names = {setting.name for name, setting in SETTINGS.items() if name != "dither"}  # which no cycle verifies
-    tried = [outcome for outcome in outcomes if outcome.remedy.name in names and outcome.points]
+    names = {setting.name for setting in SETTINGS.values()}
+    several = (outcome for outcome in outcomes if outcome.remedy.name in names and outcome.remedy.verifiable)
+    tried = [outcome for outcome in several if outcome.points]
     closest = sorted(tried, key=lambda outcome: outcome.least_cost(goal))
     return [with_bandwidth(outcome.remedy) for outcome in closest[:PAIRS]]
 

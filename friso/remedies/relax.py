@@ -1,4 +1,4 @@
-"""What to relax where no remedy meets the goal: the points that break one constraint alone, or two."""
+"""What to relax where no remedy meets the goal: the points that break one constraint alone, or two, or three."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ WIDER = (1.5, 2.0, 3.0, 5.0)
 
 @dataclass(frozen=True)
 class RelaxedGoal:
-    """A goal relaxed in one part or two, with which a `remedy` meets it: its stage, the parts, and the factor by which
-    they are relaxed, all together."""
+    """A goal relaxed in up to three parts, with which a `remedy` meets it: its stage, the parts, and the factor by
+    which they are relaxed, all together."""
 
     remedy: Remedy
     stage: Stage
@@ -39,25 +39,25 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
     hunting: machines that are surveyed at the points named have nothing that attracts."""
     best: dict[tuple[str, ...], RelaxedGoal] = {}
     for outcome in outcomes:
-        if outcome.points is None:
+        if outcome.points is None or not outcome.remedy.verifiable:
             continue
         for relaxed in _of_remedy(outcome.remedy, outcome.points, goal, machines):
             keys = tuple(sorted(relaxation.key for relaxation in relaxed.relaxations))
             if keys not in best or relaxed.factor < best[keys].factor:
                 best[keys] = relaxed
-    single = [relaxed for keys, relaxed in best.items() if len(keys) == 1]
-    listed = single or [*best.values()]
+    fewest = min(map(len, best), default=0)
+    listed = [relaxed for keys, relaxed in best.items() if len(keys) == fewest]
     return tuple(sorted(listed, key=lambda relaxed: relaxed.factor))
 
 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
-    """The cheapest relaxations of a remedy: those of one part each, or else of two."""
+    """The cheapest relaxations of a remedy: those of one part each, or else of two, or of three."""
     needed = _needed(points, goal)
     count = np.sum([values > 1 for values in needed.values()], axis=0)
     factor = np.prod([np.maximum(values, 1.0) for values in needed.values()], axis=0)
     possible = np.isfinite(factor) & np.isfinite(points.slower)
     few = machines.take(np.arange(min(SURVEYED, machines.count)))
-    for parts in (1, 2):
+    for parts in (1, 2, 3):
         tried: dict[tuple[str, ...], int] = {}
         enough = False
         which = np.flatnonzero(possible & (count == parts))
@@ -90,9 +90,16 @@ def _relaxed_goal(
     relaxed = []
     for name in names:
         requirement, needed, unit = values[name]
-        relaxed.append(Relaxation(requirement, name, getattr(goal, name), needed, unit))
+        given = getattr(goal, name)
+        relaxed.append(Relaxation(requirement, name, given, _rounded(needed, needed > given), unit))
     factor = np.prod([max(part.needed / part.value, part.value / part.needed) for part in relaxed])
     return RelaxedGoal(remedy, remedy.tuned(point.shares[0]), tuple(relaxed), float(factor))
+
+
+def _rounded(value: float, up: bool) -> float:
+    """To three digits, so that what is needed lies within."""
+    scale = 10.0 ** (np.floor(np.log10(value)) - 2)
+    return float(f"{(np.ceil if up else np.floor)(value / scale) * scale:.3g}")
 
 
 def _settles(remedy: Remedy, point: TriedPoints, goal: Goal, factor: float, machines: Fleet) -> bool:

@@ -1,4 +1,4 @@
-"""What matters: derivatives of the cycle, the edge of hunting and the modulus margin to keys of the stage file."""
+"""What matters: derivatives of cycle, edge of hunting, settling time and modulus margin to keys of the stage file."""
 
 from __future__ import annotations
 
@@ -8,7 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from friso.engine.arrays import STATISTICS
 from friso.equations.bandwidth import bandwidth, faster
+from friso.equations.motion import initial_displacement, last_corner, pieces, size
+from friso.equations.roles import Steady
 from friso.equations.structure import decisive_keys
 from friso.equations.variational import along
 from friso.errors import InputError
@@ -69,6 +72,18 @@ class EdgeDerivatives:
 
 
 @dataclass(frozen=True)
+class SettlingDerivatives:
+    """The settling `time` [s] of the stage's own move, from the last corner of the reference until the stage stays
+    `within` [m], and its derivatives to the keys [s per SI unit], shape (keys,). It jumps where a turning point crosses
+    the edge of the band: `jump` is by what share of the band the nearest one that decides is off it."""
+
+    within: float
+    time: float
+    by: np.ndarray
+    jump: float
+
+
+@dataclass(frozen=True)
 class MarginDerivatives:
     """The least modulus margin in all settled states and its derivatives to the keys [1/SI], shape (keys,), of the
     state and at the frequency where the loop comes closest."""
@@ -79,8 +94,8 @@ class MarginDerivatives:
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of a stage to some keys, whose `values` are SI: of its cycle, edge of hunting and margin; None where
-    there is no such thing, or none that is smooth."""
+    """Derivatives of a stage to some keys, whose `values` are SI: of its cycle, edge of hunting, margin and settling
+    time; None where there is no such thing, none that is smooth, or, of settling, where it was not asked for."""
 
     stage: Stage
     keys: tuple[str, ...]
@@ -88,6 +103,7 @@ class Sensitivities:
     cycle: CycleDerivatives | None
     edge: EdgeDerivatives | None
     margin: MarginDerivatives | None
+    settling: SettlingDerivatives | None = None
 
     def ranked(self) -> list[tuple[str, float]]:
         """The keys with what a change of 1 % moves the edge by, the one that matters most first; empty without one."""
@@ -98,13 +114,17 @@ class Sensitivities:
 
 
 @check_arguments
-def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None) -> Sensitivities:
+def sensitivity(
+    stage: Stage, keys: Sequence[str] | None = None, edge: Margin | None = None, within: float | None = None
+) -> Sensitivities:
     """Derivatives of cycle, edge of hunting and modulus margin to keys; all that the equations contain if none are
-    named. The `edge` is located unless it is given (that of a check).
+    named. The `edge` is located unless it is given (that of a check). Those of the settling time, too, if it is said
+    what deviation counts as in position, `within` [m].
 
-    The cycle's are exact: from variational equations along the keys, with saltation at kinks. The edge's follow from
-    the multipliers, exact derivatives of the flow, whose own change is taken by central differences; they are those of
-    a flip. The margin's are central differences of the loop at one frequency. Raises InputError for an unknown key.
+    The cycle's and the settling time's are exact: from variational equations along the keys, with saltation at kinks.
+    The edge's follow from the multipliers, exact derivatives of the flow, whose own change is taken by central
+    differences; they are those of a flip. The margin's are central differences of the loop at one frequency. Raises
+    InputError for an unknown key, and for a deviation that is not positive.
 
     Examples
     --------
@@ -124,6 +144,8 @@ def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | 
             )
     values = np.array([flat[name] for name in names])
     flat = _with_equations_of(flat, names)
+    if within is not None and not within > 0:
+        raise InputError("within", f"{within:g}", "a deviation [m] greater than 0", "within=1e-6")
     hunts = can_hunt(flat)
     return Sensitivities(
         stage,
@@ -132,6 +154,7 @@ def sensitivity(stage: Stage, keys: Sequence[str] | None = None, edge: Margin | 
         _of_cycle(flat, names) if hunts else None,
         _of_edge(stage, flat, names, edge) if hunts else None,
         _of_margin(flat, names),
+        None if within is None else _of_settling(flat, names, within),
     )
 
 
@@ -267,6 +290,50 @@ def _multipliers(inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]]
         return None
     local = multipliers(stages, orbits, RTOL).local[:, 0]
     return np.real(local) if np.all(np.abs(np.imag(local)) < 1e-9) else None
+
+
+@np.errstate(all="ignore")
+def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) -> SettlingDerivatives | None:
+    """The derivatives of the time at which the stage last enters the band: by how much the position moves there, over
+    the speed at which it enters."""
+    _, standing, moving, _ = pieces(flat, 1)[0, -1]
+    if moving:
+        return None
+    stages, corner = Ensemble(flat, 1), float(last_corner(flat))
+    duration = np.array([float(flat["motion.duration"])])
+    start = _starts(stages, flat, 1)
+    results = stages.run(start, duration, RTOL, bands=(within, within), least_swing=0.0)
+    entered = results.statistics[:, STATISTICS.index("inner_exit")]
+    if not done(results).all() or not corner < entered[0] < duration[0]:
+        return None
+    flow = _flow(stages, keys, start, entered)
+    if flow is None:
+        return None
+    end, by_states, by_keys = flow
+    position = stages.kernel.position
+    moved = (by_states @ _starts_by(stages, flat, keys) + by_keys)[position]
+    turns = slice(int(results.turn_counts[0]))
+    off = np.abs(results.turn_values[0, turns] - standing) / within
+    times = results.turn_times[0, turns]
+    last = off[(times > corner) & (times <= entered[0])][-1:]
+    jump = np.abs(np.append(last, off[times > entered[0]]) - 1).min(initial=np.inf)
+    return SettlingDerivatives(within, float(entered[0] - corner), -moved / end[stages.kernel.velocity], float(jump))
+
+
+def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:
+    """The states in which stages begin their motion, shape (count, states)."""
+    displaced = Steady(0.0, np.broadcast_to(initial_displacement(flat), (count,)))
+    sized = {**flat, "motion.size": size(flat)}
+    return stages.kernel.settled(sized, displaced, count)[:, : len(stages.kernel.states)]
+
+
+def _starts_by(stages: Ensemble, flat: Mapping[str, Any], keys: tuple[str, ...]) -> np.ndarray:
+    """Their derivatives to the keys, shape (states, keys), by central differences: they are settled states."""
+    columns = []
+    for name in keys:
+        low, high = _starts(stages, {**flat, name: flat[name] * np.array([1 - SMALL, 1 + SMALL])}, 2)
+        columns.append((high - low) / (2 * SMALL * flat[name]))
+    return np.stack(columns, axis=1)
 
 
 def _of_margin(flat: Mapping[str, Any], keys: tuple[str, ...]) -> MarginDerivatives | None:

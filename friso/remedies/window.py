@@ -11,6 +11,9 @@ from friso.remedies.search import Search
 POINTS = 16
 """Values of each number that are tried."""
 
+HALVINGS = 4
+"""How often the gap between the last value that does and the next, which does not, is halved."""
+
 
 @dataclass(frozen=True)
 class VariableWindow:
@@ -25,19 +28,37 @@ class VariableWindow:
 
 
 def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
-    """The windows about points, shape (variables,), by moves and margins of the machines of the search."""
-    variables = search.remedy.variables
-    grid = np.linspace(0, 1, POINTS)
-    listed = []
-    for number, variable in enumerate(variables):
+    """The windows about points, shape (variables,), by moves and margins of the machines of the search: on a grid, then
+    their ends by halving what lies between them and the next value that was tried."""
+    variables, grid = search.remedy.variables, np.linspace(0, 1, POINTS)
+    inside, outside = np.empty((len(variables), 2)), np.full((len(variables), 2), np.nan)
+    for number in range(len(variables)):
         places = np.union1d(grid, shares[[number]])
-        tried = np.repeat(shares[None], len(places), axis=0)
-        tried[:, number] = places
-        broken = ~search.measured(tried).meets(search.goal)
+        broken = ~_meets(search, shares, np.full(len(places), number), places)
         at = int(np.searchsorted(places, shares[number]))
         below, above = np.flatnonzero(broken[:at]), np.flatnonzero(broken[at:])
         first = int(below[-1]) + 1 if below.size else 0
-        last = at + int(above[0]) - 1 if above.size else len(places) - 1
-        low, high = variable.at(places[[first, max(first, last)]])
-        listed.append(VariableWindow(variable.name, float(low), float(high), not below.size, not above.size))
-    return tuple(listed)
+        last = max(first, at + int(above[0]) - 1) if above.size else len(places) - 1
+        inside[number] = places[[first, last]]
+        if below.size:
+            outside[number, 0] = places[first - 1]
+        if above.size:
+            outside[number, 1] = places[min(last + 1, len(places) - 1)]
+    closed = np.argwhere(np.isfinite(outside))
+    for _ in range(HALVINGS if len(closed) else 0):
+        rows, sides = closed.T
+        middle = (inside[rows, sides] + outside[rows, sides]) / 2
+        good = _meets(search, shares, rows, middle)
+        inside[rows[good], sides[good]], outside[rows[~good], sides[~good]] = middle[good], middle[~good]
+    ends = [[float(value) for value in variable.at(row)] for variable, row in zip(variables, inside, strict=True)]
+    return tuple(
+        VariableWindow(variable.name, low, high, *np.isnan(row).tolist())
+        for variable, (low, high), row in zip(variables, ends, outside, strict=True)
+    )
+
+
+def _meets(search: Search, shares: np.ndarray, numbers: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Whether points meet the goal with one variable each, that of a number (n,), at another place (n,)."""
+    tried = np.repeat(shares[None], len(places), axis=0)
+    tried[np.arange(len(places)), numbers] = places
+    return search.measured(tried).meets(search.goal)

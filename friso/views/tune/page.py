@@ -17,6 +17,9 @@ from friso.views.tune.gain_words import gain_facts
 from friso.views.tune.sensitivity_words import sensitivity_sentences
 from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, window_facts
 
+NOT_SURE = "-not-sure"
+"""End of the names of stage files with remedies that are not sure to work."""
+
 
 def tune_files(tuning: Advice) -> dict[str, Content]:
     """The stage files, the page, and every figure in all formats; `tuned.toml` is the least change that works."""
@@ -31,7 +34,7 @@ def stage_files(tuning: Advice) -> dict[str, Content]:
         if outcome.stage is None:
             continue
         slug = outcome.remedy.name.replace(",", "").replace(":", "").replace(" ", "-")
-        unsure = "" if outcome.certainty == "works" else "-not-sure"
+        unsure = "" if outcome.certainty == "works" else NOT_SURE
         files |= _stage_file(tuning, f"tuned-{slug}{unsure}.toml", outcome.stage)
     least = tuning.least
     return {**_stage_file(tuning, "tuned.toml", least.stage if least else None), **files}

@@ -160,7 +160,8 @@ def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
 def size_words(size: ChangeSize) -> str:
     """How large a change is."""
     keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
-    factor = f", by a factor of {plain(size.factor)}{' in all' * (size.keys > 1)}" if size.factor > 1 else ""
+    each = " each on average" if size.scaled > 1 else ""
+    factor = f", by a factor of {plain(size.mean)}{each}" if size.factor > 1 else ""
     return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
 
 
@@ -214,7 +215,7 @@ def _nothing(tuning: Advice) -> list[str]:
     if not (tuning.goal.controller and tuning.goal.joint):
         lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
     if not tuning.relaxed and not tuning.interrupted:
-        lines.append("No relaxation of one part of the goal, or of two, was found with which an option meets it.")
+        lines.append("No relaxation of up to three parts of the goal was found with which an option meets it.")
     return lines
 
 
@@ -260,16 +261,18 @@ def reason(outcome: RemedyOutcome, tuning: Advice) -> str:
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
     """The first constraint that leaves nothing of the settings that meet those before."""
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
-    tried = f"of {len(left)} settings tried"
+    margin = f"a modulus margin of {goal.margin:g}"
+    some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
+    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} settings tried)"
+    settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {
-        "margin": f"No setting keeps a modulus margin of {goal.margin:g} on {percent(goal.share)} of the machines: the "
-        f"best has {points.margin.max(initial=0.0):.2f}.",
-        "settling": f"No setting ({tried}) brings {percent(goal.share)} of the machines to rest in position by the "
-        "end of the run.",
-        "distance": f"No setting ({tried}) still does so at {1 / goal.distance:.2f} of its bandwidth: the edge of "
-        "hunting is too close.",
-        "force": "All settings that settle take more force than there is.",
-        "settle": "All settings that settle do so too late.",
+        "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
+        f"{points.margin.max(initial=0.0):.2f}.",
+        "settling": f"{tried} brings {percent(goal.share)} of the machines to rest in position by the end of the run.",
+        "distance": f"{tried} still does so at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too "
+        "close.",
+        "force": f"{settle} take more force than there is.",
+        "settle": f"{settle} do so too late.",
         "bandwidth": f"Only settings above your limit of the bandwidth do all of that{_lowest(points, goal)}.",
     }
     for name, sentence in sentences.items():
