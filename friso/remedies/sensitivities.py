@@ -46,6 +46,10 @@ FLIP = 0.8
 SMALL = 1e-5
 """Share by which keys are changed to see how the loop changes at one frequency, which is smooth."""
 
+SMOOTH = 1e-2
+"""By how much, as a share of the time and for a change of a key by all of it, a settling time may move otherwise than
+its derivative says."""
+
 TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmission.", "motor_friction.")
 """Where keys stand of which the cycle may depend."""
 
@@ -295,7 +299,7 @@ def _multipliers(inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]]
 @np.errstate(all="ignore")
 def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) -> SettlingDerivatives | None:
     """The derivatives of the time at which the stage last enters the band: by how much the position moves there, over
-    the speed at which it enters."""
+    the speed at which it enters. None where motions beside it do not follow them."""
     _, standing, moving, _ = pieces(flat, 1)[0, -1]
     if moving:
         return None
@@ -311,13 +315,29 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
         return None
     end, by_states, by_keys = flow
     position = stages.kernel.position
-    moved = (by_states @ _starts_by(stages, flat, keys) + by_keys)[position]
+    by = -(by_states @ _starts_by(stages, flat, keys) + by_keys)[position] / end[stages.kernel.velocity]
+    if not _is_smooth(flat, keys, float(entered[0]), by, within):
+        return None
     turns = slice(int(results.turn_counts[0]))
     off = np.abs(results.turn_values[0, turns] - standing) / within
     times = results.turn_times[0, turns]
     last = off[(times > corner) & (times <= entered[0])][-1:]
     jump = np.abs(np.append(last, off[times > entered[0]]) - 1).min(initial=np.inf)
-    return SettlingDerivatives(within, float(entered[0] - corner), -moved / end[stages.kernel.velocity], float(jump))
+    return SettlingDerivatives(within, float(entered[0] - corner), by, float(jump))
+
+
+def _is_smooth(flat: Mapping[str, Any], keys: tuple[str, ...], entered: float, by: np.ndarray, within: float) -> bool:
+    """Whether the stage enters the band when the derivatives say it does with each key a little larger and smaller: not
+    where it bounces on its limiter so often that neighbouring motions part."""
+    step = SMALL * np.array([flat[name] for name in keys])
+    changes = np.concatenate([-np.diag(step), np.diag(step)])
+    beside = {name: flat[name] + column for name, column in zip(keys, changes.T, strict=True)}
+    stages = Ensemble({**flat, **beside}, len(changes))
+    durations = np.full(len(changes), float(flat["motion.duration"]))
+    results = stages.run(_starts(stages, stages.flat, len(changes)), durations, RTOL, bands=(within, within))
+    moved = results.statistics[:, STATISTICS.index("inner_exit")] - entered
+    expected = np.concatenate([-step * by, step * by])
+    return bool(done(results).all() and np.all(np.abs(moved - expected) <= SMOOTH * SMALL * entered))
 
 
 def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:
