@@ -112,6 +112,8 @@ def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet
     alone = measured_run(fast)
     assert moves.settling[0, 0] == pytest.approx(alone.settling_time[0][0], rel=1e-9)
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
+    limited = fast.replace({"controller.force_limit": "60 N"})
+    assert moves_of_points(Remedy.settled_on("", limited), np.zeros((1, 0)), machines, goal).force.max() == 60.0
 
 
 def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Fleet) -> None:

@@ -19,6 +19,7 @@ from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.stage import Stage
+from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import linear_flat
 
@@ -59,6 +60,7 @@ def moves_of_points(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: G
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))
     options = RunOptions(rtol=RTOL, bands=(goal.within, LOOSER * goal.within), record_from=np.inf)
     corner = np.broadcast_to(last_corner(flat), (count,))
+    most = np.broadcast_to(flat.get(FORCE_LIMIT, np.inf), (count,))  # what is above is rounding
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, options):
         done = np.equal(runs.results.statuses, Status.DONE)
         ended = runs.statistic("ended")
@@ -66,7 +68,8 @@ def moves_of_points(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: G
             left = runs.statistic(name)
             after = np.maximum(left - corner[runs.numbers], 0.0)
             column[runs.numbers] = np.where(done & (left < ended), after, np.inf)
-        force[runs.numbers] = np.where(done, runs.statistic("force_peak"), np.inf)
+        largest = np.minimum(runs.statistic("force_peak"), most[runs.numbers])
+        force[runs.numbers] = np.where(done, largest, np.inf)
     shape = len(shares), machines.count
     return Moves(settling.reshape(shape), looser.reshape(shape), force.reshape(shape))
 
