@@ -274,6 +274,8 @@ def test_the_answer_names_what_to_change(tuning: Advice) -> None:
     assert tuning.size(tuning.working[0]).keys == 1
     assert len(rows(tuning)) == 3
     assert [line.split(":")[0] for line in failing(tuning)] == ["gains"]
+    locked = load(EXAMPLES / "thesis_rig.toml").replace({"joint.locked": True})
+    assert changes(locked, locked.replace({"joint.locked": False})) == ["joint.locked = false (was true)"]
 
 
 def test_gains_are_told_in_the_terms_of_drives(tuning: Advice) -> None:

@@ -61,6 +61,8 @@ OPTIONS = {
 
 ABSENT = "never"
 
+LOCKED = "joint.locked"
+
 
 def time(seconds: float) -> str:
     """A settling time, which may never come."""
@@ -74,6 +76,8 @@ def changes(before: Stage, after: Stage) -> list[str]:
     numbers = [_change(key, old.get(key), new[key], keys[key].unit) for key in new if _changes(key, old, new, keys)]
     own = [key for key in {**new, **old} if key.startswith(f"{CONTROLLER}.")]
     words = [f'{key} = "{new[key]}"' for key in own if isinstance(new.get(key), str) and new[key] != old.get(key)]
+    if old.get(LOCKED) and not new.get(LOCKED):
+        words.append(f"{LOCKED} = false (was true)")
     return [*words, *numbers, *(f"{key} left out" for key in own if key not in new)]
 
 
