@@ -342,7 +342,8 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
     columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
     columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2}
     points = TriedPoints(np.zeros((2, 1)), *(np.array(column) for column in columns.values()))
-    both, one = (next(_reasons(some, SimpleNamespace(), Goal())) for some in (points, points.take(np.array([1]))))
+    outcome: Any = SimpleNamespace()
+    both, one = (next(_reasons(some, outcome, Goal())) for some in (points, points.take(np.array([1]))))
     assert "0.5" in both
     assert "0.5" not in one
 
