@@ -90,7 +90,8 @@ class Friction:
         except ValueError:
             return None
         ahead = Piecewise((1, velocity > 0), (0, True))
-        side: dict[Any, Any] = {kink.beyond: ahead for kink in self.component.kinks if _is_direction(kink)}
+        kinks = (direction(velocity), *self.component.kinks)
+        side: dict[Any, Any] = {kink.beyond: ahead for kink in kinks if _is_direction(kink)}
         return self.force.subs(slid).subs(side)
 
     def sides(self, states: Mapping[sp.Symbol, sp.Expr]) -> dict[Any, Any]:
