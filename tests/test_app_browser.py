@@ -108,6 +108,29 @@ def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browse
     page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
 
 
+def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> None:
+    page, field = browsed.page, '[data-path="controller.crossover"] input[type=text]'
+    before, held = page.input_value(field), []
+    page.route("**/ask/machine", lambda route: held.append(route))
+    try:
+        with page.expect_request(re.compile("ask/machine")):
+            browsed.type("controller.crossover", "11 Hz")
+        page.keyboard.press("Control+a")
+        page.keyboard.type("10.5 H")
+        with page.expect_response(re.compile("ask/machine")):
+            held.pop().continue_()
+        page.wait_for_timeout(300)  # it is drawn
+        page.keyboard.type("z")
+    finally:
+        page.unroute("**/ask/machine")
+    with page.expect_request(re.compile("ask/machine")) as asked:
+        page.keyboard.press("Enter")
+    assert "10.5 Hz" in (asked.value.post_data or "")
+    page.click("#undo")
+    page.click("#undo")
+    page.wait_for_function("([field, value]) => document.querySelector(field).value === value", arg=[field, before])
+
+
 def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
     page = browsed.page
     last = "Array.from(document.querySelector('.plot').data.find((line) => line.name === 'position').y.slice(-40))"

@@ -23,6 +23,12 @@ export function worded(key, si, digits = 6) {
 /** Where sliders go is settled when a machine is opened: they do not move under the hand. */
 export const forgetRanges = () => ranges.clear();
 
+/** Whether a value is typed that has not been handed over yet. */
+export function typing() {
+  const field = document.activeElement;
+  return Boolean(field?.matches?.("#keys input[type=text]")) && field.value !== field.defaultValue;
+}
+
 export function keys(place, machine, part, changed, wrong, tell) {
   const about = PARTS.find((item) => item.id === part);
   const held = document.activeElement?.closest?.("#keys [data-path]")?.dataset.path;
@@ -80,7 +86,10 @@ function field(key, id, tell) {
   const value = key.value === undefined || key.value === null ? "" : String(key.value);
   const read = (text) => (text.trim() === "" ? null : !key.unit && Number.isFinite(Number(text)) ? Number(text) : text.trim());
   const input = el("input", { id, type: "text", value, placeholder: `e.g. ${key.example}`, autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-help` });
-  input.addEventListener("change", () => tell.set(key.path, read(input.value)));
+  input.addEventListener("change", () => {
+    input.defaultValue = input.value; // handed over
+    tell.set(key.path, read(input.value));
+  });
   if (!key.plain || !key.range || !QUANTITY.test(value)) return [input];
   if (!ranges.has(key.path) || !inside(ranges.get(key.path), key.si)) ranges.set(key.path, key.range);
   const range = ranges.get(key.path);

@@ -2,7 +2,7 @@
 import * as answers from "./answer.js";
 import { $, el, plain } from "./dom.js";
 import { drawing } from "./drawing.js";
-import { edit, forgetRanges, keys, worded } from "./keys.js";
+import { edit, forgetRanges, keys, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
 import * as machines from "./state.js";
@@ -17,6 +17,7 @@ let answer = null;
 let timer = 0;
 let held = "";
 let begun = false;
+let late = false;
 
 const sent = () => ({ machine: machines.sent(), pinned: machines.pinned() });
 const set = (values, dragged = false) => machines.set(values, dragged);
@@ -120,6 +121,8 @@ function redraw() {
 function left() {
   redraw();
   if (machines.dragging()) return; // the slider would go from under the hand; letting go asks again
+  late = typing(); // so would the field, with what is typed in it
+  if (late) return;
   keys($("keys"), shown, chosen, machines.changes(), wrong, {
     set: (path, value, dragged = false) => set({ [path]: value }, dragged),
     hold: machines.hold,
@@ -184,6 +187,7 @@ function wire() {
       else undo();
     } else if (event.key === "p" && !event.ctrlKey && !event.metaKey) machines.pin();
   });
+  $("keys").addEventListener("focusout", () => setTimeout(() => late && left()));
   document.addEventListener("dragover", (event) => event.preventDefault());
   document.addEventListener("drop", (event) => {
     event.preventDefault();
