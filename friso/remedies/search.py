@@ -46,6 +46,9 @@ SPARE = 1e-3
 APART = 0.03
 """Least distance of points that are surveyed one after the other, as a share of a range."""
 
+WIDENED = 1.5
+"""By what factor that distance grows after a batch with all of which something attracts machines."""
+
 
 @dataclass(frozen=True)
 class Budget:
@@ -212,18 +215,21 @@ class Search:
 
     def surveyed(self) -> Iterator[np.ndarray]:
         """The best points first, shape (variables,), as far as nothing attracts the machines with them; those that
-        are alike are taken for one."""
+        are alike are taken for one, in a wider sense after each batch with all of which something does: the points that
+        settle soonest are often at the edge of hunting."""
         if not self.tried:
             return
         points = self.points
         free = np.flatnonzero(points.meets(self.goal))
-        left = points.shares[free[np.argsort(points.settling[free], kind="stable")]]
+        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], APART
         for _ in range(MOST):
             if not len(left):
                 return
-            batch = _apart(left, BATCH)
-            yield from batch[self.clear(batch)]
-            left = left[np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1) > APART]
+            batch = _apart(left, BATCH, apart)
+            clear = self.clear(batch)
+            yield from batch[clear]
+            apart = APART if clear.any() else WIDENED * apart
+            left = left[np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1) > apart]
 
 
 def _evolve(
@@ -243,10 +249,10 @@ def _evolve(
     )
 
 
-def _apart(shares: np.ndarray, most: int) -> np.ndarray:
-    """The first of points that are apart from each other, so many at most."""
+def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
+    """The first of points that are so far apart from each other, so many at most."""
     chosen: list[np.ndarray] = []
     for row in shares:
-        if len(chosen) < most and all(np.abs(row - other).max() > APART for other in chosen):
+        if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):
             chosen.append(row)
     return np.array(chosen)

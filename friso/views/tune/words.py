@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.frequency.bandwidth import loop_bandwidth
-from friso.quantities import percent
+from friso.quantities import Quantity, percent, positive
 from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice
@@ -127,7 +127,10 @@ def unknown(tuning: Advice) -> list[str]:
             '[parasitic], or the highest bandwidth that the machine allows (--bandwidth-limit "25 Hz").'
         )
     if goal.force_limit is None and FORCE_LIMIT not in flat:
-        lines.append('Not known: the force of the actuator. No limit is assumed; state one (--force-limit "200 N").')
+        example = Quantity("N", positive, "200 N").on(stage.axis_kind).example
+        lines.append(
+            f'Not known: the force of the actuator. No limit is assumed; state one (--force-limit "{example}").'
+        )
     return lines
 
 
