@@ -549,6 +549,22 @@ def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:
     assert b"answer 2" in newer
 
 
+def test_what_fails_once_it_is_overtaken_is_not_reported(capsys: pytest.CaptureFixture[str]) -> None:
+    """When the server ends, pools take no more work."""
+
+    def job(work: Work) -> Iterator[dict[str, Any]]:
+        if overtaken:
+            work.overtake()
+        raise RuntimeError("cannot schedule new futures after interpreter shutdown")
+        yield {}
+
+    for overtaken, kind in [(False, "failed"), (True, "overtaken")]:
+        parts: list[Any] = []
+        Work(parts.append).run(job)
+        assert [part and part["kind"] for part in parts] == [kind, None]
+        assert ("Traceback" in capsys.readouterr().err) == (not overtaken)
+
+
 def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> None:
     flag = np.zeros(1, np.int64)
     with ended_by(flag):

@@ -65,8 +65,11 @@ class Work:
         except InputError as error:
             self.put({"kind": "refused", "key": error.key, "text": str(error)})
         except Exception as error:  # a page is answered whatever happens; the terminal has the rest
-            traceback.print_exc()
-            self.put({"kind": "failed", "key": "", "text": f"the computation could not be completed: {error}"})
+            if self.flag[0]:  # nobody waits, and at the end of the process pools take no more work
+                self.put({"kind": "overtaken"})
+            else:
+                traceback.print_exc()
+                self.put({"kind": "failed", "key": "", "text": f"the computation could not be completed: {error}"})
         finally:
             _AT_WORK.reset(token)
             self.put(None)
