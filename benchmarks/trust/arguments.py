@@ -187,13 +187,15 @@ def _valued_options() -> dict[str, list[str]]:
 
 @contextmanager
 def nothing_computed() -> Iterator[None]:
-    """Kernels are neither built nor loaded, and nothing is served: Computed is raised instead. Pictures are empty."""
+    """Kernels are neither built nor loaded, those that are loaded are not there, and nothing is served: Computed is
+    raised instead. Pictures are empty."""
 
     def computed(*_: object, **__: object) -> None:
         raise Computed
 
     with (
         mock.patch.object(CodeRequest, "entry", computed),
+        mock.patch("friso.engine.kernel._kernels", {}),
         mock.patch("uvicorn.Server.run", computed),
         mock.patch.object(matplotlib_renderer, "image", return_value=b""),
     ):
