@@ -7,9 +7,12 @@ import shutil
 import signal
 import sys
 import tempfile
+from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from patched import patched
 from refusals import Refused, Wording
 from snapshots import Snapshots
 
@@ -69,6 +72,16 @@ def own_bandwidth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Checks search no other bandwidths than a stage's own, which takes most of their time: what they say of the stage
     itself does not depend on it."""
     monkeypatch.setattr("friso.hunting.verdict.search_bandwidths", lambda *how: NOT_SOUGHT)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def unprinted() -> Iterator[None]:
+    """Pages hold empty prints, whose drawing takes most of a page's time; tests/test_check_views.py has one with its
+    own. Figures that are files are drawn everywhere."""
+    from friso.views import pages  # slow
+
+    with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda figure, form: b"<svg/>")}}):
+        yield
 
 
 @pytest.fixture(scope="session")

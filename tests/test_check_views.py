@@ -27,6 +27,7 @@ from made_up import (
     settles,
 )
 from pages import Page, packed_values
+from patched import patched
 from refusals import Wording
 from snapshots import Snapshots
 
@@ -35,6 +36,7 @@ from friso.hunting.margin import BandwidthWindow
 from friso.hunting.outward import AttractionEnd
 from friso.hunting.verdict import BANDWIDTHS, LOWER, STARTS
 from friso.version import VERSION
+from friso.views import pages
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
 from friso.views.check.page import check_html, conclusion, verdict_sentence
@@ -215,7 +217,9 @@ def test_response_of_one_run():
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    return check_html(both_joints())
+    """With its prints."""
+    with patched({pages: {"matplotlib_renderer": matplotlib_renderer}}):
+        return check_html(both_joints())
 
 
 def test_report_says_the_verdict_first(page):

@@ -12,6 +12,7 @@ import html
 import math
 import textwrap
 from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,7 @@ _CONFIG = {
 }
 
 
+@cache
 def script() -> str:
     """plotly.js of the installed package, packed, to stand once in a page."""
     return packed(get_plotlyjs())
