@@ -84,6 +84,20 @@ def unprinted() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages hold their prints all the same."""
+    from friso.views.drawing import matplotlib_renderer
+
+    monkeypatch.setattr("friso.views.pages.matplotlib_renderer", matplotlib_renderer)
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files of figures are empty: what is tested is beside them."""
+    monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", lambda figure, form: b"")
+
+
 @pytest.fixture(scope="session")
 def snapshots(pytestconfig: pytest.Config) -> Snapshots:
     """What commands say, kept in tests/snapshots."""

@@ -38,7 +38,6 @@ from friso.errors import InputError, LogError
 from friso.studies.execute import local_crew
 from friso.studies.request import Request
 from friso.studies.sweep import run_in_memory
-from friso.views.drawing import matplotlib_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Axis, Figure, Panel, Series
 
@@ -447,8 +446,7 @@ def test_a_map_stays_where_there_is_no_edge(served: Served) -> None:
     assert "log" not in part["command"] + part["python"]
 
 
-def test_a_report_has_page_figures_document_and_stage_file(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+def test_a_report_has_page_figures_document_and_stage_file(served: Served, undrawn: None) -> None:
     part = served.ask("check.zip", STICK_SLIP)[-1]
     names = set(zipfile.ZipFile(io.BytesIO(base64.b64decode(part["base64"]))).namelist())
     assert {"report.html", "check.json", "lugre_stick_slip.toml"} <= names

@@ -218,9 +218,8 @@ def test_dollars_and_markup_in_names_are_text():
     assert "<script>$" not in json.dumps(packed_values(plotly_renderer.fragment(figure)))
 
 
-def test_files_are_the_same_bytes_in_every_process(request, tmp_path, monkeypatch):
+def test_files_are_the_same_bytes_in_every_process(request, tmp_path, monkeypatch, printed):
     monkeypatch.setattr("friso.views.pages.foreign", list)  # other tests bring some to this process
-    monkeypatch.setattr("friso.views.pages.matplotlib_renderer", matplotlib_renderer)  # with prints, as there
     (tmp_path / "matplotlibrc").write_text("font.size: 30\n")
     environment = {"PYTHONHASHSEED": "2", "MATPLOTLIBRC": str(tmp_path), "HOME": str(tmp_path), "PATH": "/usr/bin:/bin"}
     environment |= {"PYTHONPATH": os.pathsep.join(map(str, (request.config.rootpath, request.path.parent)))}

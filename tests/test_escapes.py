@@ -59,7 +59,7 @@ def hostile_stage(folder: Path) -> Path:
     return path
 
 
-def test_a_stage_file_steers_neither_terminal_nor_page(tmp_path: Path) -> None:
+def test_a_stage_file_steers_neither_terminal_nor_page(tmp_path: Path, undrawn: None) -> None:
     done = friso_inside(tmp_path, "bode", hostile_stage(tmp_path), "--out", "out")
     assert done.returncode == 0
     assert not steers(done.stdout + done.stderr)

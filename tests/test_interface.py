@@ -148,7 +148,7 @@ def test_an_answer_as_a_dictionary_is_the_document(command: str, path: Path, tmp
     assert {key: value for key, value in document.items() if key not in ("files", "plug_ins")} == answer.to_dict()
 
 
-def test_an_answer_writes_its_files(leaves: Answer, tmp_path: Path) -> None:
+def test_an_answer_writes_its_files(leaves: Answer, tmp_path: Path, undrawn: None) -> None:
     (page,) = leaves.report(tmp_path / "leaves.html")
     assert page.read_text(encoding="utf-8").startswith("<!")
     with pytest.raises(friso.InputError):

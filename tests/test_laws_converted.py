@@ -24,7 +24,6 @@ from friso.stage import Stage
 from friso.stage.lists import element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert, convertible, measure_friction
-from friso.views.drawing import matplotlib_renderer
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 LUGRE = VARIANTS["rigid"]
@@ -146,8 +145,7 @@ def test_every_law_but_none_can_be_converted_to() -> None:
     assert "none" not in convertible()
 
 
-def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+def test_the_command(tmp_path: Path, undrawn: None) -> None:
     done = friso_inside(tmp_path, "convert", RIG, "--friction", "gms", "--elements", "4", "--out", "out", "--json")
     assert (done.returncode, done.stderr) == (0, "")
     document = json.loads(done.stdout)

@@ -561,7 +561,7 @@ print(hashlib.sha256(t.map_html(t.troubled(), "peaks", t.RERUN).encode()).hexdig
 """
 
 
-def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
+def test_files_are_the_same_bytes_in_every_process(request, tmp_path, printed):
     environment = {"PYTHONHASHSEED": "7", "HOME": str(tmp_path), "PYTHONPATH": str(request.config.rootpath)}
     environment |= {"MPLCONFIGDIR": matplotlib.get_cachedir()}  # the list of fonts takes seconds to make
     done = subprocess.run(

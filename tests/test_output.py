@@ -22,7 +22,6 @@ from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, _check
 from friso.cli.app import command_line
 from friso.errors import InputError
 from friso.stage import load
-from friso.views.drawing import matplotlib_renderer
 from friso.views.files import Content
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -364,10 +363,9 @@ def test_a_folder_in_the_way_is_not_moved(folder: Path) -> None:
 
 @pytest.mark.parametrize(("command", "stage"), [("check", STICK_SLIP), ("bode", RIG)])
 def test_a_command_that_fails_while_writing_leaves_nothing(
-    command: str, stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
     monkeypatch.setattr("friso.answers.drafts.Drafts.put_in_place", failing(lambda self: None, 1, OSError("disk full")))
-    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
     done = friso_inside(tmp_path, command, stage, "--out", "out")
     assert done.returncode == 1
     assert "disk full" in done.stderr

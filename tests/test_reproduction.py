@@ -730,6 +730,7 @@ def test_the_command_writes_its_page_and_claims(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
     snapshots: Snapshots,
+    undrawn: None,
 ) -> None:
     """In this process, which keeps the linear analysis of `small`: it takes longer than all the rest."""
 

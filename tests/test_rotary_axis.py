@@ -186,8 +186,8 @@ COMMANDS = {
 }
 
 
-WRITTEN = ("check", "map")
-"""Commands whose pages and figures are drawn, too."""
+WRITTEN = (("check", "rotary"), ("map", "linear"), ("map", "rotary"))
+"""Commands, and their stages, whose pages and figures are drawn, too."""
 
 
 LONG = {"boundary": pytest.mark.thorough}
@@ -199,7 +199,7 @@ def test_commands(folder: Path, command: str) -> None:
     for name, static in (("linear", "friction.static=2 N..3 N"), ("rotary", "friction.static=2 N*m..3 N*m")):
         options = [option.format(static=static) for option in COMMANDS[command]]
         out = folder / f"{command}_{name}{'.zarr' if command == 'map' else ''}"
-        written = ("--out", out) if command in WRITTEN else ()
+        written = ("--out", out) if (command, name) in WRITTEN else ()
         answer = friso_inside(folder, command, f"{name}.toml", *options, *written, "--json")
         assert answer.returncode == 0, answer.stderr
         documents.append(json.loads(answer.stdout))
@@ -218,7 +218,7 @@ def texts(value: Any) -> list[str]:
     return [value] if isinstance(value, str) else []
 
 
-def test_logs_of_the_rig_are_in_its_units(folder: Path) -> None:
+def test_logs_of_the_rig_are_in_its_units(folder: Path, undrawn: None) -> None:
     answer = friso_inside(folder, "rig", "presliding", "rotary.toml", "--out", "log", "--json")
     assert answer.returncode == 0, answer.stderr
     first = next(path for path in (folder / "log").glob("*.csv"))

@@ -287,10 +287,7 @@ def test_gains_are_told_in_the_terms_of_drives(tuning: Advice) -> None:
     assert f"k_p = {float(f'{gain:.4g}'):.10g} N/m" in gain_lines(tuning)[0]
 
 
-def test_the_answer_as_files(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
-    from friso.views.drawing import matplotlib_renderer
-
-    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
     files = tune_files(replace(tuning, as_built={"drive": {"sample_time": "50 us"}}))
     assert files["tuned.toml"] == files["tuned-bandwidth.toml"]
     assert loads(str(files["tuned.toml"])).flat()["drive.sample_time"] == 5e-5

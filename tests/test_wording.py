@@ -13,7 +13,6 @@ from pages import Page
 from snapshots import FOLDER, Snapshots, alike, masked, read
 
 from friso.cli.command import COMMANDS
-from friso.views.drawing import matplotlib_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
@@ -60,10 +59,9 @@ RUNS = {
 
 
 @pytest.fixture(autouse=True)
-def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
+def narrow(monkeypatch: pytest.MonkeyPatch, undrawn: None) -> None:
     """A narrow terminal, and no time for pictures, which say nothing here."""
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
 
 
 def test_every_command_has_its_words_here() -> None:
