@@ -664,7 +664,7 @@ def test_the_judges_recognise_what_holds() -> None:
     magnitude = np.full((4, 9), 1.7 / 2.5)
     magnitude[:, -1] = 0.1
     scatter = np.array([0.01, 0.1, 0.3, 0.2, 0.1, 0.1, 0.01, 0.01, 0.01])
-    assert judged_line(LockedLine(magnitude, scatter), 1.7).judgement == "holds"
+    assert judged_line(LockedLine(magnitude, np.zeros((4, 9)), scatter), 1.7).judgement == "holds"
 
 
 def test_the_judges_recognise_what_does_not_hold() -> None:
@@ -673,7 +673,10 @@ def test_the_judges_recognise_what_does_not_hold() -> None:
     assert judged_slips(runs).pattern[0] is False
     lively = constant_speed(rig_of_thesis().replace({"joint.locked": True, "friction.static": "1 N"}))
     assert judged_speeds(lively, lively).pattern[:2] == (False, False)
-    assert judged_line(LockedLine(np.full((4, 9), 2.0), np.linspace(0.1, 0.5, 9)), 1.7).judgement == "differs"
+    assert (
+        judged_line(LockedLine(np.full((4, 9), 2.0), np.zeros((4, 9)), np.linspace(0.1, 0.5, 9)), 1.7).judgement
+        == "differs"
+    )
     few = replace(joint_steps(rig_of_thesis()), stiffness=5e3)
     assert not any(part.holds for part in judged_steps(few).parts)
     assert of_plant({"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz"}).judgement == "differs"

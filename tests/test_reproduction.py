@@ -9,7 +9,7 @@ from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any, cast, get_type_hints
 
 import numpy as np
 import pytest
@@ -47,7 +47,7 @@ from friso.studies.thesis.as_built import _prescribed, rig_with_drive
 from friso.studies.thesis.claims import _JUDGES, FindingTable, judges, registered
 from friso.studies.thesis.cycles import map_cycles, survey
 from friso.studies.thesis.evidence import RESPONSES
-from friso.studies.thesis.experiments import _RUNS, EXPERIMENTS, GRID, MOVES, ON_RAILS, STANDSTILL, TRACES
+from friso.studies.thesis.experiments import _RUNS, EXPERIMENTS, GRID, MOVES, ON_RAILS, STANDSTILL, TRACES, Experiments
 from friso.studies.thesis.experiments import BUILT as LOOPS_BUILT
 from friso.studies.thesis.gains import rig_gains
 from friso.studies.thesis.judges import design_rules
@@ -56,9 +56,10 @@ from friso.studies.thesis.kept import Kept, kept_findings
 from friso.studies.thesis.laws import conclusions_by_law
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
-from friso.studies.thesis.plausible import PARTS
+from friso.studies.thesis.plausible import PARTS, plausible
 from friso.studies.thesis.reproduce import _changed
 from friso.studies.thesis.space import OPEN, OpenValue, baseline, draw, enters
+from friso.studies.thesis.taken_apart import put_together, taken_apart
 from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.studies.thesis.ways import COUNT, CYCLE, SWING, by_attraction, by_peak_count, by_swing_at_end, weakest
 from friso.views.reproduce.document import reproduce_document
@@ -694,6 +695,33 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         file.write_bytes(content)
     kept.clear()
     assert kept.count == 0
+
+
+def test_experiments_are_kept_whole(tmp_path: Path) -> None:
+    """Every kind of result comes back as it was made, and a damaged one is made again."""
+    kept, experiment = Kept(tmp_path), Experiments(thesis_rig())
+    for name in (*EXPERIMENTS, TRACES):
+        kind, result = get_type_hints(vars(Experiments)[name].fget)["return"], getattr(experiment, name)
+        kept.result((name,), kind, lambda made=result: made)
+        again = kept.result((name,), kind, lambda: pytest.fail("it was kept"))
+        arrays, others = taken_apart(result), taken_apart(again)
+        assert arrays.keys() == others.keys()
+        assert all(np.array_equal(arrays[key], others[key], equal_nan=arrays[key].dtype.kind in "fc") for key in arrays)
+        assert type(again) is type(result)
+        if name == GRID:
+            for wrong in ({**arrays, "tree": np.array("[1]")}, {"tree": arrays["tree"]}, {"tree": np.array("[")}):
+                with pytest.raises((ValueError, TypeError, KeyError)):
+                    put_together(kind, wrong)
+    assert kept.count == len(EXPERIMENTS) + 1
+
+
+def test_a_draw_that_decides_nothing_says_why() -> None:
+    def stopped(*_: Any) -> Any:
+        raise ValueError("the loop stops")
+
+    with patched({import_module("friso.studies.thesis.plausible"): {"POINTS": 3, "ways_of": stopped}}):
+        space = plausible({"F15B": registered()["F15B"]}, 1).claims["F15B"]
+    assert (space.undecided, space.count, space.failures) == (1, 0, {0: "ValueError: the loop stops"})
 
 
 def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path) -> None:

@@ -78,6 +78,6 @@ def evidence(
         {name: map_of(study, points, rtol, verify, changes, kept) for name, study in STUDIES.items() if name in wanted},
         {name: run_response(own, changes, rtol) for name, own in RESPONSES.items() if name in wanted},
         analysed(rig) if wanted & NEEDS.keys() else None,
-        Experiments(rig),
+        Experiments(rig, kept),
         rig,
     )

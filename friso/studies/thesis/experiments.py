@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Any
+from typing import Any, get_type_hints
 
 import numpy as np
 
@@ -37,6 +37,7 @@ from friso.studies.thesis.as_built import (
     standstill,
     traces,
 )
+from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.linear import PartNeeded
 from friso.studies.thesis.studies import LOCKED
 
@@ -72,10 +73,11 @@ SPEEDS, WAY = (2.5e-3, 10e-3), 0.15
 
 @dataclass(frozen=True)
 class LockedLine:
-    """Fig. 17: magnitude over the mass line, shape (places, frequencies), and the scatter of the phase over the places
-    [rad], shape (frequencies,), at FREQUENCIES."""
+    """Fig. 17: magnitude over the mass line, and phase over that of it [rad], shape (places, frequencies), and the
+    scatter of the phase over the places [rad], shape (frequencies,), at FREQUENCIES."""
 
     magnitude: np.ndarray
+    phase: np.ndarray
     scatter: np.ndarray
 
 
@@ -136,11 +138,12 @@ EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
 
 
 class Experiments:
-    """The experiments on one rig, each run when it is first asked for; the constant speeds are with the joint free, and
-    locked; the loops with its drive as built."""
+    """The experiments on one rig, each run when it is first asked for, unless it was `kept`; the constant speeds are
+    with the joint free, and locked; the loops with its drive as built."""
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage_file = stage.to_toml()
+    def __init__(self, stage: Stage, kept: Kept = NOT_KEPT) -> None:
+        self._stage_file, self._kept = stage.to_toml(), kept
+        self._results: dict[str, Any] = {}
 
     @property
     def locked_line(self) -> LockedLine:
@@ -193,12 +196,16 @@ class Experiments:
         return self._result(TRACES)
 
     def _result(self, name: str) -> Any:
-        return _experiment(name, self._stage_file)
+        if name not in self._results:
+            kind = get_type_hints(vars(Experiments)[name].fget)["return"]
+            about = ("experiment", name, self._stage_file)
+            self._results[name] = self._kept.result(about, kind, partial(_experiment, name, self._stage_file))
+        return self._results[name]
 
 
 @lru_cache(maxsize=64)
 def _experiment(name: str, stage_file: str) -> Any:
-    """Kept, since judges and figures ask for the same."""
+    """Cached, since judges of several claims ask for the same."""
     return _RUNS[name](loads(stage_file))
 
 
@@ -208,7 +215,7 @@ def locked_line(stage: Stage) -> LockedLine:
         {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
     ]
     line = mass_line(stage.replace(dict(LOCKED)), places, [FORCE], FREQUENCIES)
-    return LockedLine(line["magnitude"].values[:, 0], line["spread_phase"].values[0])
+    return LockedLine(line["magnitude"].values[:, 0], line["phase"].values[:, 0], line["spread_phase"].values[0])
 
 
 def joint_steps(stage: Stage) -> JointSteps:

@@ -6,10 +6,11 @@ import hashlib
 import json
 import shutil
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,9 +22,12 @@ from friso.studies.study import Study, equations_version
 from friso.studies.sweep import dataset
 from friso.studies.thesis.claims import Finding, Part
 from friso.studies.thesis.studies import thesis_rig
+from friso.studies.thesis.taken_apart import put_together, taken_apart
 
 if TYPE_CHECKING:
     import xarray as xr
+
+T = TypeVar("T")
 
 Findings = dict[str, Finding]
 """Findings by a name, such as that of a claim."""
@@ -31,8 +35,8 @@ Findings = dict[str, Finding]
 
 @dataclass(frozen=True)
 class Kept:
-    """Where maps and findings are kept, a folder; None keeps nothing. What other code made, or is damaged, is made
-    again."""
+    """Where maps, experiments and findings are kept, a folder; None keeps nothing. What other code made, or is
+    damaged, is made again."""
 
     folder: Path | None = None
 
@@ -75,6 +79,18 @@ class Kept:
         if file is not None:
             keep_arrays(file, arrays)
         return arrays
+
+    def result(self, about: tuple[Any, ...], kind: type[T], make: Callable[[], T]) -> T:
+        """A result of a kind (see `taken_apart`) `about` something, as it was kept or made now."""
+        file = self._file("npz", "result", *about)
+        columns = None if file is None else kept_arrays(file)
+        if columns is not None:
+            with suppress(ValueError, TypeError, KeyError, RecursionError):
+                return put_together(kind, columns)
+        made = make()
+        if file is not None:
+            keep_arrays(file, taken_apart(made))
+        return made
 
     def findings(self, about: tuple[Any, ...], make: Callable[[], Findings]) -> Findings:
         """Findings `about` something, as they were kept or made now."""

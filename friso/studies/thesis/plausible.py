@@ -9,9 +9,10 @@ from functools import partial
 
 import numpy as np
 
+from friso.escapes import one_line
 from friso.progress import Tally
 from friso.shares import Share, share
-from friso.studies.thesis.claims import Evidence, Finding, Registered
+from friso.studies.thesis.claims import Evidence, Finding, Part, Registered
 from friso.studies.thesis.evidence import RESPONSES, evidence
 from friso.studies.thesis.experiments import EXPERIMENTS
 from friso.studies.thesis.kept import NOT_KEPT, Findings, Kept
@@ -53,8 +54,8 @@ class Separation:
 @dataclass(frozen=True)
 class ClaimInSpace:
     """A claim over the draws with these `seeds`, (seed, number): the share of them in which it `holds`, in every way
-    and in each (`by_way`), and in which each part does; values on which it hangs, the most decisive first; in how many
-    draws it could not be computed."""
+    and in each (`by_way`), and in which each part does; values on which it hangs, the most decisive first; why it could
+    not be computed, by the number of the draw (`failures`)."""
 
     seeds: tuple[tuple[int, int], ...]
     holds: Share
@@ -62,7 +63,12 @@ class ClaimInSpace:
     by_way: Mapping[str, Share]
     parts: tuple[Share, ...]
     hangs_on: tuple[Separation, ...]
-    undecided: int
+    failures: Mapping[int, str]
+
+    @property
+    def undecided(self) -> int:
+        """In how many draws it could not be computed."""
+        return len(self.failures)
 
     @property
     def draws(self) -> int:
@@ -113,6 +119,7 @@ def plausible(
     drawn = tuple(draw(number) for number in range(draws))
     own: dict[str, Finding] = {}
     by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
+    failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
     for one in (*drawn, baseline()) if drawn else ():
         groups = [(cheap, MAP_WORK)] + (
             [(costly, COSTLY_WORK)] if one in drawn and one.number % EVERY == EVERY - 1 else []
@@ -126,11 +133,14 @@ def plausible(
                 ways = _by_way(findings, name)
                 if one in drawn:
                     by_claim_tried[name].append((one, ways))
+                    failures[name] |= {} if ways else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
                 elif COUNT in ways:
                     own[name] = ways[COUNT]
             if tally:
                 tally.add(work, f"draw {one.number + 1} of {draws}" if one in drawn else "friso's own choice")
-    by_claim = {name: _in_space(entries[name], tried) for name, tried in by_claim_tried.items() if tried}
+    by_claim = {
+        name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
+    }
     return Plausible(drawn, by_claim, _fit({name: by_claim_tried[name] for name in cheap}, own))
 
 
@@ -149,20 +159,28 @@ def ways_of(entry: Registered, base: Evidence) -> dict[str, Finding]:
 
 
 def _judged(entries: Mapping[str, Registered], one: Draw) -> Findings:
-    """The findings in a draw, by claim and way; none of what cannot be computed there."""
+    """The findings in a draw, by claim and way; of what cannot be computed there, why not."""
     needs = {need for entry in entries.values() for need in entry.needs}
-    findings: Findings = {}
     try:
         base = evidence(needs, POINTS, DRAW_RTOL, changes=one.changes)
-    except _SHOWS_NOTHING:
-        return findings
+    except _SHOWS_NOTHING as error:
+        return {f"{name} {FAILED}": _failure(error) for name in entries}
+    findings: Findings = {}
     for name, entry in entries.items():
         try:
             findings |= {f"{name} {way}": finding for way, finding in ways_of(entry, base).items()}
-        except _SHOWS_NOTHING:
-            continue  # the claim is undecided there
+        except _SHOWS_NOTHING as error:
+            findings[f"{name} {FAILED}"] = _failure(error)
     return findings
 
+
+def _failure(error: Exception) -> Finding:
+    """What stands for a claim that is undecided in a draw."""
+    return Finding((Part("can be computed", False, one_line(f"{type(error).__name__}: {error}")),))
+
+
+FAILED = "failed"
+"""Stands after the name of a claim in the place of a way."""
 
 _SHOWS_NOTHING = ValueError, ArithmeticError, RuntimeError
 """What is raised of a rig of which an experiment shows nothing, such as a loop that stops; errors of the program are
@@ -173,7 +191,9 @@ def _by_way(findings: Findings, name: str) -> dict[str, Finding]:
     return {way: findings[key] for way in (COUNT, SWING) if (key := f"{name} {way}") in findings}
 
 
-def _in_space(entry: Registered, tried: Sequence[tuple[Draw, Mapping[str, Finding]]]) -> ClaimInSpace:
+def _in_space(
+    entry: Registered, tried: Sequence[tuple[Draw, Mapping[str, Finding]]], failures: Mapping[int, str]
+) -> ClaimInSpace:
     decided = [(one, ways) for one, ways in tried if ways]
     together = [weakest(ways) for _, ways in decided]
     holds = np.array([finding.judgement == "holds" for finding in together], bool)
@@ -189,7 +209,7 @@ def _in_space(entry: Registered, tried: Sequence[tuple[Draw, Mapping[str, Findin
         by_way_holds,
         tuple(_share(column, len(tried)) for column in parts.T),
         tuple(_separations(entry, [one for one, _ in decided], holds)),
-        len(tried) - len(decided),
+        failures,
     )
 
 

@@ -84,7 +84,7 @@ class ClaimVerdict:
             sentence += " It does not hold by an attracting cycle only, which was not tried in draws."
         if self.undrawn:
             sentence += f" It hangs also on what is assumed and not drawn: {self.undrawn}."
-        return " ".join((sentence, *(f"Method: {text}." for text in self.turned)))
+        return sentence
 
 
 _HANGS = {True: "; that hangs on ", False: ""}

@@ -108,6 +108,7 @@ def _space(space: ClaimInSpace) -> dict[str, Any]:
     return {
         "draws": space.draws,
         "undecided": space.undecided,
+        "failures": {str(number): text for number, text in space.failures.items()},
         "holds": space.count,
         "share": _share(space.holds),
         "by_way": {way: _share(share) for way, share in space.by_way.items()},

@@ -114,8 +114,10 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[ClaimVerdict]) ->
 
 
 def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
-    """An item without a figure of its own, by where the thesis makes its claims."""
-    return f"Figure {place}" if place.isdigit() else ", ".join(dict.fromkeys(item.claim.where for item in group))
+    """An item without a figure of its own, by where the thesis makes its claims, and what they are about."""
+    if place.isdigit():
+        return f"Figure {place}"
+    return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))
 
 
 def _printed(figure: Figure) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.identification.experiments.steps import CUTOFF
 from friso.studies.thesis.experiments import (
     BUILT,
     FREQUENCIES,
@@ -14,11 +15,13 @@ from friso.studies.thesis.experiments import (
     LINE,
     MOVES,
     ON_RAILS,
+    RANGE,
     SLIPS,
     SPEEDY,
     STANDSTILL,
     STEPPED,
 )
+from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,
@@ -56,31 +59,46 @@ def rig_figures(experiments: Experiments, made: frozenset[str]) -> dict[str, Fig
 def _mass_lines(experiments: Experiments) -> dict[str, Figure]:
     hertz = np.array(FREQUENCIES)
     omega = 2 * np.pi * hertz
-    places = experiments.locked_line.magnitude / (_WEIGHED * omega**2)
-    axes = Axis.of_frequency(hertz), Axis("Magnitude", "m/N", log=True, prefixed=False)
+    line = experiments.locked_line
+    places = line.magnitude / (_WEIGHED * omega**2)
+    turns = np.degrees(line.phase) - 180
 
-    def line(mass: float, colour: str) -> Series:
+    def mass_line(mass: float, colour: str) -> Series:
         return Series(hertz, 1 / (mass * omega**2), f"mass line, {mass:g} kg", colour, "dashed")
 
     average = Series(hertz, np.nanmean(places, axis=0), "average of the places", INK, width=2.0)
-    single = tuple(
-        Series(hertz, place, f"place {number + 1}", _COLOURS[number % len(_COLOURS)])
-        for number, place in enumerate(places)
+    average_turn = Series(hertz, np.nanmean(turns, axis=0), "", INK, width=2.0)
+    colours = [_COLOURS[number % len(_COLOURS)] for number in range(len(places))]
+    static = np.linspace(*RANGE, len(places))
+    single, single_turns = (
+        tuple(Series(hertz, row, name.format(f), c) for row, f, c in zip(rows, static, colours, strict=True))
+        for rows, name in ((places, "static friction {:.2g} N"), (turns, ""))
     )
-    lines = line(_WEIGHED, BLUE), line(_FITTED, VERMILLION)
+    lines = mass_line(_WEIGHED, BLUE), mass_line(_FITTED, VERMILLION)
     caption = (
         "Position over force of the simulated rig, joint locked, with friction, by sines of one force; the mass "
         "weighed and the one that the thesis reads off its own."
     )
     return {
-        "17": Figure("figure-17", "Figure 17: plant, joint locked", caption, (Panel("", *axes, (average, *lines)),)),
+        "17": Figure(
+            "figure-17", "Figure 17: plant, joint locked", caption, _plant(hertz, (average, *lines), (average_turn,))
+        ),
         "29": Figure(
             "figure-29",
             "Figure 29: plant, joint locked, at several places",
-            "The same, place by place; the thesis shows ten identifications.",
-            (Panel("", *axes, single),),
+            "The same, place by place, which differ in their friction; the thesis shows ten identifications.",
+            _plant(hertz, single, single_turns),
         ),
     }
+
+
+def _plant(hertz: np.ndarray, above: tuple[Series, ...], below: tuple[Series, ...]) -> tuple[Panel, Panel]:
+    """Magnitude over phase of position over force."""
+    axis = Axis.of_frequency(hertz)
+    return (
+        Panel("", axis, Axis("Magnitude", "m/N", log=True, prefixed=False), above),
+        Panel("", axis, Axis("Phase", "°"), below, limits=(Limit((-180.0,), "", INK),)),
+    )
 
 
 def _free_plant(experiments: Experiments) -> dict[str, Figure]:
@@ -98,22 +116,25 @@ def _free_plant(experiments: Experiments) -> dict[str, Figure]:
             "dashed",
         ),
     )
-    axes = Axis.of_frequency(hertz), Axis("Magnitude", "m/N", log=True, prefixed=False)
+    (turn,) = phases([response.response])
     caption = (
         "Position over force of the virtual rig as built, joint free, from one excitation of the closed loop; its "
         f"first mode is at {plant.first_mode:.3g} Hz, the mass line is read between its modes."
     )
-    panel = Panel("", *axes, lines)
-    return {"18": Figure("figure-18", "Figure 18: plant, joint free", caption, (panel,))}
+    panels = _plant(hertz, lines, (Series(hertz, turn, "", BLUE),))
+    return {"18": Figure("figure-18", "Figure 18: plant, joint free", caption, panels)}
 
 
 def _steps(experiments: Experiments) -> dict[str, Figure]:
-    log = experiments.joint_steps.log
+    log, read = experiments.joint_steps.log, experiments.joint_steps.result
     place = (
         Series(log.time, log["position"], "position", BLUE),
         Series(log.time, log["reference"], "reference", INK, "dotted"),
     )
-    force = (Series(log.time, log["force"], "force", VERMILLION),)
+    force = (
+        Series(log.time, log["force"], "force", VERMILLION, width=0.8),
+        Series(read.time, read.force, f"low-passed at {CUTOFF:g} Hz", INK),
+    )
     panels = Panel("", _TIME, Axis("Position", "m"), place), Panel("", _TIME, Axis("Force", "N"), force)
     caption = "Steps of 0.3 mm of the simulated rig, its cart fixed: the position is the deflection of the joint."
     return {"19": Figure("figure-19", "Figure 19: stiffness of the joint", caption, panels)}

@@ -53,7 +53,8 @@ def share(verdict: ClaimVerdict) -> str:
     if verdict.space is None:
         return ""
     space = verdict.space
-    return f"{space.count} of {space.draws} ({percent(space.holds.low)} to {percent(space.holds.high)})"
+    interval = f"{percent(space.holds.low)} to {percent(space.holds.high)}".replace(" %", "\u00a0%")
+    return f"{space.count} of {space.draws} ({interval})"
 
 
 def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
@@ -66,6 +67,19 @@ def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
 def reason(verdict: ClaimVerdict) -> str:
     """Why it does not hold, the first sentence; the rest is among the details."""
     return short(verdict.reason) if verdict.finding else verdict.reason
+
+
+def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
+    """What stands below an item, by its name: numbers and reasons that are shortened above, draws that decide nothing,
+    and what another grid or tolerance changes."""
+    parts = verdict.finding.judged if verdict.finding else ()
+    rows = [
+        (f"Criterion {place}", part.number) for place, part in enumerate(parts, 1) if short(part.number) != part.number
+    ]
+    rows += [("Reason", verdict.reason)] if reason(verdict) != verdict.reason else []
+    failures = verdict.space.failures if verdict.space else {}
+    rows += [(f"Draw {number}, undecided", text) for number, text in failures.items()]
+    return rows + [("Method", text) for text in verdict.turned]
 
 
 def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:

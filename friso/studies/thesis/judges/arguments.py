@@ -34,7 +34,7 @@ _START = 0.02
 """Time [s] after break-away in which the acceleration is read."""
 
 
-@judges("S341", figure="Sec. 3.4.1", needs=("isolator-stiffness",))
+@judges("S341", figure="Sec. 3.4.1, force at full stroke", needs=("isolator-stiffness",))
 def force_at_full_stroke(evidence: Evidence) -> Finding:
     """The rule at the thesis's own values, and over the map of stiffness and stroke."""
     flat = evidence.rig.flat()
@@ -80,7 +80,7 @@ def _margins(stage_file: str) -> tuple[float, float]:
     return first, second
 
 
-@judges("S342", figure="Sec. 3.4.2", needs=(FREE,))
+@judges("S342", figure="Sec. 3.4.2, mass the controller is tuned for", needs=(FREE,))
 def the_mass_to_tune_for(evidence: Evidence) -> Finding:
     """The margins of all settled states, tuned for the largest and for the smallest mass that moves."""
     whole, small = _margins(evidence.rig.to_toml())
@@ -121,7 +121,7 @@ def close_to_ten_g(evidence: Evidence) -> Finding:
     )
 
 
-@judges("S41", figure="Sec. 4.1", needs=(LIGHT, HEAVY))
+@judges("S41", figure="Sec. 4.1, why mass helps", needs=(LIGHT, HEAVY))
 def why_mass_helps(evidence: Evidence) -> Finding:
     """The first slip across the reference after the return move, with both masses at the same crossover."""
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
@@ -169,7 +169,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
     return np.nan, np.nan
 
 
-@judges("F25O", figure="11B", needs=("system",))
+@judges("F25O", figure="25", needs=("system",))
 def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
     """The swing at the end over the crossover, at every mass of the map."""
     runs = evidence.maps["system"]
@@ -182,8 +182,8 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                "with the joint locked the swing of the cycles that last falls as the crossover rises (mean rank "
-                f"correlation over the masses at most {-TREND:g})",
+                "with the joint locked, over the map of Fig. 11B, the swing of the cycles that last falls as the "
+                f"crossover rises (mean rank correlation over the masses at most {-TREND:g})",
                 mean <= -TREND,
                 f"mean rank correlation {trend_text(mean)}, over {some.sum()} of {len(mass)} masses",
             ),
@@ -191,7 +191,7 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
     )
 
 
-@judges("S5", figure="Sec. 5", needs=tuple(STUDIES))
+@judges("S5", figure="Sec. 5, peaks and cycles", needs=tuple(STUDIES))
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
     """Of the cells of every map in which peaks are counted, those whose run still swings at its end; by what attracts,
     of those that are decided those which a cycle attracts."""

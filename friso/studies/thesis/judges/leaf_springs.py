@@ -55,7 +55,7 @@ def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
     )
 
 
-@judges("S35", figure="Sec. 3.5")
+@judges("S35", figure="Sec. 3.5, leaf springs")
 def the_leaf_springs(evidence: Evidence) -> Finding:
     """Stiffness, frequencies and stress, by geometrically exact beams."""
     evaluations = _evaluated()

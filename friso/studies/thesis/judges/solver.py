@@ -93,7 +93,7 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
     off = {name: abs(theirs[name][1] / tight[name][1] - 1) for name in swinging}
     own = [name for name in tight if loose[name][0] != tight[name][0]]
     steps = [int(count) for _, _, count in theirs.values()], [int(count) for _, _, count in loose.values()]
-    rows = tuple((name.replace("_", " "), *(_text(runs[name]) for runs in (theirs, tight, loose))) for name in tight)
+    rows = tuple((_title(name), *(_text(runs[name]) for runs in (theirs, tight, loose))) for name in tight)
     return Finding(
         (
             Part(
@@ -101,7 +101,7 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
                 f"{TIGHT:g} in each of {len(tight)} runs",
                 not counts,
                 f"in {len(tight) - len(counts)} of {len(tight)}"
-                + (f"; not in {', '.join(name.replace('_', ' ') for name in counts)}" if counts else ""),
+                + (f"; not in {', '.join(map(_title, counts))}" if counts else ""),
                 why="tolerance: these runs are near an edge of hunting, or bounce on the limiter",
             ),
             Part(
@@ -120,6 +120,11 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
         ),
         FindingTable(("run", "ode23s", f"friso, {TIGHT:g}", f"friso, {RTOL:g}"), rows),
     )
+
+
+def _title(name: str) -> str:
+    """A run's name in words."""
+    return name.replace("_", " ").replace(" hz", " Hz").replace(" um damping", " um, damping")
 
 
 def _text(run: Counted) -> str:
