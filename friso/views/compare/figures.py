@@ -67,8 +67,9 @@ def figures(comparison: Comparison) -> list[Figure]:
 
 
 def _names(comparison: Comparison) -> Axis:
-    """The options side by side."""
-    return Axis("Option", "", (-0.5, len(comparison.results) - 0.5), words=tuple(map(label, comparison.results)))
+    """The options side by side, by the letters that the curves of settling times name; names would not fit a phone."""
+    letters = tuple(result.letter for result in comparison.results)
+    return Axis("Option", "", (-0.5, len(letters) - 0.5), words=letters)
 
 
 def _probabilities(comparison: Comparison) -> Panel:

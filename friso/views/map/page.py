@@ -69,7 +69,7 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = N
 
 def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
     """The table under the map: what was varied, how well it was computed, and what came out."""
-    facts = [("Stage", str(runs.attrs.get("name", "")))]
+    facts = [("Stage", name)] if (name := str(runs.attrs.get("name", ""))) else []
     facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
     facts.append(("Verification", verification(runs)))
