@@ -104,7 +104,7 @@ def test_check_writes_its_page(host: str, axis: Path) -> None:
 @on_windows
 def test_files_are_replaced(host: str, axis: Path) -> None:
     for _ in range(2):
-        friso(host, axis, "simulate", "axis.toml", "--out", "run")
+        friso(host, axis, "export", "gains", "axis.toml", "--out", "run")
     assert not list(axis.rglob(f"{DRAFTS}*"))
 
 
