@@ -242,12 +242,12 @@ def described(stage: Stage, harmonics: int) -> tuple[float, float]:
         left = ((of_motor - of_load - deflection) / deflection[0].real)[: unknown.size // 2]
         return np.append(left.real, left.imag)
 
-    found = np.array([3.0, 1.5])
+    solution = np.array([3.0, 1.5])
     for some in range(1, harmonics + 1):  # steps that cross samples: the damper makes the force jump
-        begin = np.append(found, np.zeros(2 * some - found.size))
-        found = least_squares(left_over, begin, x_scale="jac", xtol=1e-12, ftol=1e-12, diff_step=1e-3).x
-    assert np.abs(left_over(found)).max() < 2e-3
-    omega, _, (of_load, _) = cycle(found)
+        begin = np.append(solution, np.zeros(2 * some - solution.size))
+        solution = least_squares(left_over, begin, x_scale="jac", xtol=1e-12, ftol=1e-12, diff_step=1e-3).x
+    assert np.abs(left_over(solution)).max() < 2e-3
+    omega, _, (of_load, _) = cycle(solution)
     return np.ptp(np.real(of_load @ waves)) / 2, 2 * np.pi / omega
 
 
