@@ -33,7 +33,7 @@ from friso.design_method.relax import Relaxation
 from friso.design_method.spec import Position, Spec, load_spec
 from friso.progress import Progress
 from friso.stage import Stage
-from friso.views.design.control import controller_step, moves_step, parallel_gains
+from friso.views.design.control import controller_step, moves_step
 from friso.views.design.document import design_document, refused_document
 from friso.views.design.figures import design_figures
 from friso.views.design.leaves import leaves_step, requirement_rows
@@ -210,7 +210,8 @@ def test_the_document_tells_front_controller_and_moves(designed: Design) -> None
     tuned = document["controller"]
     assert tuned["least_modulus_margin"] == designed.controller.corners.min()
     assert tuned["kp_n_per_m"] == pytest.approx(1.5 * tuned["k_p_n_per_m"])  # beta = 2
-    assert parallel_gains(designed)[1:] == (tuned["ki_n_per_m_s"], tuned["kd_n_s_per_m"])
+    parallel = designed.controller.gains.parallel
+    assert (parallel["ki"], parallel["kd"]) == (tuned["ki_n_per_m_s"], tuned["kd_n_s_per_m"])
     moves = document["verification"]
     assert (moves["moves"], moves["not_at_rest"], moves["settling_time_met"]) == (64, 0, True)
     assert moves["locked"]["moves"] == 64

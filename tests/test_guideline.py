@@ -42,7 +42,7 @@ from friso.studies.guideline.groups import (
 )
 from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fit_law, rates_in_series
 from friso.studies.guideline.parasitic import holding
-from friso.studies.guideline.thesis_rig import plain
+from friso.studies.guideline.thesis_rig import plain_rig
 from friso.studies.thesis.studies import thesis_rig
 
 RIGID = pytest.mark.xdist_group("rigid")
@@ -77,7 +77,9 @@ def with_mode(flat: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
 # groups
 
 
-@pytest.mark.parametrize("flat", [plain(), plain("joint"), plain("joint") | {"parasitic.frequency": 300.0}], ids=len)
+@pytest.mark.parametrize(
+    "flat", [plain_rig(), plain_rig("joint"), plain_rig("joint") | {"parasitic.frequency": 300.0}], ids=len
+)
 def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, Any]) -> None:
     """As many groups as parameters less the rank of their dimensions, none with a dimension, none made of others."""
     if "parasitic.frequency" in flat:
@@ -94,9 +96,9 @@ def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, A
 
 def test_parameters_are_all_that_the_equations_contain() -> None:
     """Every key in the equations of the rig is in a parameter; rigid masses enter as their sum alone."""
-    model = assemble(structure(plain()))
+    model = assemble(structure(plain_rig()))
     keys = {str(symbol) for symbol in model.parameters} - {"motion.size", "motion.duration"}
-    assert keys == {key for name in group_parameters(plain()) for key in PARAMETERS[name].keys}
+    assert keys == {key for name in group_parameters(plain_rig()) for key in PARAMETERS[name].keys}
     cart, part = sp.Symbol("masses.cart", real=True), sp.Symbol("masses.stage", real=True)
     whole = [rhs.subs(cart, sp.Symbol("m") - part) for rhs in model.rhs]
     assert all(part not in sp.expand(sp.simplify(rhs)).free_symbols for rhs in whole)
@@ -298,7 +300,7 @@ def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
 
 def studied(edge: Any, kind: str = FLIP) -> worked.Worked:
     """Worked steps of invented computed edges: `edge` gives that of the flat keys of the rig."""
-    flat = plain("joint")
+    flat = plain_rig("joint")
     studies = {
         name: tuple(worked.ThesisCase(change, 9.0, edge(name, flat | dict(change)), kind) for change in changes)
         for name, (changes, _) in worked._studies().items()  # pyright: ignore[reportPrivateUsage]
@@ -402,7 +404,8 @@ def shown(laws: Any, safe_locked: float, safe_free: float) -> worked.Worked:
 
     def by_law(laws: Any, changes: Any, free: bool) -> list[worked.ThesisCase]:
         own = [
-            plain("joint") | {k: v for k, v in change.items() if not k.startswith("parasitic")} for change in changes
+            plain_rig("joint") | {k: v for k, v in change.items() if not k.startswith("parasitic")}
+            for change in changes
         ]
         edges = [float((laws.free_edge if free else laws.locked_edge)(flat)[0]) for flat in own]
         return [worked.ThesisCase(change, edge, edge) for change, edge in zip(changes, edges, strict=True)]

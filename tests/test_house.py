@@ -21,7 +21,15 @@ KNOW_CONTROLLERS = ("equations/controllers/", "drives/formats/", "stage/stage.py
 """Where keys of a controller may be named: its own files, the stage file's schema, the template of one, and parameter
 files of drives, which are translated into friso's controllers."""
 
-SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "glossary.py", "loop_words.py", "pages.py", "report.py"}
+SHARED_VIEWS = {
+    "__init__.py",
+    "documents.py",
+    "files.py",
+    "glossary.py",
+    "loop_words.py",
+    "machine_words.py",
+    "pages.py",
+}
 """Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
 
 ABOUT_TUNING = (

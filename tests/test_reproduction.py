@@ -49,7 +49,6 @@ from friso.studies.thesis.cycles import map_cycles, survey
 from friso.studies.thesis.evidence import RESPONSES
 from friso.studies.thesis.experiments import _RUNS, EXPERIMENTS, GRID, MOVES, ON_RAILS, STANDSTILL, TRACES, Experiments
 from friso.studies.thesis.experiments import BUILT as LOOPS_BUILT
-from friso.studies.thesis.gains import rig_gains
 from friso.studies.thesis.judges import design_rules
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.kept import Kept, kept_findings
@@ -59,6 +58,7 @@ from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, v
 from friso.studies.thesis.plausible import PARTS, plausible
 from friso.studies.thesis.reproduce import _changed
 from friso.studies.thesis.space import OPEN, OpenValue, baseline, draw, enters
+from friso.studies.thesis.studies import rig_gains
 from friso.studies.thesis.taken_apart import put_together, taken_apart
 from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.studies.thesis.ways import COUNT, CYCLE, SWING, by_attraction, by_peak_count, by_swing_at_end, weakest

@@ -1,4 +1,4 @@
-"""The friction law on a cart that is stuck under a bias force or slides at a speed: its steady state there."""
+"""The friction law of a stage as a linear system; its steady force, and the speeds over which that differs."""
 
 from __future__ import annotations
 
@@ -16,12 +16,10 @@ from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, sine
 from friso.stage.stage import declared_keys
 from friso.stage.tables import friction_law
-from friso.stage.transmission import STATE_PREFIX, leading_friction, of_motor
+from friso.stage.transmission import STATE_PREFIX, leading_friction
 
 if TYPE_CHECKING:
     from collections.abc import Hashable
-
-    from friso.frequency.members import Members
 
 VELOCITY, BIAS = state("velocity"), sp.Symbol("bias", real=True)
 FORWARD = str(direction(VELOCITY).beyond)
@@ -69,17 +67,6 @@ def motor_law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
         return None
     states = tuple(state(f"{STATE_PREFIX}{name}") for name in law.states)
     return replace(law, declared=replace(law.declared, states=states))
-
-
-def operating_point_of_motor(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """The same as `operating_point` at the motor, which moves with the load and bears no bias."""
-    unbiased = replace(members, bias=np.zeros(len(members)))
-    point = operating_point(of_motor(flat), unbiased)
-    beyond = "beyond_"
-    return {
-        f"{beyond}{STATE_PREFIX}{name.removeprefix(beyond)}" if name.startswith(beyond) else f"{STATE_PREFIX}{name}": at
-        for name, at in point.items()
-    }
 
 
 @cache
@@ -155,19 +142,3 @@ def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     law = law_of(flat)
     bristles = (law.lengths(flat) if law else []) or [BRISTLES]
     return np.geomspace(SLOW * min(bristles), FAST * max(bristles), count)
-
-
-def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Values of the internal states of the law, of its modes that remember, of the sides of its kinks and of its
-    direction, by name, each of shape (members,)."""
-    law, forward = law_of(flat), members.forward.astype(float)
-    if law is None:
-        return {}
-    sign = 2 * forward - 1
-    at = {**flat, "velocity": sign * np.maximum(members.speed, np.finfo(float).tiny), FORWARD: forward}
-    sliding, stuck = law.sliding(at), law.stuck({**at, "bias": sign * members.bias})
-    internal = {
-        name: np.where(members.stuck, rest, moving)
-        for name, rest, moving in zip((*law.states, *law.modes), stuck, sliding, strict=True)
-    }
-    return {FORWARD: forward, **internal}

@@ -21,8 +21,9 @@ from friso.equations.structure import ControllerForm, Structure, shared_structur
 from friso.equations.transmission import flanks
 from friso.errors import InputError
 from friso.frequency.declared import Declared
-from friso.frequency.friction import law_of, motor_law_of, operating_point, operating_point_of_motor
+from friso.frequency.friction import law_of, motor_law_of
 from friso.frequency.members import Members
+from friso.frequency.operating_point import operating_point, operating_point_of_motor
 from friso.frequency.system import System
 from friso.stage.transmission import MOTOR_STATES
 

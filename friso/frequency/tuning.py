@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friso.equations.controllers.van_dijk import numbers, tuned
+from friso.equations.controllers.van_dijk import as_gains, numbers, tuned
 from friso.errors import InputError
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
@@ -22,6 +22,11 @@ class Tuning:
     tau_i: float
     tau_p: float
     margins: Margins
+
+    @property
+    def parallel(self) -> dict[str, float]:
+        """The same as gains of Eq. 6, on the error behind the low-pass: kp [N/m], ki [N/(m s)], kd [N s/m], tau [s]."""
+        return as_gains(self.k_p, self.tau_z, self.tau_i, self.tau_p)
 
     @property
     def true_crossover(self) -> float:

@@ -28,12 +28,11 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     answers, sentences = [], []
     for key in dict.fromkeys(estimate.name for estimate in estimates):
         estimates_of_key = [estimate for estimate in estimates if estimate.name == key]
-        certain = [estimate for estimate in estimates_of_key if estimate.determined]
-        shown = with_interval(certain)
+        shown = determined(estimates_of_key)
         if len(shown) > 1:
             answer, agrees = _mean(key, shown)
-        elif certain:
-            answer, agrees = (shown or certain)[0], True
+        elif shown:
+            answer, agrees = shown[0], True
         else:
             answer, agrees = _intersection(key, estimates_of_key)
         answers.append(answer)
@@ -44,7 +43,7 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         beyond = [
             estimate
             for estimate in estimates_of_key
-            if certain and not estimate.determined and (estimate.low > answer.high or estimate.high < answer.low)
+            if shown and not estimate.determined and (estimate.low > answer.high or estimate.high < answer.low)
         ]
         sentences += [f"{key}: {_text(answer)} is shown, but {_text(estimate)}" for estimate in beyond]
     return answers, sentences
@@ -58,7 +57,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
     """
     keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
     precision = {
-        key: sum(_weight(estimate) for estimate in with_interval(estimates) if estimate.name == key) for key in keys
+        key: sum(_weight(estimate) for estimate in determined(estimates) if estimate.name == key) for key in keys
     }
     covariance = np.diag([1 / precision[key] for key in keys])
     for group, matrix in groups:
@@ -72,7 +71,7 @@ def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) ->
     return keys, (joint + joint.T) / 2
 
 
-def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
+def determined(estimates: Sequence[Estimate]) -> list[Estimate]:
     """Those that are shown, with an interval, by which they can be weighted."""
     return [estimate for estimate in estimates if estimate.determined]
 

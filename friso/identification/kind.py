@@ -9,7 +9,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from friso.errors import InputError
-from friso.identification.combine import Correlated, with_interval
+from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
 from friso.identification.logs.joined import join_alike
 from friso.identification.logs.log import Log
@@ -88,7 +88,7 @@ def left_out(stage: Stage, log: Log) -> list[str]:
 
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
     """Estimates that are independent of one another."""
-    certain = with_interval(estimates)
+    certain = determined(estimates)
     return certain, np.eye(len(certain))
 
 

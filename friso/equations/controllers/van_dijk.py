@@ -62,10 +62,8 @@ class VanDijk(Pid):
     @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
         """A PID by its gains, as large as those of the rules, its derivative that of the measurement."""
-        k_p, tau_z, tau_i, tau_p = numbers(flat).values()
         gone = dict.fromkeys((CROSSOVER, ALPHA, BETA, TUNED_MASS))
-        gains = {"kp": k_p * (1 + tau_z / tau_i), "ki": k_p / tau_i, "kd": k_p * tau_z, "tau": tau_p}
-        written = {cls.key(name): value for name, value in gains.items()}
+        written = {cls.key(name): value for name, value in as_gains(**numbers(flat)).items()}
         return {"derivative of the measurement": {**gone, **written, cls.key("derivative_on"): "measurement"}}
 
     @classmethod
@@ -127,6 +125,11 @@ def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
         name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
         for name, expression in rules(Continuous(S.One)).items()
     }
+
+
+def as_gains(k_p: float, tau_z: float, tau_i: float, tau_p: float) -> dict[str, float]:
+    """The gains of Eq. 6 that are as large as those of the rules: kp [N/m], ki [N/(m s)], kd [N s/m]; and tau [s]."""
+    return {"kp": k_p * (1 + tau_z / tau_i), "ki": k_p / tau_i, "kd": k_p * tau_z, "tau": tau_p}
 
 
 def rules(blocks: Blocks) -> dict[str, sp.Expr]:

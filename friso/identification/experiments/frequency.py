@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.identification.combine import Correlated, with_interval
+from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
 from friso.identification.kind import (
     AnalysisSettings,
@@ -93,7 +93,7 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
 
 def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
     """Masses that are shared out of one move together."""
-    certain = with_interval(estimates)
+    certain = determined(estimates)
     if all(estimate.name.startswith("masses.") for estimate in estimates):
         return certain, np.ones((len(certain), len(certain)))
     return independent(result, estimates)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from friso.identification.combine import Correlated, with_interval
+from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
@@ -253,7 +253,7 @@ def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
 
 def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
     """As the fit has it; masses are shares of one."""
-    certain = with_interval(estimates)
+    certain = determined(estimates)
     rows = [result.order(estimate.name) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]
 

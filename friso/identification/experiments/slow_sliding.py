@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.identification.combine import Correlated, with_interval
+from friso.identification.combine import Correlated, determined
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
@@ -286,7 +286,7 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
 
 def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
     """As the fit has it."""
-    certain = with_interval(estimates)
+    certain = determined(estimates)
     rows = [result.estimates.index(estimate) for estimate in certain]
     return certain, result.correlation[np.ix_(rows, rows)]
 

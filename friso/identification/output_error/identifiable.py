@@ -174,7 +174,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     return True
 
 
-def reason(name: str, covered: Coverage) -> str:
+def why_not_shown(name: str, covered: Coverage) -> str:
     """Why a parameter is not shown, in a sentence."""
     if name in STRIBECK:
         low, high = covered.gap

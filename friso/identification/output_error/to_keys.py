@@ -9,7 +9,7 @@ import numpy as np
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.coverage import Coverage
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.identifiable import STRIBECK, IdentifiableFit, reason
+from friso.identification.output_error.identifiable import STRIBECK, IdentifiableFit, why_not_shown
 from friso.identification.output_error.parameters import MASS, RATIO, SHARE, keys_of
 from friso.identification.output_error.profile import Profile
 from friso.identification.readings.common import LINEARITY
@@ -66,7 +66,7 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
     fit = identified.fit
     parameters = {parameter.name: parameter for parameter in fit.problem.parameters}
     unknown = {
-        name: reason(name, covered)
+        name: why_not_shown(name, covered)
         for name, parameter in parameters.items()
         if name not in identified.shown and not parameter.core
     }

@@ -33,7 +33,7 @@ from friso.studies.guideline.sweeps import (
     free_sweep,
     locked_sweep,
 )
-from friso.studies.guideline.thesis_rig import Laws, plain
+from friso.studies.guideline.thesis_rig import Laws, plain_rig
 from friso.studies.guideline.worked import Worked, friction_range, worked
 from friso.studies.thesis.studies import thesis_rig
 from friso.system import usable_cores
@@ -138,7 +138,7 @@ def by_rates(locked: Fit) -> list[ByRates]:
 
 def safe_over_friction(locked: Fit) -> float:
     """The largest of the safe factors of those bins of slip over drop that the rig visits over its friction range."""
-    flats = [plain() | forces for forces in friction_range()]
+    flats = [plain_rig() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]
     visited = _ratio(locked.law, {name: np.array([group[name] for group in groups], float) for name in groups[0]})
     bins = [decade for decade in by_rates(locked) if np.any((visited >= decade.low) & (visited < decade.high))]
@@ -192,8 +192,8 @@ def checked_samples(samples: int) -> None:
 def group_counts() -> dict[str, Count]:
     """Parameters and groups of the rig rigid, with its joint, and with its parasitic mode as well."""
     return {
-        "rigid": group_count(plain()),
-        "joint": group_count(plain("joint")),
+        "rigid": group_count(plain_rig()),
+        "joint": group_count(plain_rig("joint")),
         "parasitic": group_count(thesis_rig().flat()),
     }
 
@@ -216,7 +216,7 @@ def _steps(sizes: Mapping[str, int]) -> int:
 
 def _compile() -> None:
     """Compile all equations that are needed, side by side."""
-    flats = (plain(), plain("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
+    flats = (plain_rig(), plain_rig("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
     kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 
 

@@ -77,7 +77,7 @@ def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]
     return dict(zip(values, arrays, strict=True)), np.atleast_1d(rate)
 
 
-def plain(part: str = "") -> dict[str, Any]:
+def plain_rig(part: str = "") -> dict[str, Any]:
     """The flat keys of the rig without its parasitic mode; without its joint as well unless part is "joint"."""
     dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
     return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
@@ -86,7 +86,7 @@ def plain(part: str = "") -> dict[str, Any]:
 def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisCase]:
     """The rig with each of these changes, rigid or with its joint free."""
     mode = any("parasitic.frequency" in change for change in changes)
-    base = thesis_rig().flat() if mode else plain("joint" if free else "")
+    base = thesis_rig().flat() if mode else plain_rig("joint" if free else "")
     keys = {key for change in changes for key in change}
     flat = base | {key: np.array([change.get(key, base[key]) for change in changes], float) for key in keys}
 
@@ -96,7 +96,7 @@ def cases(laws: Laws, changes: Sequence[RigChanges], free: bool) -> list[ThesisC
 
     grid = FREE_GRID if free else RIGID_GRID
     edges = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))
-    with_joint = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
+    with_joint = plain_rig("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
     law = np.broadcast_to(laws.free_edge(with_joint) if free else laws.locked_edge(with_joint), edges.kind.shape)
     columns = law.tolist(), edges.crossover.tolist(), edges.kind.astype(str).tolist()
     return [ThesisCase(*row) for row in zip(changes, *columns, strict=True)]

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.studies.guideline.parasitic import margin_with
 from friso.studies.guideline.sweeps import LOCKED_BOX
-from friso.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCase, cases, direct, plain
+from friso.studies.guideline.thesis_rig import FREE_GRID, Laws, ThesisCase, cases, direct, plain_rig
 from friso.studies.thesis.studies import thesis_rig
 
 STATIC = (1.0, 1.5, 2.0, 2.5)
@@ -133,7 +133,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
     highest_law = safe_locked * max(case.law for case in friction)
     needs = tuple(IsolatorNeed(limit, highest_law) for limit in LIMITS)
     return Worked(
-        {name: float(rate[0]) for name, rate in laws.rates(plain("joint")).items()},
+        {name: float(rate[0]) for name, rate in laws.rates(plain_rig("joint")).items()},
         machines(laws),
         tuple(friction),
         highest(laws),
@@ -146,7 +146,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
 
 def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
     """The rig as one rigid mass, locked and free."""
-    flat = plain("joint")
+    flat = plain_rig("joint")
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
     stage = thesis_rig()
     rigid = stage.model_copy(update={"joint": None, "parasitic": None})
@@ -166,7 +166,7 @@ def highest(laws: Laws) -> float:
     """The highest edge [Hz] of the rig by the law, over all friction forces with a gap in the range, its masses and
     bristles as they are: the edge goes with sqrt(sigma_0/m)."""
     static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
-    flat = plain() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
+    flat = plain_rig() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
     return float(laws.locked_edge(flat).max())
 
 
@@ -184,7 +184,7 @@ def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
     """Nine tenths of the stiffest joint whose edge by the law stays below the aim over the friction range, with the
     least stroke with which it still does."""
     forces = friction_range(DESIGN_GAPS)
-    base: dict[str, Any] = plain("joint")
+    base: dict[str, Any] = plain_rig("joint")
     base |= {key: np.array([pair[key] for pair in forces]) for key in forces[0]}
 
     def over(stiffness: float, stroke: float) -> float:
@@ -218,7 +218,7 @@ def _root(function: Any, low: float, high: float) -> float:
 
 def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
     """Changes of the rig by the name of the study, and whether its joint is free."""
-    flat = plain("joint")
+    flat = plain_rig("joint")
     mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
     forces = [
         {"friction.static": force, "friction.coulomb": force * (1 - gap)}

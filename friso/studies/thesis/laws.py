@@ -45,10 +45,6 @@ class ConclusionByLaw:
         pairs = zip(first.parts, self.findings[law].parts, strict=True)
         return tuple(other.number for own, other in pairs if own.holds != other.holds)
 
-    def survives(self, law: str) -> bool:
-        """Whether the same parts hold under a law as under the thesis's own."""
-        return not self.turned(law)
-
 
 @dataclass(frozen=True)
 class ConclusionsByLaw:
@@ -62,7 +58,7 @@ class ConclusionsByLaw:
     @property
     def dependent(self) -> tuple[ConclusionByLaw, ...]:
         """The conclusions that do not survive every law."""
-        return tuple(c for c in self.conclusions if not all(c.survives(law) for law in self.laws[1:]))
+        return tuple(c for c in self.conclusions if any(c.turned(law) for law in self.laws[1:]))
 
 
 def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:

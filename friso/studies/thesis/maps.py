@@ -90,6 +90,6 @@ def overlap(part: np.ndarray, total: np.ndarray) -> float:
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
 
 
-def share_text(moving: np.ndarray, cells: np.ndarray) -> str:
+def overlap_text(moving: np.ndarray, cells: np.ndarray) -> str:
     """The same share in words."""
     return f"{percent(overlap(moving, cells))}" if cells.any() else "none"

@@ -190,16 +190,12 @@ def _others(
     }
     return {
         method: {
-            name: _two(entry, replace(base, maps=maps))
+            name: weakest(ways_of(entry, replace(base, maps=maps)))
             for name, entry in entries.items()
             if entry.needs & STUDIES.keys()
         }
         for method, maps in grids.items()
     }
-
-
-def _two(entry: Registered, base: Evidence) -> Finding:
-    return weakest(ways_of(entry, base))
 
 
 def _second(runs: xr.Dataset) -> xr.Dataset:

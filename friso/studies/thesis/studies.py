@@ -9,7 +9,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
-from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS, as_gains, numbers
 from friso.stage import Stage, loads
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -72,6 +72,18 @@ class ThesisStudy:
 def thesis_rig() -> Stage:
     """The rig of Table 2 and Sec. 3.5 with our choice of what the thesis leaves open."""
     return loads(files("friso.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8"))
+
+
+def rig_crossover() -> float:
+    """Crossover of the rig [Hz]."""
+    return float(thesis_rig().flat()[CROSSOVER])
+
+
+def rig_gains(mass: float) -> tuple[float, float, float]:
+    """k_p [N/m], k_i [N/(m s)] and k_d [N s/m] of Eq. 6 by Eq. 7 and 8 for a mass [kg], at the crossover, alpha and
+    beta of the rig."""
+    gains = as_gains(**numbers({**thesis_rig().flat(), TUNED_MASS: mass}))
+    return gains["kp"], gains["ki"], gains["kd"]
 
 
 def masses(whole: float) -> dict[str, object]:

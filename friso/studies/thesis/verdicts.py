@@ -74,7 +74,7 @@ class ClaimVerdict:
         if self.space is None:
             sentence = "No joint draws of the values that the thesis leaves open were made for this claim."
         else:
-            sentence = f"By the runs it holds in {share_text(self.space.holds, self.space.count, self.space.draws)}"
+            sentence = f"By the runs it holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
             sentence += (
                 f", {percent(self.space.undecided / self.space.draws)} undecided" if self.space.undecided else ""
             )
@@ -94,7 +94,7 @@ _KINDS = {
 }
 
 
-def share_text(share: Share, count: int, draws: int) -> str:
+def draws_text(share: Share, count: int, draws: int) -> str:
     """The share of the joint draws in words."""
     return f"{count} of {draws} joint draws of the unstated values ({percent(share.low)} to {percent(share.high)})"
 

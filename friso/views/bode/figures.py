@@ -87,7 +87,7 @@ def phases(responses: Sequence[np.ndarray]) -> list[Array]:
     return [first, *(phase + 360 * np.round(np.median(first[high] - phase[high]) / 360) for phase in others)]
 
 
-def size(response: np.ndarray) -> Array:
+def magnitude(response: np.ndarray) -> Array:
     """Absolute value [dB]."""
     return 20 * np.log10(np.abs(response))
 
@@ -215,12 +215,12 @@ def _sensitivity(bode: Bode) -> Figure:
     """Sensitivity of the limit cases that are stable, and the band of the family."""
     stable = bode.scan.stable
     lines = tuple(
-        Series(_hertz(bode), -size(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
+        Series(_hertz(bode), -magnitude(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
         for curve in (_loop_of(name, case) for name, case in bode.cases.items() if case.margins.stable)
     )
     bands = ()
     if stable.any() and has_family(bode):
-        all_ = -size(1 + bode.loops[stable])
+        all_ = -magnitude(1 + bode.loops[stable])
         name = "stable states of the family"
         bands = (Band(_hertz(bode), all_.min(axis=0), all_.max(axis=0), name, LIGHT),)
     if not (lines or bands):
@@ -242,9 +242,9 @@ def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, .
     of no loops."""
     if not curves:
         return ()
-    sizes = np.concatenate([size(curve.response) for curve in curves])
+    sizes = np.concatenate([magnitude(curve.response) for curve in curves])
     view = max(float(sizes.min()) - 5, SIZES[0]), min(float(sizes.max()) + 5, SIZES[1])
-    above = _magnitudes(hertz, curves, Axis("Magnitude", "dB", view, step=30.0), size)
+    above = _magnitudes(hertz, curves, Axis("Magnitude", "dB", view, step=30.0), magnitude)
     below = _phases(hertz, curves)
     low, high = below.y.limits or (-180.0, 180.0)
     halves = tuple(turn for turn in (-540.0, -180.0, 180.0) if low < turn < high)

@@ -21,6 +21,7 @@ from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
 from friso.views.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval, with_unit
+from friso.views.machine_words import spread_sentences
 
 COLUMNS = (
     "Swings at the end",
@@ -322,11 +323,7 @@ def population(comparison: Comparison) -> list[str]:
         f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "
         "noise in all options."
     ]
-    if machines.from_file:
-        lines.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
-    if machines.spreads:
-        spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
-        lines.append(f"Default spreads (95 % of the machines), as the stage file gives none: {spreads}.")
+    lines += spread_sentences(machines.from_file, machines.spreads)
     if "rail.seed" in machines.keys:
         lines.append("Every machine has a different rail.")
     return lines

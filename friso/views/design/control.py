@@ -11,11 +11,11 @@ from friso.views.design.window import CrossoverBound, comfortable, lower, upper
 from friso.views.design.words import (
     DesignStep,
     hertz,
-    plain,
     probability,
     restless,
     seconds,
     settling,
+    trimmed,
 )
 from friso.views.drawing.prefixes import listed
 
@@ -29,7 +29,7 @@ LITTLE = 0.1
 def controller_step(design: Design) -> DesignStep:
     """The crossover, why it is no other, and the gains."""
     controller = design.controller
-    gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)} {plain(controller.gains.tau_p, 's')}."
+    gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)}."
     faster = [_faster(design)] if design.damped else []
     sentences = (_not_higher(design), *faster, _not_lower(design), gains, _margin(design), _damping(design))
     figures = ("design_window", "design_damping")
@@ -41,12 +41,9 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
     window = " to ".join(map(hertz, comfortable(design)))
     return (
         ("Crossover", hertz(controller.crossover)),
-        (
-            "Tuned for",
-            f"{plain(flat[TUNED_MASS], 'kg')}, α = {flat[ALPHA]:g}, β = {flat[BETA]:g}",
-        ),
-        ("k_p", plain(gains.k_p, "N/m")),
-        ("τ_z, τ_i, τ_p", ", ".join(plain(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
+        ("Tuned for", f"{trimmed(flat[TUNED_MASS], 'kg')}, α = {flat[ALPHA]:g}, β = {flat[BETA]:g}"),
+        ("k_p", trimmed(gains.k_p, "N/m")),
+        ("τ_z, τ_i, τ_p", ", ".join(trimmed(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
         ("As gains of a PID: kp, ki, kd", _parallel(design)),
         ("Least modulus margin, as designed", f"{controller.margin:.3g}"),
         ("The same over the corners", f"{controller.corners.min():.3g}"),
@@ -58,22 +55,16 @@ def _faster(design: Design) -> str:
     """What would let the crossover be higher."""
     assert design.damped
     return (
-        f"With {plain(design.damped.needed, 'N*s/m')} of joint damping instead of "
-        f"{plain(design.damped.value, 'N*s/m')} it could be {hertz(design.faster)}: --set joint.damping tries it."
+        f"With {trimmed(design.damped.needed, 'N*s/m')} of joint damping instead of "
+        f"{trimmed(design.damped.value, 'N*s/m')} it could be {hertz(design.faster)}: --set joint.damping tries it."
     )
 
 
 def _parallel(design: Design) -> str:
     """The gains of Eq. 6 that act on the error low-passed with tau_p."""
-    kp, ki, kd = parallel_gains(design)
-    gains = f"{plain(kp, 'N/m')}, {plain(ki, 'N/(m*s)')}, {plain(kd, 'N*s/m')}"
-    return f"{gains}, with a low-pass filter of time constant τ_p ="
-
-
-def parallel_gains(design: Design) -> tuple[float, float, float]:
-    """Proportional [N/m], integral [N/(m s)] and derivative gain [N s/m] on the error behind the low-pass of tau_p."""
-    gains = design.controller.gains
-    return gains.k_p * (1 + gains.tau_z / gains.tau_i), gains.k_p / gains.tau_i, gains.k_p * gains.tau_z
+    kp, ki, kd, tau = design.controller.gains.parallel.values()
+    gains = f"{trimmed(kp, 'N/m')}, {trimmed(ki, 'N/(m*s)')}, {trimmed(kd, 'N*s/m')}"
+    return f"{gains}, with a low-pass filter of time constant τ_p = {trimmed(tau, 's')}"
 
 
 def _not_higher(design: Design) -> str:
@@ -110,14 +101,14 @@ def _margin(design: Design) -> str:
 def _damping(design: Design) -> str:
     damping = design.controller.damping
     as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
-    now = f"with its own damping of {plain(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"
+    now = f"with its own damping of {trimmed(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"
     if worth == 0 or best < (1 + LITTLE) * as_designed:
         return (
-            f"More damping in the joint is not worth adding: {now}, and none up to {plain(damping.tried[-1], 'N*s/m')} "
-            f"raises it above {best:.3g}."
+            f"More damping in the joint is not worth adding: {now}, and none up to "
+            f"{trimmed(damping.tried[-1], 'N*s/m')} raises it above {best:.3g}."
         )
     return (
-        f"Damping in the joint is worth adding: {now}, with {plain(damping.tried[worth], 'N*s/m')} it is "
+        f"Damping in the joint is worth adding: {now}, with {trimmed(damping.tried[worth], 'N*s/m')} it is "
         f"{damping.margins[worth]:.3g}; more damping adds little."
     )
 
@@ -134,7 +125,7 @@ def moves_step(design: Design) -> DesignStep:
     sentences += [_met(design), f"{_worst(free)}: worst.toml"]
     facts = (
         *(row for name, outcome in (("free", free), ("locked", locked)) for row in _outcome(name, outcome)),
-        ("In position", f"within ±{plain(design.spec.position.window, 'm')} of the reference"),
+        ("In position", f"within ±{trimmed(design.spec.position.window, 'm')} of the reference"),
     )
     title = f"Verification: {free.tried} moves, {restless(free)}"
     return DesignStep(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
@@ -150,7 +141,7 @@ def _met(design: Design) -> str:
 def _worst(outcome: MachineOutcomes) -> str:
     k = outcome.worst
     if outcome.restless[k]:
-        return f"The worst move, which {outcome.words[k]} over {plain(outcome.swing[k], 'm')}"
+        return f"The worst move, which {outcome.words[k]} over {trimmed(outcome.swing[k], 'm')}"
     return f"The worst move, which takes {seconds(float(outcome.settling[k]))} to settle"
 
 

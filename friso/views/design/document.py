@@ -14,7 +14,6 @@ from friso.design_method.geometry import Geometry
 from friso.design_method.method import SLOW, Design, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
-from friso.views.design.control import parallel_gains
 from friso.views.design.window import lower, upper
 from friso.views.design.words import need, refusal
 from friso.views.documents import plain_json, unit_suffix
@@ -145,7 +144,7 @@ def _candidate(candidate: Candidate, beams: Confirmed | None) -> dict[str, Any]:
 
 def _controller(design: Design) -> dict[str, Any]:
     controller, gains = design.controller, design.controller.gains
-    kp, ki, kd = parallel_gains(design)
+    kp, ki, kd, _ = gains.parallel.values()
     return {
         "crossover_hz": controller.crossover,
         "bounds_above_hz": [{"value": bound.value, "reason": bound.reason} for bound in upper(design)],

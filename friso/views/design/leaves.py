@@ -10,7 +10,7 @@ import numpy as np
 from friso.design_method.method import Design
 from friso.design_method.requirements import RelaxableKey, Requirement
 from friso.quantities import percent
-from friso.views.design.words import DesignStep, hertz, leaves, plain, size
+from friso.views.design.words import DesignStep, hertz, leaves, size, trimmed
 from friso.views.drawing.prefixes import listed
 from friso.views.flexure.table import megapascals, newtons_per
 from friso.views.flexure.words import assumptions
@@ -33,7 +33,7 @@ def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
         (
             requirement.name,
             _keys(requirement, lambda relaxable: relaxable.key),
-            _keys(requirement, lambda relaxable: plain(relaxable.value, relaxable.unit)),
+            _keys(requirement, lambda relaxable: trimmed(relaxable.value, relaxable.unit)),
             f"{percent(share, 3)}{', binds' if share > BINDS else ''}",
         )
         for requirement, share in zip(choice.requirements, choice.excess, strict=True)
@@ -63,13 +63,13 @@ def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
         ("First interfering frequency, by beams", hertz(choice.frequency)),
         ("Stress at the clamps at full stroke", megapascals(beams.clamp_stress)),
         ("Margin to yield, to fatigue", f"{beams.yield_margin:.3g} times, {_factor(beams.fatigue_margin)}"),
-        ("Buckling load", plain(beams.buckling, "N")),
+        ("Buckling load", trimmed(beams.buckling, "N")),
         ("Load along the leaves, weight included", f"{design.fitted.task.load:.3g} N"),
         (
             "Support stiffness at full stroke, x and y",
             f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}",
         ),
-        ("Shortening at full stroke", plain(beams.shortening, "m")),
+        ("Shortening at full stroke", trimmed(beams.shortening, "m")),
     )
 
 
@@ -94,7 +94,7 @@ def _strength(design: Design) -> str:
         f"With the stroke alone, the stress at the clamps is {megapascals(beams.clamp_stress)}, "
         f"{beams.yield_margin:.3g} "
         f"times below yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at "
-        f"{plain(beams.buckling, 'N')}, {margin:.3g} times the {load:.3g} N that they carry ({safety.buckling:g} "
+        f"{trimmed(beams.buckling, 'N')}, {margin:.3g} times the {load:.3g} N that they carry ({safety.buckling:g} "
         f"required{forms})."
     )
 

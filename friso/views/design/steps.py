@@ -9,7 +9,7 @@ from friso.design_method.method import Design
 from friso.quantities import percent
 from friso.views.design.control import controller_step, moves_step
 from friso.views.design.leaves import leaves_step
-from friso.views.design.words import DesignStep, brings, corner, edge, gaps, hertz, plain, size
+from friso.views.design.words import DesignStep, brings, corner, edge, gaps, hertz, size, trimmed
 from friso.views.flexure.table import newtons_per
 
 GAP = 1.0
@@ -44,10 +44,10 @@ def joint_step(design: Design) -> DesignStep:
     """How soft, and with which stroke."""
     task, beams, safety = design.fitted.task, design.fitted.choice.beams, design.spec.safety
     allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
-    stiffness, force = newtons_per(beams.drive[0], "mm"), plain(beams.forces[-1], "N")
+    stiffness, force = newtons_per(beams.drive[0], "mm"), trimmed(beams.forces[-1], "N")
     held = (
         f"At full stroke the joint exerts {force}. The cart breaks away at no less than "
-        f"{plain(task.friction, 'N')}; with the safety factor of {safety.breakaway:g} and a stiffness error of "
+        f"{trimmed(task.friction, 'N')}; with the safety factor of {safety.breakaway:g} and a stiffness error of "
         f"{percent(safety.stiffness_tolerance)} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
     sentences = [
@@ -62,11 +62,11 @@ def joint_step(design: Design) -> DesignStep:
         ("Stroke to each side", f"{size(task.stroke)} mm"),
         ("Deviation from linear over the stroke", f"{percent(beams.nonlinearity)}"),
         ("Force at full stroke", force),
-        ("Least static friction", plain(task.friction, "N")),
+        ("Least static friction", trimmed(task.friction, "N")),
         (
             "Limiter, beside the joint when touched",
-            f"{plain(joint['joint.limiter_stiffness'], 'N/m')}, "
-            f"{plain(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
+            f"{trimmed(joint['joint.limiter_stiffness'], 'N/m')}, "
+            f"{trimmed(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
         ),
         ("Edge of hunting with isolator", _edge(design.edges)),
     )

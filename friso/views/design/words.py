@@ -166,7 +166,7 @@ def corner(corners: Corners, flat: Mapping[str, Any], number: int) -> str:
     keys = corners.population.of(number)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
-    return ", ".join(f"{in_sentence(key)} {plain(keys[key], units[key])}" for key in order)
+    return ", ".join(f"{in_sentence(key)} {trimmed(keys[key], units[key])}" for key in order)
 
 
 def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
@@ -196,7 +196,7 @@ def shortfall(design: Design) -> str:
 
 def relaxation(change: Relaxation) -> str:
     needed = outwards(change.needed, change.needed > change.value)
-    values = f"{plain(change.value, change.unit)} to {plain(needed, change.unit)}"
+    values = f"{trimmed(change.value, change.unit)} to {trimmed(needed, change.unit)}"
     text = f"relax {change.key} from {values} ({change.requirement})"
     if change.geometry is None:
         return text
@@ -212,7 +212,7 @@ def outwards(value: float, larger: bool) -> float:
     return float(f"{steps * step:.6g}")
 
 
-def plain(value: float, unit: str) -> str:
+def trimmed(value: float, unit: str) -> str:
     """A value with its unit, without zeros that say nothing: "70 mm", "0.3 N"."""
     if unit.startswith("N") and abs(value) < 1000:
         return f"{value:.4g} {pretty(unit)}"

@@ -9,7 +9,7 @@ import numpy as np
 from friso.hunting.edges import FLIP, FOLD, JUMP, LOST
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.sweeps import Sweep
-from friso.studies.guideline.thesis_rig import Laws, plain
+from friso.studies.guideline.thesis_rig import Laws, plain_rig
 from friso.studies.guideline.worked import STUDIED, ThesisCase
 from friso.views.drawing.figure import (
     BLUE,
@@ -156,7 +156,7 @@ def _thesis_rig(guideline: Guideline) -> Figure:
     """The thesis rig with one thing changed at a time."""
     laws = Laws(guideline.locked.law, guideline.free.law)
     panels = tuple(_studied(title, x, guideline.worked.studies[name], laws) for name, (title, x) in PANELS.items())
-    flat = plain("joint")
+    flat = plain_rig("joint")
     mass, stiffness, stroke = (
         flat["masses.cart"] + flat["masses.stage"],
         flat["joint.stiffness"] / 1e3,
@@ -181,7 +181,7 @@ def _studied(title: str, x: Axis, cases: Sequence[ThesisCase], laws: Laws) -> Pa
     changes = {
         key: np.interp(places, np.arange(len(cases)), [case.changes[key] for case in cases]) for key in cases[0].changes
     }
-    finer = plain("joint") | changes
+    finer = plain_rig("joint") | changes
     law = laws.locked_edge(finer) if name == "mass" else laws.free_edge(finer)
     top = 1.15 * float(np.nanmax([*law, *computed]))
     return Panel(

@@ -21,7 +21,7 @@ from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors
 from friso.studies.guideline.parasitic import DRIVE
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
-from friso.studies.guideline.thesis_rig import ThesisCase, plain
+from friso.studies.guideline.thesis_rig import ThesisCase, plain_rig
 from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
 from friso.version import VERSION
 from friso.views.files import Content, pictures
@@ -151,7 +151,7 @@ def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
     ranges["joint"] = _span(used.values["joint"])
     edges = (guideline.locked.sweep.usable.edge, used.edge)
     ranges["crossover"] = _span(np.concatenate(edges))
-    thesis_values = values_of(plain("joint"))
+    thesis_values = values_of(plain_rig("joint"))
     return [
         {
             "name": name,

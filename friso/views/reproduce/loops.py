@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.studies.thesis.experiments import BUILT
-from friso.views.bode.figures import ResponseCurve, bode_figures, phases, size
+from friso.views.bode.figures import ResponseCurve, bode_figures, magnitude, phases
 from friso.views.drawing.colours import ramp
 from friso.views.drawing.figure import INK, Axis, Figure, Limit, Panel, Series
 
@@ -93,7 +93,7 @@ def _panels(title: str, ends: tuple[float, float], curves: Sequence[tuple[np.nda
     responses = [curve.response for _, curve in curves]
     above, below = [], []
     for (hertz, curve), turn, shade in zip(curves, phases(responses), shades, strict=False):
-        above.append(Series(hertz, size(curve.response), curve.label, shade))
+        above.append(Series(hertz, magnitude(curve.response), curve.label, shade))
         below.append(Series(hertz, turn, "", shade))
     return [
         Panel(title, x, Axis("Magnitude", "dB", step=30.0), tuple(above), limits=(Limit((0.0,), "", INK),)),

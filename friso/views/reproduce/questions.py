@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from friso.evidence import value
-from friso.studies.thesis.gains import rig_crossover, rig_gains
 from friso.studies.thesis.space import OPEN
+from friso.studies.thesis.studies import rig_crossover, rig_gains
 
 if TYPE_CHECKING:
     from friso.studies.thesis import Reproduction
@@ -132,7 +132,6 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
     limits = {v.claim.id: v for v in reproduction.verdicts}
     gap = _number(limits["F12A"], 0)
     softest = _STATIC / _STROKE
-    gains = [_gains(mass) for mass in (1.7, _LARGEST)]
     built = partial(value, "design.thesis")
     needed = "an isolator is needed" if built("needed") else "no isolator is needed"
     return [
@@ -162,7 +161,7 @@ def method_rows(reproduction: Reproduction) -> list[Sequence[str]]:
         (
             "4. Gains for the largest mass",
             "Eq. 7, 8 with the mass identified",
-            "; ".join(f"{mass:g} kg: {text}" for mass, text in zip((1.7, _LARGEST), gains, strict=True)),
+            "; ".join(f"{mass:g} kg: {_gain_text(*rig_gains(mass))}" for mass in (1.7, _LARGEST)),
             f"{built('crossover_hz'):g} Hz: {_gain_text(*map(built, _GAINS))}; least modulus margin "
             f"{built('margin'):.2g}",
         ),
@@ -182,11 +181,6 @@ _GAINS = "kp_n_per_m", "ki_n_per_m_s", "kd_n_s_per_m"
 def _number(verdict: object, part: int) -> str:
     finding = getattr(verdict, "finding", None)
     return finding.parts[part].number if finding else "not computed in this run"
-
-
-def _gains(mass: float) -> str:
-    """The gains for a mass [kg]."""
-    return _gain_text(*rig_gains(mass))
 
 
 def _gain_text(proportional: float, integral: float, derivative: float) -> str:

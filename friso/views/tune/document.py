@@ -8,7 +8,7 @@ from typing import Any
 from friso.remedies.method import Advice
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.views.documents import plain_json
-from friso.views.tune.words import answer, changes, failing, reason, unsure_why
+from friso.views.tune.words import answer, changes, failing, unsure_why, why_unmet
 
 
 def tune_document(tuning: Advice) -> dict[str, Any]:
@@ -51,7 +51,7 @@ def tune_document(tuning: Advice) -> dict[str, Any]:
 
 def _remedy(outcome: RemedyOutcome, tuning: Advice) -> dict[str, Any]:
     if outcome.stage is None or outcome.measured is None:
-        why = unsure_why(outcome) if outcome.interrupted else reason(outcome, tuning)
+        why = unsure_why(outcome) if outcome.interrupted else why_unmet(outcome, tuning)
         return {"works": outcome.certainty, "why": why}
     judgement = outcome.case.judgement if outcome.case else None
     edge = judgement.margin if judgement else None

@@ -24,6 +24,7 @@ from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
 from friso.views.drawing.prefixes import NOTHING, listed, share_with_interval, with_unit
 from friso.views.loop_words import unstable_loop
+from friso.views.machine_words import spread_sentences
 
 DOUBTS = {
     "verdict": "friso check does not say that it settles",
@@ -167,8 +168,8 @@ def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
 def size_words(size: ChangeSize) -> str:
     """How large a change is."""
     keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
-    each = " each on average" if size.scaled > 1 else ""
-    factor = f", by a factor of {plain(size.mean)}{each}" if size.factor > 1 else ""
+    average = " each on average" if size.scaled > 1 else ""
+    factor = f", by a factor of {factor_text(size.mean)}{average}" if size.factor > 1 else ""
     return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
 
 
@@ -200,10 +201,10 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
 
 
 def _ratio(now: float, before: float) -> str:
-    return plain(now / before) if before > 0 and math.isfinite(now / before) else NOTHING
+    return factor_text(now / before) if before > 0 and math.isfinite(now / before) else NOTHING
 
 
-def plain(factor: float) -> str:
+def factor_text(factor: float) -> str:
     """A factor with three digits, without an exponent."""
     return f"{float(f'{factor:.3g}'):.15g}"
 
@@ -250,13 +251,13 @@ def failing(tuning: Advice) -> list[str]:
     lines = []
     for outcome in tuning.outcomes:
         if outcome.certainty == "does not work":
-            lines.append(f"{outcome.remedy.name}: does not work. {reason(outcome, tuning)}")
+            lines.append(f"{outcome.remedy.name}: does not work. {why_unmet(outcome, tuning)}")
         elif outcome.certainty == "unsure" and tuning.working:
             lines.append(f"{outcome.remedy.name}: not sure to work: {unsure_why(outcome)}.")
     return lines
 
 
-def reason(outcome: RemedyOutcome, tuning: Advice) -> str:
+def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Why no setting of a remedy meets the goal."""
     if outcome.points is None:
         return "It was given up: its motions take too much computing."
@@ -393,11 +394,7 @@ def assumptions(tuning: Advice) -> list[str]:
         f"continuous time. {machines.count} machines that the optimiser did not see were drawn (seed {tuning.seed}), "
         "each with a move of a quarter of the travel or more."
     )
-    if machines.from_file:
-        lines.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
-    if machines.spreads:
-        spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
-        lines.append(f"Default spreads (95 % of the machines): {spreads}.")
+    lines += spread_sentences(machines.from_file, machines.spreads)
     if machines.left_out:
         lines.append(f"{machines.left_out} draws that no stage may have were left out and others drawn.")
     return lines

@@ -1,45 +1,11 @@
-"""The judges of the claims, by figure; importing a module registers those in it.
+"""The judges of the claims, by figure; every module in this folder is imported, and registers those in it.
 
 A judge of a later claim is one more module here (or a function decorated with `judges` anywhere): the page lists
 its finding without a change.
 """
 
-from friso.studies.thesis.judges import (
-    arguments,
-    control_and_friction,
-    crossover,
-    design_rules,
-    identified_in_time,
-    identified_responses,
-    leaf_springs,
-    limit_cases,
-    loops,
-    masses,
-    path_and_system,
-    response,
-    rig_hunting,
-    series_stiffness,
-    shares,
-    solver,
-    stiffness_and_damping,
-)
+from importlib import import_module
+from pkgutil import iter_modules
 
-__all__ = [
-    "arguments",
-    "control_and_friction",
-    "crossover",
-    "design_rules",
-    "identified_in_time",
-    "identified_responses",
-    "leaf_springs",
-    "limit_cases",
-    "loops",
-    "masses",
-    "path_and_system",
-    "response",
-    "rig_hunting",
-    "series_stiffness",
-    "shares",
-    "solver",
-    "stiffness_and_damping",
-]
+for _module in iter_modules(__path__):
+    import_module(f"{__name__}.{_module.name}")

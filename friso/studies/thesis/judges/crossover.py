@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
 from friso.studies.thesis.claims import SAME, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, share_text, sizes, verdict_table
+from friso.studies.thesis.maps import ends, overlap_text, sizes, verdict_table
 from friso.studies.thesis.studies import SOFT, thesis_rig
 
 if TYPE_CHECKING:
@@ -34,7 +34,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
                 "one on",
                 bool(moving[:, long].any(axis=0).all() and not moving[-1, long].any()),
                 f"mean limit {limits[long].mean():.3g} Hz ({limits[long].min():.3g} to {limits[long].max():.3g} Hz); "
-                f"{share_text(moving, below)} of the cells below it keep moving",
+                f"{overlap_text(moving, below)} of the cells below it keep moving",
             ),
             Part(
                 "the mean limits over the third and over the fourth quarter of the strokes differ by at most "

@@ -12,8 +12,8 @@ from friso.studies.thesis.maps import (
     ends,
     free_square,
     overlap,
+    overlap_text,
     peak_counts,
-    share_text,
     sizes,
     trend,
     trend_text,
@@ -68,7 +68,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
                 "and at least half of the paths that move lie above it",
                 bool(resting.any() and above >= 0.5),
                 f"all keep it moving above {bound:.2g} m/s, {percent(above)} of the paths; "
-                f"{share_text(moving, moved & (speed <= bound))} keep it moving below",
+                f"{overlap_text(moving, moved & (speed <= bound))} keep it moving below",
             ),
         )
     )

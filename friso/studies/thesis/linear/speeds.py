@@ -13,9 +13,10 @@ from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.bode import PRESCRIBED
 from friso.frequency.crossover import HIGHEST
 from friso.frequency.family import loops, spectral_abscissa
-from friso.frequency.friction import law_of, operating_point, speeds
+from friso.frequency.friction import law_of, speeds
 from friso.frequency.loops import closed_loop
 from friso.frequency.members import Members, member
+from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import DISTURBANCE, cart_states
 from friso.frequency.ranges import Range, ranges_below
 

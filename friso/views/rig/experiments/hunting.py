@@ -41,7 +41,7 @@ AFTERWARDS = 5.0
 """From where on [s] what is left of the move decides the height of a panel."""
 
 
-def share_text(share: Share, count: int) -> str:
+def rails_text(share: Share, count: int) -> str:
     """A share of rails with its interval, in words."""
     return f"{round(share.probability * count)} of {count} rails ({percent(share.low)} to {percent(share.high)})"
 
@@ -53,8 +53,8 @@ def sentences(outcome: Outcome) -> list[str]:
     count = len(moves.rails)
     return [
         f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[first]:.3g} Hz peaks are counted on "
-        f"{share_text(moves.shares('locked')[first], count)} with the joint locked, and on "
-        f"{share_text(moves.shares('free')[first], count)} with it free (95 % intervals).",
+        f"{rails_text(moves.shares('locked')[first], count)} with the joint locked, and on "
+        f"{rails_text(moves.shares('free')[first], count)} with it free (95 % intervals).",
         _swings(moves),
         f"Joint locked: {_limit(moves, 'locked')} Joint free: {_limit(moves, 'free')}",
         *_started(moves),
