@@ -144,7 +144,7 @@ def check(
     seed : int
         Seed of the draws: the same one gives the same stages.
     laws : bool
-        Whether the verdict is wanted under every friction law, too, that shows the same in measurements.
+        Whether to give the verdict under every friction law that fits the same measurements as well.
     progress : Progress
         Called as work is done, also from worker threads.
 

@@ -66,7 +66,7 @@ def convert(
     set: Changes = None,
     progress: Progress = silent,
 ) -> ConvertAnswer:
-    """To another friction law that shows the same in measurements, and what could not be kept.
+    """To another friction law that fits the same measurements, and what could not be kept.
 
     Parameters
     ----------

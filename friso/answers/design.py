@@ -151,7 +151,7 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
         hertz = with_unit(loop_bandwidth(rules), "Hz")
         LOGGER.warning(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
-            f"controller, whose bandwidth is {hertz}; friso export gains tells its gains"
+            f"controller, whose bandwidth is {hertz}; friso export gains lists its gains"
         )
     if keys := assumed(stage, spec):
         units = numeric_keys(stage.flat() | keys)

@@ -37,7 +37,7 @@ REFUSED = (
 
 TWICE = (
     "the address with which friso started the browser was opened a second time: another user of this machine may have "
-    "been first. Whoever was first is shut out: open the address printed above"
+    "been first. That browser is shut out: open the address printed above"
 )
 
 ALARM = 60.0

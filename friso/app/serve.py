@@ -33,7 +33,7 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
     load(file)
     begin = {"name": file.name, "text": text_of(file, "a stage file"), "asked": stage is not None}
     if host not in LOOPBACK and not insecure:
-        expected = "127.0.0.1, or --insecure: whoever reads the network sees all, and uses this machine"
+        expected = "127.0.0.1, or --insecure: anyone who can read the traffic sees everything and can use this machine"
         raise InputError("--host", host, expected, "--host 127.0.0.1")
     if host in ("0.0.0.0", "::"):
         raise InputError("--host", host, "the name or address by which others reach this machine", "--host rig.local")

@@ -1,4 +1,4 @@
-"""A specification to begin with, written from a stage file: ranges about its own numbers, and leaves to be had."""
+"""A specification to begin with, written from a stage file: ranges about its own numbers, leaves as sold."""
 
 from __future__ import annotations
 

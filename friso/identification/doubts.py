@@ -72,7 +72,7 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         )
     if inverse.value("coulomb") < NONE_LEFT * float(np.std(inverse.measured)):
         doubts.append(
-            f"Coulomb friction comes out as {inverse.value('coulomb'):.2g} {unit}, next to nothing: no friction in "
+            f"Coulomb friction is estimated as {inverse.value('coulomb'):.2g} {unit}, next to nothing: no friction in "
             "this force, a wrong --scale, or friction that a drive compensates"
         )
     differing = tuple(halves(inverse)) if plain.lacks_something else ()

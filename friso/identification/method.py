@@ -74,7 +74,7 @@ def identify(
     InputError for logs that cannot be used.
     """
     if base is not None and base.conditions is not None:
-        expected = "none: what a log shows of friction holds under the conditions of that day"
+        expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
         raise InputError("conditions", "a stage with [conditions]", expected, "the stage file without [conditions]")
     groups = _groups(logs)
     stage = base or _around(logs)

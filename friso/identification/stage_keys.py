@@ -93,12 +93,12 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
     if not np.isfinite([estimate.low, estimate.high]).all():
         ends = [f"{word} {end:.4g} {estimate.unit}".rstrip() for word, end in _ends(estimate)]
         knowledge = f"known only to be {' and '.join(ends)}" if ends else "unknown"
-        return None, f"{knowledge}, the stage file keeps what it had"
+        return None, f"{knowledge}, the stage file keeps its value"
     if not estimate.high > estimate.low:
-        return None, "its uncertainty is not known, the stage file keeps what it had"
+        return None, "its uncertainty is not known, the stage file keeps its value"
     if not (field.bound.holds(estimate.low) or field.bound.holds(estimate.high)):
         ends = f"{estimate.low:.4g} to {estimate.high:.4g} {estimate.unit}".rstrip()
-        return None, f"{ends} is all that is known, the stage file keeps what it had: it has to be {field.bound.text}"
+        return None, f"{ends} is all that is known, the stage file keeps its value: it has to be {field.bound.text}"
     if _allowed(estimate, field):
         return estimate, ""
     low = LEAST * estimate.high
@@ -106,7 +106,7 @@ def _within(estimate: Estimate, field: Quantity | Number) -> tuple[Estimate | No
     limits = f"{estimate_text(estimate)} was found, but it has to be {field.bound.text}"
     if estimate.low < low and _allowed(cut, field):
         return cut, f"{limits}: the stage file has {estimate_text(cut)}, from a thousandth of the upper end on"
-    return None, f"{limits}: the stage file keeps what it had"
+    return None, f"{limits}: the stage file keeps its value"
 
 
 def _ends(estimate: Estimate) -> list[tuple[str, float]]:

@@ -50,7 +50,7 @@ class Conditions(UncertainSection):
         Rule(
             ("conditions.place",),
             lambda flat: "conditions.place" not in flat or "rail.seed" in flat,
-            "a [rail] on which the place is",
+            "a [rail] on which that place lies",
             '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm"',
         ),
         Rule(

@@ -16,7 +16,9 @@ Port = Annotated[
 ]
 Insecure = Annotated[
     bool,
-    typer.Option("--insecure", help="Let other machines connect, unencrypted: who reads the network can use this one."),
+    typer.Option(
+        "--insecure", help="Let others connect, unencrypted: who can read the traffic can use this machine."
+    ),
 ]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]
 

@@ -25,7 +25,7 @@ SeedOption = Annotated[
 
 AcrossLaws = Annotated[
     bool,
-    typer.Option("--laws", help="The verdict under every friction law that shows the same in measurements, too."),
+    typer.Option("--laws", help="Also the verdict under every friction law that fits the same measurements."),
 ]
 
 

@@ -231,8 +231,8 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
     if axis.values.get(f"{CONFIG}.enable_gain_scheduling"):
         width = axis.number(f"{CONFIG}.gain_scheduling_width", 0.0)
         left.append(
-            f"enable_gain_scheduling: within {width:g} turns the gains go to 0 with the error, and what friso says of "
-            "swings as small as that is not what this axis does"
+            f"enable_gain_scheduling: within {width:g} turns the gains go to 0 with the error, and friso's results for "
+            "swings that small do not hold for this axis"
         )
     if axis.values.get(f"{CONFIG}.enable_vel_limit", True) and axis.is_set(f"{CONFIG}.vel_limit"):
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")

@@ -206,11 +206,11 @@ def _beyond_the_search(stages: Ensemble) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
     controller = stages.structure.controller
     if controller is not None and controller.anti_windup == "none" and not stable_at_lower_gains(stages.flat):
-        return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
+        return "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
     if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
         return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
     if stages.outer_integrals:
-        return "with integrals in several loops, stages that stick with an outer one wound up otherwise may swing on"
+        return "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
     if small_cycles_possible(stages):
         return (
             "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"

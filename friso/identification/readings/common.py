@@ -56,7 +56,7 @@ def channel(log: Log, role: str) -> np.ndarray:
         raise InputError(role, f"a channel in {log.unit(role)}", f"one in {ROLES[role]}", example, log.name)
     values = log[role]
     if not np.isfinite(values).all():
-        actual = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are no finite numbers"
+        actual = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are not finite"
         raise InputError(role, actual, "finite values, with gaps between segments", "", log.name)
     return values
 

@@ -120,7 +120,7 @@ def _map(
     covered = inside[count[inside] > 0]
     mapped[inside] = np.interp(inside, covered, mapped[covered])  # places passed between two samples
     row = mapped[inside]
-    mean = by_t("friction force along the rail", "N", block_mean(row), "mean over the place by blocks")
+    mean = by_t("friction force along the rail", "N", block_mean(row), "mean over position by blocks")
     flat = row - np.polyval(np.polyfit(inside, row, 1), inside)
     return PassMap(
         stretch.velocity,
@@ -150,9 +150,9 @@ def _length(fields: np.ndarray) -> np.ndarray:
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     """Where the autocorrelation of the field is 1/e; its interval by the ratio of found to true length of
     random fields with exponential correlation, detrended in the same way."""
-    name, unit, method = "correlation length", "m", "autocorrelation of the force over the place falls to 1/e"
+    name, unit, method = "correlation length", "m", "autocorrelation of the force over position falls to 1/e"
     if not np.ptp(flat) > 0:
-        return Estimate.unknown(name, unit, method, "the force does not vary with the place")
+        return Estimate.unknown(name, unit, method, "the force does not vary along the rail")
     length = float(_length(flat[None])[0])
     count = len(flat)
     if not length * LEAST_LENGTHS <= count:
@@ -194,7 +194,7 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
 
 def _no_repeatability(reason: str) -> Estimate:
     return Estimate.unknown(
-        "repeatability", "1", "correlation of the force over the place between passes", reason, -1, 1
+        "repeatability", "1", "correlation of the force over position between passes", reason, -1, 1
     )
 
 
@@ -211,7 +211,7 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
     independent = max(travel / (2 * float(np.median(lengths_shown))), 4.0)
     error = max((independent - 3) ** -0.5, float(z.std(ddof=1)) / len(z) ** 0.5 if len(z) > 1 else 0.0)
     value, low, high = np.tanh(z.mean() + COVERAGE * error * np.array([0, -1, 1]))
-    method = f"mean correlation of the force over the place between {len(pairs)} pairs of passes"
+    method = f"mean correlation of the force over position between {len(pairs)} pairs of passes"
     return Estimate("repeatability", "1", float(value), float(low), float(high), method)
 
 

@@ -48,7 +48,7 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     chance, share = _foretold(driven, answer, direct)
     if chance > SURE or share < SHARE:
         return ()
-    finding = f"the output foretells {percent(share)} of the news in the input (chance {chance:.1g})"
+    finding = f"the output predicts {percent(share)} of the innovation of the input (chance {chance:.1g})"
     return (f"{finding}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
 
 

@@ -117,7 +117,7 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
     if held:
         notes += [f"not drawn, being the same on all machines: {', '.join(held)}"]
     if sample.left_out:
-        notes += [f"{sample.left_out} draws that no stage may have were left out and others drawn"]
+        notes += [f"{sample.left_out} draws that no stage may have were replaced by others"]
     numbers = np.arange(count)
     keys = {key: values for key, values in sample.keys.items() if not key.startswith(HELD)}
     if SLIP in spreads:

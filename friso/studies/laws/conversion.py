@@ -1,4 +1,4 @@
-"""From one friction law to another that shows the same in measurements, and what could not be kept."""
+"""From one friction law to another that fits the same measurements, and what could not be kept."""
 
 from __future__ import annotations
 

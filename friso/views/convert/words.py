@@ -34,7 +34,7 @@ def conversion_sentences(conversion: LawConversion) -> list[str]:
     if lost:
         says = [f"{name} under {law}: {listed([_change(item) for item in lost], 'and')}."]
     else:
-        says = [f"{name} under {law} shows the same in measurements."]
+        says = [f"{name} under {law} fits the same measurements."]
     says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
     return [*says, *activity_sentences(conversion.active)]
 

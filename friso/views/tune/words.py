@@ -396,5 +396,5 @@ def assumptions(tuning: Advice) -> list[str]:
     )
     lines += spread_sentences(machines.from_file, machines.spreads)
     if machines.left_out:
-        lines.append(f"{machines.left_out} draws that no stage may have were left out and others drawn.")
+        lines.append(f"{machines.left_out} draws that no stage may have were replaced by others.")
     return lines

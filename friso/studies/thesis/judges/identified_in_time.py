@@ -148,7 +148,7 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
                 why="locked, the simulated rig slides steadily where it is fast enough",
             ),
             Part(
-                "the oscillation depends on the place: passes over the same places repeat it",
+                "the oscillation depends on the position: passes over the same places repeat it",
                 all(
                     friction.repeatability.determined and friction.repeatability.low > 0 for friction in named.values()
                 ),
