@@ -49,19 +49,13 @@ use all that is left then."""
 FARTHER = 12.0
 """How many times as long a motion is followed that still swings by less than what attracts."""
 
-LEFT_OVER = (
-    "not every motion that kept swinging was followed to its end: this one may end in another swing"
-)
+LEFT_OVER = "not every motion that kept swinging was followed to its end: this one may end in another swing"
 """Why it is not certain that a motion comes to rest which does not end in what attracts."""
 
-SWINGS_ON = (
-    "this motion was still swinging when it was given up, by less than half of what was found to attract"
-)
+SWINGS_ON = "this motion was still swinging when it was given up, by less than half of what was found to attract"
 """The same where it has been seen not to have done so."""
 
-STILL_SWINGS = (
-    "this motion still swings a little at the end of the longest run, but nothing was found that attracts"
-)
+STILL_SWINGS = "this motion still swings a little at the end of the longest run, but nothing was found that attracts"
 
 UNFOLLOWED = (
     "this motion was not followed for long enough to see it come to rest: that takes more work than a check may"

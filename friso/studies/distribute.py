@@ -41,9 +41,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
         expected = f"the address of a Dask scheduler that answers ({error})"
         raise InputError("--scheduler", scheduler, expected, "--scheduler tls://10.0.0.1:8786") from None
     if not scheduler.startswith("tls://"):
-        logger.warning(
-            "anyone who reaches %s can run code on its workers and here; tls:// keeps others out", scheduler
-        )
+        logger.warning("anyone who reaches %s can run code on its workers and here; tls:// keeps others out", scheduler)
     with client:
         _refuse_strangers(client)
         threads = sum(client.nthreads().values())

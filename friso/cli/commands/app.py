@@ -17,7 +17,7 @@ Port = Annotated[
 Insecure = Annotated[
     bool,
     typer.Option(
-        "--insecure", help="Let others connect, unencrypted: who can read the traffic can use this machine."
+        "--insecure", help="Let others connect, unencrypted: anyone who reads the traffic can use this machine."
     ),
 ]
 Browser = Annotated[bool, typer.Option("--browser/--no-browser", help="Whether to open the browser.")]

@@ -101,9 +101,7 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
     if quick:
         notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
     if stops:
-        notes.append(
-            f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest."
-        )
+        notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
         notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
     return _answer(table, bristle_rate, threshold, notes)
