@@ -165,7 +165,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
             ),
             Part(
                 f"on a rail that varies its period is nearly twice as long (at least {AS_SLOW:g} times) at a similar "
-                f"swing (within a factor of {SIMILAR:g}), on at least half of those that swing on",
+                f"swing (within a factor of {SIMILAR:g}), on at least half of those that keep swinging",
                 bool(swings.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= swings.sum()),
                 f"{swinging}{times}. {_ASSUMED}",
                 why="not because of the rail: friction that differs between the two sides slows a cycle down, and ends "
@@ -173,7 +173,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
             ),
             Part(
                 f"there its two sides differ (by a factor of more than {_LOPSIDED:g}, on at least half of those that "
-                "swing on)",
+                "keep swinging)",
                 bool(len(lopsided) and np.median(lopsided) > np.log(_LOPSIDED)),
                 f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
                 if len(lopsided)
