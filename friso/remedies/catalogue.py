@@ -19,8 +19,7 @@ from friso.remedies.goal import Goal
 from friso.remedies.variables import Variable, bandwidth_factor, of_key
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import FILTERS_KEY, controller_of
-
-DITHER = "controller.dither_amplitude"
+from friso.stage.standstill import settings_of
 
 WIDTHS, DEPTH = (0.1, 1.5), 0.9
 """Range of the width of a notch, as a share of its frequency, and its depth."""
@@ -47,7 +46,7 @@ class Remedy:
     @property
     def verifiable(self) -> bool:
         """Whether cycles can verify it: not where a dither keeps the stage from coming to rest."""
-        return not self.stage.flat().get(DITHER, 0.0)
+        return not settings_of(self.stage.flat()).dither
 
     @classmethod
     def settled_on(cls, name: str, stage: Stage, buys_joint: bool = False) -> Remedy:

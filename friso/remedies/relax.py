@@ -90,8 +90,8 @@ def _relaxed_goal(
     relaxed = []
     for name in names:
         requirement, needed, unit = values[name]
-        given = getattr(goal, name)
-        relaxed.append(Relaxation(requirement, name, given, _rounded(needed, needed > given), unit))
+        present = getattr(goal, name)
+        relaxed.append(Relaxation(requirement, name, present, _rounded(needed, needed > present), unit))
     factor = np.prod([max(part.needed / part.value, part.value / part.needed) for part in relaxed])
     return RelaxedGoal(remedy, remedy.tuned(point.shares[0]), tuple(relaxed), float(factor))
 
