@@ -31,7 +31,7 @@ from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
-from friso.studies.compare.statistics import difference, median
+from friso.studies.compare.statistics import difference, median, quantile_interval
 from friso.studies.compare.study import Comparison, OptionResult, compare
 from friso.views.compare.document import compare_document
 from friso.views.compare.figures import figures
@@ -299,6 +299,13 @@ def test_intervals_of_medians_hold() -> None:
     expected = [median(np.exp(rng.standard_normal(50))) for _ in range(2000)]
     held = np.mean([item.low <= 1 <= item.high for item in expected])
     assert 0.95 - 0.015 < held < 0.985
+
+
+def test_intervals_of_the_slowest_hold() -> None:
+    rng = np.random.default_rng(7)
+    expected = [quantile_interval(rng.random(100), 0.95) for _ in range(2000)]
+    assert 0.95 < np.mean([low <= 0.95 <= high for low, high in expected]) < 0.995
+    assert quantile_interval(rng.random(40), 0.95)[1] == np.inf
 
 
 def test_intervals_of_paired_differences_hold() -> None:

@@ -22,6 +22,7 @@ from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
+from friso.studies.compare.statistics import quantile_interval
 
 ONE = np.zeros((1, 0))
 """The shares of the one point of a remedy without variables."""
@@ -48,6 +49,11 @@ class Performance:
     def slowest(self, goal: Goal) -> float:
         """The settling time [s] of the slowest twentieth of machines and moves; infinite where that is never."""
         return float(self.moves.slowest(goal.share)[0])
+
+    def slowest_interval(self, goal: Goal) -> tuple[float, float]:
+        """The 95 % interval of that time, these machines being some of all there may be."""
+        low, high = quantile_interval(self.moves.settling[0], goal.share)
+        return max(low, 0.0), high
 
     @property
     def median(self) -> float:

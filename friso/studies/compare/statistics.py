@@ -20,14 +20,20 @@ class EstimatedValue:
 
 
 def median(values: np.ndarray) -> EstimatedValue:
-    """The median, with the interval of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1), which holds
-    for any distribution; infinite values are allowed, NaN are left out."""
+    """The median; infinite values are allowed, NaN are left out."""
     ranked = np.sort(values[~np.isnan(values)])
     if not ranked.size:
         return EstimatedValue(np.nan, np.nan, np.nan)
-    rank = int(binom.ppf(0.025, ranked.size, 0.5))
-    low, high = (ranked[rank - 1], ranked[-rank]) if rank else (-np.inf, np.inf)
-    return EstimatedValue(_middle(ranked), float(low), float(high))
+    return EstimatedValue(_middle(ranked), *quantile_interval(ranked, 0.5))
+
+
+def quantile_interval(values: np.ndarray, share: float) -> tuple[float, float]:
+    """The 95 % interval of what a share of all there are does not exceed, by values, shape (n,), that were drawn of
+    them: that of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1), which holds for any distribution.
+    Infinite where there are too few."""
+    ranked = np.concatenate([[-np.inf], np.sort(values), [np.inf]])
+    low, high = (int(binom.ppf(tail, values.size, share)) for tail in (0.025, 0.975))
+    return float(ranked[low]), float(ranked[high + 1])
 
 
 def _middle(ordered: np.ndarray) -> float:

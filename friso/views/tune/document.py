@@ -74,6 +74,7 @@ def _performance(measured: Performance, tuning: Advice) -> dict[str, Any]:
     return {
         "meets_goal": asdict(measured.share(goal)),
         "slowest_twentieth_s": measured.slowest(goal),
+        "slowest_twentieth_interval_s": measured.slowest_interval(goal),
         "median_s": measured.median,
         "force_n": measured.force(goal),
         "modulus_margin": measured.least_margin(goal),

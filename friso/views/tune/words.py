@@ -22,7 +22,7 @@ from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
-from friso.views.drawing.prefixes import NOTHING, listed, share_with_interval, with_unit
+from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, share_with_interval, with_unit
 from friso.views.loop_words import unstable_loop
 from friso.views.machine_words import spread_sentences
 
@@ -68,6 +68,16 @@ LOCKED = "joint.locked"
 def time(seconds: float) -> str:
     """A settling time, which may never come."""
     return with_unit(seconds, "s") if math.isfinite(seconds) else ABSENT
+
+
+def slowest_time(measured: Performance, goal: Goal) -> str:
+    """The settling time of the slowest twentieth, with its interval."""
+    low, high = measured.slowest_interval(goal)
+    if not math.isfinite(measured.slowest(goal)):
+        return ABSENT
+    between = range_with_unit(low, high, "s") if math.isfinite(high) else f"{with_unit(low, 's')} or longer"
+    alone = time(measured.slowest(goal))
+    return alone if between == alone else f"{alone} ({between})"
 
 
 def changes(before: Stage, after: Stage) -> list[str]:
@@ -174,12 +184,12 @@ def size_words(size: ChangeSize) -> str:
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
-    before, now = (part.slowest(tuning.goal) for part in (tuning.present, measured))
-    as_is = "" if measured is tuning.present else f" (as it is: {time(before)})"
+    before = time(tuning.present.slowest(tuning.goal))
+    as_is = "" if measured is tuning.present else f"; as it is: {before}"
     meet = share_with_interval(measured.share(tuning.goal))
     return (
         f"Of {measured.count} fresh machines and moves, {meet} meet the goal; "
-        f"the slowest twentieth is in position after {time(now)}{as_is}"
+        f"the slowest twentieth is in position after {slowest_time(measured, tuning.goal)}{as_is}"
     )
 
 
@@ -331,7 +341,7 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
     return [
         works,
         share_with_interval(measured.share(goal)),
-        time(measured.slowest(goal)),
+        slowest_time(measured, goal),
         time(measured.median),
         with_unit(measured.force(goal), "N"),
         f"{measured.least_margin(goal):.2f}",
