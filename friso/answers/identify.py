@@ -125,7 +125,7 @@ def identify(
     Parameters
     ----------
     logs : path or list of paths
-        CSV, TwinCAT, MAT, TDMS, UFF58 or LVM files.
+        Files, in a format that `friso logs --help` lists.
     stage : Stage, path or dict, optional
         What is known beforehand: structure, controller, drive.
     set : dict, optional

@@ -111,7 +111,7 @@ def logs(
     Parameters
     ----------
     logs : path or list of paths
-        CSV, TwinCAT, MAT, TDMS, UFF58 or LVM files.
+        Files, in a format that `friso logs --help` lists.
     map : dict, optional
         Roles and their channels: ``{"position": "Axis1.ActPos"}``.
     unit : dict, optional

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="CSV, TwinCAT, MAT, TDMS, UFF58 or LVM files.")]
+Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help="Log files; friso logs --help lists their formats.")]
 Maps = Annotated[list[str] | None, typer.Option("--map", metavar="ROLE=CHANNEL", help='position="Axis1.ActPos"')]
 Units = Annotated[list[str] | None, typer.Option("--unit", metavar="CHANNEL=UNIT", help='Axis1.ActPos="mm"')]
 Scales = Annotated[list[str] | None, typer.Option("--scale", metavar="ROLE=SCALE", help='force="35.15 N/V"')]

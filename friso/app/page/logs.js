@@ -13,7 +13,7 @@ export class Logs {
     this.status = el("div", { class: "status", role: "status" });
     this.form = el("div", { class: "form" });
     this.result = el("div", {});
-    this.place = el("div", {}, el("div", { class: "drop" }, "Drop logs here (CSV, TwinCAT, MAT, TDMS, UFF58, LVM), or choose them: ", this.input), this.status, this.form, this.result);
+    this.place = el("div", {}, el("div", { class: "drop" }, "Drop logs here, or choose them: ", this.input), this.status, this.form, this.result);
   }
 
   async add(files) {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from friso.cli.asking import named_as_options, show
-from friso.cli.command import MACHINE, Command
+from friso.cli.command import MACHINE, Choices, Command
 from friso.cli.common import AsJson
 from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import OutFolder, Overwrite
@@ -43,4 +43,11 @@ def logs(
         raise unreadable(answer.errors)
 
 
-COMMAND = Command(logs, 90, MACHINE)
+def listed_formats() -> list[tuple[str, str]]:
+    """The formats of logs that friso reads, each in one line."""
+    from friso.identification.logs.format import FORMATS
+
+    return [(FORMATS[name].title, FORMATS.one_line(name)) for name in FORMATS]
+
+
+COMMAND = Command(logs, 90, MACHINE, Choices("Formats", listed_formats))

@@ -84,4 +84,5 @@ def _holds(content: LogContent) -> str:
     longest = max(content.channels, key=lambda channel: channel.values.size)
     time = longest.time
     lasts = "" if time is None or not time.size else f" over {with_unit(float(time[-1] - time[0]), 's', 4)}"
-    return f"{len(content.channels)} channels, {longest.values.size} samples{lasts}"
+    channels, samples = len(content.channels), longest.values.size
+    return f"{channels} channel{'s' * (channels != 1)}, {samples} sample{'s' * (samples != 1)}{lasts}"
