@@ -85,7 +85,7 @@ def test_a_scheduler_without_tls_is_said_to_let_everybody_in(
 ) -> None:
     with connected(cluster.scheduler_address):
         pass
-    assert f"whoever reaches {cluster.scheduler_address} can run code" in caplog.text
+    assert f"{cluster.scheduler_address} can run code" in caplog.text
 
 
 def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: LocalCluster) -> None:

@@ -183,7 +183,11 @@ def test_every_claim_is_in_the_table() -> None:
         pytest.skip("the list of claims is not at hand")
     rows = [line.strip().strip("|").split("|") for line in source.read_text(encoding="utf-8").splitlines()]
     printed = [[cell.strip() for cell in row] for row in rows if len(row) == 3][2:]
-    assert [(claim.id, claim.text) for claim in claims() if claim.listed] == [(row[0], row[2]) for row in printed]
+    listed = [claim for claim in claims() if claim.listed]
+    assert [claim.id for claim in listed] == [row[0] for row in printed]
+    own_words = {"E1", "F26"}  # of which the list says what to check, and the page what the thesis says
+    for claim, (name, _, text) in zip(listed, printed, strict=True):
+        assert (claim.text == text) == (name not in own_words)
     assert all(claim.where and claim.place for claim in claims())
 
 
