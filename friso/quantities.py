@@ -41,6 +41,15 @@ def percent(share: float, digits: int = 2, signed: bool = False) -> str:
     return f"{number:{plus}.0f} %" if abs(number) >= 10**digits else f"{number:{plus}g} %"
 
 
+def outwards(value: float, larger: bool) -> float:
+    """Three digits of a value, so that it is not met more tightly than it has to be."""
+    if value <= 0:
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    steps = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
+    return float(f"{steps * step:.6g}")
+
+
 def as_toml(value: Any) -> str:
     """How a scalar is written in TOML; anything else is named, not written out."""
     if isinstance(value, bool):

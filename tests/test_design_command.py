@@ -32,6 +32,7 @@ from friso.design_method.method import Design, Frictions, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.spec import Position, Spec, load_spec
 from friso.progress import Progress
+from friso.quantities import outwards
 from friso.stage import Stage
 from friso.views.design.control import controller_step, moves_step
 from friso.views.design.document import design_document, refused_document
@@ -39,7 +40,7 @@ from friso.views.design.figures import design_figures
 from friso.views.design.leaves import leaves_step, requirement_rows
 from friso.views.design.steps import isolator_step, joint_step, steps
 from friso.views.design.window import lower, stiffest, upper
-from friso.views.design.words import brings, edge, headline, hertz, outwards, refusal, settling
+from friso.views.design.words import brings, edge, headline, hertz, refusal, settling
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Figure
 
@@ -477,7 +478,10 @@ def test_no_single_relaxation(wording: Wording) -> None:
 
 @pytest.mark.parametrize(
     ("value", "larger", "expected"),
-    [(0.07421, True, 0.0743), (8.127, False, 8.12), (1.2, True, 1.2), (300.0, False, 300.0), (0.0, False, 0.0)],
+    [
+        *((0.07421, True, 0.0743), (8.127, False, 8.12), (1.2, True, 1.2), (300.0, False, 300.0), (0.0, False, 0.0)),
+        *((2 * 1e-5, True, 2e-5), (3 * 0.1, True, 0.3), (0.57, False, 0.57), (9.999, True, 10.0), (2.0001, True, 2.01)),
+    ],
 )
 def test_relaxations_are_rounded_to_be_enough(value: float, larger: bool, expected: float) -> None:
     assert outwards(value, larger) == expected

@@ -13,6 +13,7 @@ from variants import stage as variant
 
 from friso import Stage, load, loads
 from friso.design_method.isolator import isolated
+from friso.engine.arrays import Results
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
@@ -35,7 +36,7 @@ from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import Advice, tune
 from friso.remedies.relax import relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
-from friso.remedies.sensitivities import Sensitivities, sensitivity
+from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
 from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.variables import of_key
@@ -48,7 +49,7 @@ from friso.views.tune.document import tune_document
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
-from friso.views.tune.words import DOUBTS, _reasons, _without_friction, answer, changes, failing, rows
+from friso.views.tune.words import DOUBTS, _reasons, _without_friction, answer, changes, failing, rows, window_lines
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6)
@@ -346,6 +347,25 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
     both, one = (next(_reasons(some, outcome, Goal())) for some in (points, points.take(np.array([1]))))
     assert "0.5" in both
     assert "0.5" not in one
+    outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((6, 2)))
+    assert "2 settings tried 2 meet the rest" in next(_reasons(kept, outcome, Goal()))
+
+
+@pytest.mark.parametrize("first", np.arange(0, 0.95, 0.08))
+def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machines: Fleet, rigid: Stage) -> None:
+    """Of settings that settle the sooner the lower they are, a range of 6 % anywhere."""
+    shares = np.linspace(0, 1, 60)
+    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((5, 60)))
+    search = Search(Remedy.settled_on("", rigid), Goal(), machines, rigid, TINY, lambda label: None, [points])
+    surveyed: list[float] = []
+
+    def clear(batch: np.ndarray) -> np.ndarray:
+        surveyed.extend(batch[:, 0])
+        return (batch[:, 0] >= first) & (batch[:, 0] <= first + 0.06)
+
+    search.clear = clear  # pyright: ignore[reportAttributeAccessIssue]
+    assert [*search.surveyed()]
+    assert np.diff(np.sort(surveyed)).min() > 0.03
 
 
 def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
@@ -363,6 +383,13 @@ def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:
     assert 0.49 < ends[0] < ends[1] < 0.51
     assert ends[2] > 0.21
     assert (second.open_below, second.open_above, first.open_above) == (False, True, False)
+    assert windows(search, np.array([0.52, 0.4])) == ()  # not met there itself
+
+
+def test_that_there_is_no_window_is_said() -> None:
+    least = SimpleNamespace(remedy=SimpleNamespace(name="gains", variables=(1,)), windows=())
+    tuning: Any = SimpleNamespace(least=least)
+    assert window_lines(tuning)[0].startswith("No window is given for gains")
 
 
 def test_check_tells_what_an_isolator_would_do(rigid: Stage, wording: Wording) -> None:
@@ -452,9 +479,68 @@ def test_a_settling_time_s_derivative_is_that_of_finite_differences(rigid: Stage
         sensitivity(rigid, within=0.0)
 
 
-def settling_times(flat: dict[str, Any]) -> np.ndarray:
-    """When four stages are last outside of 1 um."""
-    (runs,) = run_chunks(kernel(shared_structure(flat)), flat, 4, RunOptions(rtol=1e-11))
+@pytest.fixture(scope="module")
+def stepping(rigid: Stage) -> dict[str, Any]:
+    """The rig's flat keys at 20 Hz, where it settles after a step."""
+    step = {"motion": {"kind": "step", "size": "2 mm", "duration": "4 s"}, "controller.crossover": "20 Hz"}
+    stage = rigid.replace(step)
+    return {**stage.flat(), **as_tuned(stage.flat())}
+
+
+def test_a_settling_time_jumps_with_the_band_where_it_is_said_to(stepping: dict[str, Any]) -> None:
+    """The move ends elsewhere than it began: the turning point that is named is one of the deviation."""
+    exact = _of_settling(stepping, KEYS[:1], 1e-6)
+    assert exact is not None
+    wide = 1e-6 * (1 + exact.jump)
+    (before,), (after,) = (settling_times(stepping, 1, wide * (1 + side)) for side in (-1e-6, 1e-6))
+    assert before - after > 0.01
+
+
+def test_a_settling_time_may_be_off_by_a_share_of_itself(stepping: dict[str, Any]) -> None:
+    """However long before the move the run began: here as long as if it had taken ten times as long."""
+    exact = _of_settling(stepping, KEYS[:1], 1e-6)
+    assert exact is not None
+    slack = exact.time / 10 / stepping[KEYS[0]]
+    follows = [
+        _is_smooth(stepping, KEYS[:1], exact.time, exact.time / 10, exact.by + off * SMOOTH * slack, 1e-6)
+        for off in (0.5, 2.0)
+    ]
+    assert follows == [True, False]
+
+
+def test_turns_of_a_stage_that_does_not_settle_are_not_asked_for(rigid: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    swings: list[float] = []
+    run = Ensemble.run
+
+    def noted(*args: Any, least_swing: float = np.inf, **options: Any) -> Results:
+        swings.append(least_swing)
+        return run(*args, least_swing=least_swing, **options)
+
+    monkeypatch.setattr(Ensemble, "run", noted)
+    assert _of_settling(rigid.flat(), KEYS[:1], 1e-6) is None
+    assert swings == [np.inf]
+
+
+def test_the_motion_is_taken_as_it_is(rigid: Stage) -> None:
+    """A settling time has no derivatives to the reference, but one to where a release begins."""
+    for kind, key in (("step", "size"), ("release", "duration")):
+        length = {"step": "size", "release": "displacement"}[kind]
+        stage = rigid.replace({"motion": {"kind": kind, length: "2 mm", "duration": "4 s"}})
+        with pytest.raises(InputError, match=f"motion.{key}"):
+            sensitivity(stage, [f"motion.{key}"], within=1e-6)
+    settles = stage.replace({"controller.crossover": "20 Hz"})
+    released = sensitivity(settles, ["motion.displacement"], within=1e-6).settling
+    assert released is not None
+    flat = {**settles.flat(), **as_tuned(settles.flat())}
+    displaced = flat["motion.displacement"] * (1 + 1e-4 * np.array([-2, -1, 1, 2]))
+    times = settling_times({**flat, "motion.displacement": displaced})
+    assert (times[2] - times[1]) / (2e-4 * flat["motion.displacement"]) == pytest.approx(released.by[0], rel=1e-4)
+
+
+def settling_times(flat: dict[str, Any], stages: int = 4, within: float = 1e-6) -> np.ndarray:
+    """When some stages are last outside of a band."""
+    options = RunOptions(rtol=1e-11, bands=(within, within))
+    (runs,) = run_chunks(kernel(shared_structure(flat)), flat, stages, options)
     return runs.statistic("inner_exit")
 
 

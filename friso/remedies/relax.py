@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.design_method.relax import Relaxation
+from friso.quantities import outwards
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
@@ -91,15 +92,9 @@ def _relaxed_goal(
     for name in names:
         requirement, needed, unit = values[name]
         present = getattr(goal, name)
-        relaxed.append(Relaxation(requirement, name, present, _rounded(needed, needed > present), unit))
+        relaxed.append(Relaxation(requirement, name, present, outwards(needed, needed > present), unit))
     factor = np.prod([max(part.needed / part.value, part.value / part.needed) for part in relaxed])
     return RelaxedGoal(remedy, remedy.tuned(point.shares[0]), tuple(relaxed), float(factor))
-
-
-def _rounded(value: float, up: bool) -> float:
-    """To three digits, so that what is needed lies within."""
-    scale = 10.0 ** (np.floor(np.log10(value)) - 2)
-    return float(f"{(np.ceil if up else np.floor)(value / scale) * scale:.3g}")
 
 
 def _settles(remedy: Remedy, point: TriedPoints, goal: Goal, factor: float, machines: Fleet) -> bool:

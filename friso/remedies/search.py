@@ -47,7 +47,7 @@ APART = 0.03
 """Least distance of points that are surveyed one after the other, as a share of a range."""
 
 WIDENED = 1.5
-"""By what factor that distance grows after a batch with all of which something attracts machines."""
+"""By what factor the next points are farther away after a batch with all of which something attracts machines."""
 
 
 @dataclass(frozen=True)
@@ -215,21 +215,24 @@ class Search:
 
     def surveyed(self) -> Iterator[np.ndarray]:
         """The best points first, shape (variables,), as far as nothing attracts the machines with them; those that
-        are alike are taken for one, in a wider sense after each batch with all of which something does: the points that
-        settle soonest are often at the edge of hunting."""
+        are alike are taken for one. After each batch with all of which something does, the next one is taken from
+        farther away, as far as there are as many: the points that settle soonest are often at the edge of hunting."""
         if not self.tried:
             return
         points = self.points
         free = np.flatnonzero(points.meets(self.goal))
         left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], APART
+        away = np.full(len(left), np.inf)  # from those that were surveyed
         for _ in range(MOST):
+            left, away = left[away > APART], away[away > APART]
             if not len(left):
                 return
-            batch = _apart(left, BATCH, apart)
+            while len(batch := _apart(left[away > apart], BATCH, apart)) < BATCH and apart > APART:
+                apart = max(APART, apart / WIDENED)
             clear = self.clear(batch)
             yield from batch[clear]
             apart = APART if clear.any() else WIDENED * apart
-            left = left[np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1) > apart]
+            away = np.minimum(away, np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1))
 
 
 def _evolve(

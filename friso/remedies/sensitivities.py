@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import STATISTICS
+from friso.engine.batch import MOST_TURNS
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.motion import initial_displacement, last_corner, pieces, size
 from friso.equations.roles import Steady
@@ -47,8 +48,14 @@ SMALL = 1e-5
 """Share by which keys are changed to see how the loop changes at one frequency, which is smooth."""
 
 SMOOTH = 1e-2
-"""By how much, as a share of the time and for a change of a key by all of it, a settling time may move otherwise than
-its derivative says."""
+"""By how much, as a share of itself and for a change of a key by all of it, a settling time may move otherwise than its
+derivative says."""
+
+NOISE = 100 * RTOL
+"""Share of the time since a run began by which runs with that tolerance may be off."""
+
+START = "motion.displacement"
+"""Where a release begins: of the motion's keys the one that is not in the reference."""
 
 TABLES = ("masses.", "friction.", "joint.", "controller.", "bias.", "transmission.", "motor_friction.")
 """Where keys stand of which the cycle may depend."""
@@ -128,7 +135,8 @@ def sensitivity(
     The cycle's and the settling time's are exact: from variational equations along the keys, with saltation at kinks.
     The edge's follow from the multipliers, exact derivatives of the flow, whose own change is taken by central
     differences; they are those of a flip. The margin's are central differences of the loop at one frequency. Raises
-    InputError for an unknown key, and for a deviation that is not positive.
+    InputError for an unknown key, for a deviation that is not positive, and, of the settling time, for keys of the
+    motion: the reference is taken as it is. Where a release begins may be asked for.
 
     Examples
     --------
@@ -150,6 +158,10 @@ def sensitivity(
     flat = _with_equations_of(flat, names)
     if within is not None and not within > 0:
         raise InputError("within", f"{within:g}", "a deviation [m] greater than 0", "within=1e-6")
+    for name in names if within is not None else ():
+        if name.startswith("motion.") and (name, flat["motion.kind"]) != (START, "release"):
+            allowed = f"keys of anything but the motion, or {START} of a release, as the settling time is asked for"
+            raise InputError("keys", name, allowed, "friction.static")
     hunts = can_hunt(flat)
     return Sensitivities(
         stage,
@@ -300,13 +312,12 @@ def _multipliers(inside: Mapping[str, Any], changed: Sequence[Mapping[str, Any]]
 def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) -> SettlingDerivatives | None:
     """The derivatives of the time at which the stage last enters the band: by how much the position moves there, over
     the speed at which it enters. None where motions beside it do not follow them."""
-    _, standing, moving, _ = pieces(flat, 1)[0, -1]
-    if moving:
-        return None
+    if pieces(flat, 1)[0, -1, 2]:
+        return None  # the reference never stands still
     stages, corner = Ensemble(flat, 1), float(last_corner(flat))
     duration = np.array([float(flat["motion.duration"])])
     start = _starts(stages, flat, 1)
-    results = stages.run(start, duration, RTOL, bands=(within, within), least_swing=0.0)
+    results = stages.run(start, duration, RTOL, bands=(within, within))
     entered = results.statistics[:, STATISTICS.index("inner_exit")]
     if not done(results).all() or not corner < entered[0] < duration[0]:
         return None
@@ -316,19 +327,25 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     end, by_states, by_keys = flow
     position = stages.kernel.position
     by = -(by_states @ _starts_by(stages, flat, keys) + by_keys)[position] / end[stages.kernel.velocity]
-    if not _is_smooth(flat, keys, float(entered[0]), by, within):
+    settling = float(entered[0] - corner)
+    if not _is_smooth(flat, keys, float(entered[0]), settling, by, within):
+        return None
+    results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)  # once, however many turns there are
+    if not done(results).all():
         return None
     turns = slice(int(results.turn_counts[0]))
-    off = np.abs(results.turn_values[0, turns] - standing) / within
-    times = results.turn_times[0, turns]
+    off, times = np.abs(results.turn_values[0, turns]) / within, results.turn_times[0, turns]
     last = off[(times > corner) & (times <= entered[0])][-1:]
     jump = np.abs(np.append(last, off[times > entered[0]]) - 1).min(initial=np.inf)
-    return SettlingDerivatives(within, float(entered[0] - corner), by, float(jump))
+    return SettlingDerivatives(within, settling, by, float(jump))
 
 
-def _is_smooth(flat: Mapping[str, Any], keys: tuple[str, ...], entered: float, by: np.ndarray, within: float) -> bool:
-    """Whether the stage enters the band when the derivatives say it does with each key a little larger and smaller: not
-    where it bounces on its limiter so often that neighbouring motions part."""
+def _is_smooth(
+    flat: Mapping[str, Any], keys: tuple[str, ...], entered: float, settling: float, by: np.ndarray, within: float
+) -> bool:
+    """Whether the stage, which `entered` the band at a time [s], after `settling` [s], enters it when the derivatives
+    say it does with each key a little larger and smaller: not where it bounces on its limiter so often that
+    neighbouring motions part."""
     step = SMALL * np.array([flat[name] for name in keys])
     changes = np.concatenate([-np.diag(step), np.diag(step)])
     beside = {name: flat[name] + column for name, column in zip(keys, changes.T, strict=True)}
@@ -337,7 +354,8 @@ def _is_smooth(flat: Mapping[str, Any], keys: tuple[str, ...], entered: float, b
     results = stages.run(_starts(stages, stages.flat, len(changes)), durations, RTOL, bands=(within, within))
     moved = results.statistics[:, STATISTICS.index("inner_exit")] - entered
     expected = np.concatenate([-step * by, step * by])
-    return bool(done(results).all() and np.all(np.abs(moved - expected) <= SMOOTH * SMALL * entered))
+    allowed = SMOOTH * SMALL * settling + NOISE * entered
+    return bool(done(results).all() and np.all(np.abs(moved - expected) <= allowed))
 
 
 def _starts(stages: Ensemble, flat: Mapping[str, Any], count: int) -> np.ndarray:

@@ -29,21 +29,24 @@ class VariableWindow:
 
 def windows(search: Search, shares: np.ndarray) -> tuple[VariableWindow, ...]:
     """The windows about points, shape (variables,), by moves and margins of the machines of the search: on a grid, then
-    their ends by halving what lies between them and the next value that was tried."""
+    their ends by halving what lies between them and the next value that was tried. None where the points themselves do
+    not meet the goal on these machines."""
     variables, grid = search.remedy.variables, np.linspace(0, 1, POINTS)
     inside, outside = np.empty((len(variables), 2)), np.full((len(variables), 2), np.nan)
     for number in range(len(variables)):
         places = np.union1d(grid, shares[[number]])
         broken = ~_meets(search, shares, np.full(len(places), number), places)
         at = int(np.searchsorted(places, shares[number]))
+        if broken[at]:
+            return ()
         below, above = np.flatnonzero(broken[:at]), np.flatnonzero(broken[at:])
         first = int(below[-1]) + 1 if below.size else 0
-        last = max(first, at + int(above[0]) - 1) if above.size else len(places) - 1
+        last = at + int(above[0]) - 1 if above.size else len(places) - 1
         inside[number] = places[[first, last]]
         if below.size:
             outside[number, 0] = places[first - 1]
         if above.size:
-            outside[number, 1] = places[min(last + 1, len(places) - 1)]
+            outside[number, 1] = places[last + 1]
     closed = np.argwhere(np.isfinite(outside))
     for _ in range(HALVINGS if len(closed) else 0):
         rows, sides = closed.T

@@ -14,7 +14,7 @@ from friso.design_method.geometry import Geometry
 from friso.design_method.method import Design, NoDesign
 from friso.design_method.relax import Relaxation
 from friso.design_method.verification import MachineOutcomes
-from friso.quantities import percent
+from friso.quantities import outwards, percent
 from friso.stage.stage import numeric_keys
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.drawing.prefixes import choose, pretty, with_unit
@@ -201,15 +201,6 @@ def relaxation(change: Relaxation) -> str:
     if change.geometry is None:
         return text
     return f"{text}: then {leaf_words(change.geometry)} do"
-
-
-def outwards(value: float, larger: bool) -> float:
-    """Three digits of a value, so that it is not met more tightly than it has to be."""
-    if value <= 0:
-        return value
-    step = 10.0 ** (math.floor(math.log10(value)) - 2)
-    steps = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
-    return float(f"{steps * step:.6g}")
 
 
 def trimmed(value: float, unit: str) -> str:

@@ -297,7 +297,10 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         left = left & ~broken[name]
         if not left.any():
             yield sentence
-    yield f"Something attracts machines, or may, with all of the {outcome.attracted} best settings that were surveyed."
+    yield (
+        f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal, but something attracts machines, or "
+        f"may, with each of those surveyed ({outcome.attracted})."
+    )
 
 
 def _lowest(points: TriedPoints, goal: Goal) -> str:
@@ -368,8 +371,10 @@ def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
 def window_lines(tuning: Advice) -> list[str]:
     """The windows of the least change that works."""
     least = tuning.least
-    if least is None or not least.windows:
+    if least is None or not least.remedy.variables:
         return []
+    if not least.windows:
+        return [f"No window is given for {least.remedy.name}: on the machines of the search it misses the goal itself."]
     return [f"{least.remedy.name} meets the goal with each number varied separately, for {'; '.join(_windows(least))}."]
 
 
