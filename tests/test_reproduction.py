@@ -4,7 +4,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
@@ -31,6 +31,7 @@ from friso.shares import share
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.studies.rig.moves_on_rails import distance
 from friso.studies.store_files import kept_arrays
+from friso.studies.study import _DECISIVE
 from friso.studies.thesis import (
     STUDIES,
     Evidence,
@@ -51,7 +52,7 @@ from friso.studies.thesis.experiments import _RUNS, EXPERIMENTS, GRID, MOVES, ON
 from friso.studies.thesis.experiments import BUILT as LOOPS_BUILT
 from friso.studies.thesis.judges import design_rules
 from friso.studies.thesis.judges.shares import NARROW, WIDE
-from friso.studies.thesis.kept import Kept, kept_findings
+from friso.studies.thesis.kept import SOURCES, Kept, kept_findings
 from friso.studies.thesis.laws import conclusions_by_law
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
@@ -66,7 +67,7 @@ from friso.views.reproduce.document import reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
 from friso.views.reproduce.page import reproduce_files, reproduce_html
 from friso.views.reproduce.questions import QUESTIONS
-from friso.views.reproduce.words import in_order
+from friso.views.reproduce.words import details, in_order
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
@@ -707,16 +708,44 @@ def test_experiments_are_kept_whole(tmp_path: Path) -> None:
     for name in (*EXPERIMENTS, TRACES):
         kind, result = get_type_hints(vars(Experiments)[name].fget)["return"], getattr(experiment, name)
         kept.result((name,), kind, lambda made=result: made)
-        again = kept.result((name,), kind, lambda: pytest.fail("it was kept"))
-        arrays, others = taken_apart(result), taken_apart(again)
-        assert arrays.keys() == others.keys()
-        assert all(np.array_equal(arrays[key], others[key], equal_nan=arrays[key].dtype.kind in "fc") for key in arrays)
-        assert type(again) is type(result)
+        assert_same(kept.result((name,), kind, lambda: pytest.fail("it was kept")), result)
         if name == GRID:
+            arrays = taken_apart(result)
             for wrong in ({**arrays, "tree": np.array("[1]")}, {"tree": arrays["tree"]}, {"tree": np.array("[")}):
                 with pytest.raises((ValueError, TypeError, KeyError)):
                     put_together(kind, wrong)
     assert kept.count == len(EXPERIMENTS) + 1
+
+
+def assert_same(again: Any, made: Any) -> None:
+    """Alike in types, fields, keys and arrays; numbers of NumPy come back as Python's."""
+    made = made.item() if isinstance(made, np.generic) else made
+    assert type(again) is type(made)
+    if isinstance(made, np.ndarray):
+        assert again.dtype == made.dtype
+        np.testing.assert_array_equal(again, made, strict=True)
+    elif is_dataclass(made):
+        assert_same(vars(again), vars(made))
+    elif isinstance(made, Mapping):
+        assert [*again] == [*made]
+        assert_same((*again, *again.values()), (*made, *made.values()))
+    elif isinstance(made, tuple):
+        for pair in zip(again, made, strict=True):
+            assert_same(*pair)
+    else:
+        assert again == made or (again != again and made != made)
+
+
+def test_what_is_kept_depends_on_all_sources_it_was_computed_with() -> None:
+    """Every part of friso that these parts import is one of them, or decides on no number."""
+    package = files("friso")
+    parts = {*SOURCES, *_DECISIVE}
+    undecisive = {"errors", "escapes", "progress", "registry", "system", "version"}
+    undecisive |= {"bounded_file", "interrupts", "leftovers", "whole_file"}
+    folders = [Path(str(package / part)) for part in parts if "." not in part]
+    texts = [file.read_text("utf-8") for folder in folders for file in folder.rglob("*.py")]
+    imported = {name for text in texts for name in re.findall(r"^ *from friso\.(\w+)", text, re.MULTILINE)}
+    assert imported - undecisive == {part.partition(".")[0].partition("/")[0] for part in parts} & imported
 
 
 def test_a_draw_that_decides_nothing_says_why() -> None:
@@ -726,6 +755,8 @@ def test_a_draw_that_decides_nothing_says_why() -> None:
     with patched({import_module("friso.studies.thesis.plausible"): {"POINTS": 3, "ways_of": stopped}}):
         space = plausible({"F15B": registered()["F15B"]}, 1).claims["F15B"]
     assert (space.undecided, space.count, space.failures) == (1, 0, {0: "ValueError: the loop stops"})
+    undecided: Any = SimpleNamespace(finding=None, space=space, reason="", turned=())
+    assert details(undecided) == [("Draw 1, undecided", "ValueError: the loop stops")]
 
 
 def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path) -> None:
@@ -828,6 +859,9 @@ def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction, monkeypatc
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
     page = reproduce_html(replace(small, verdicts=reproduction.verdicts))
     assert "Figure 28" in page
+    linked = [int(number) for number in re.findall(r'<a href="#section-\d+">(\d+)</a>', page)]
+    assert 28 in linked
+    assert linked == sorted(linked)
     assert "&lt;b&gt;criterion&lt;/b&gt; &amp; more" in page
     assert "<script>alert(1)" not in page
     assert "10.5 <i>" not in page
@@ -867,4 +901,4 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     shown = replace(small, cycles={"system": cycles_})
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
-    assert "edge of the attracting cycle" in labels
+    assert "edge of the attracting cycle (flip)" in labels

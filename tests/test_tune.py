@@ -3,7 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -49,7 +49,19 @@ from friso.views.tune.document import tune_document
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
-from friso.views.tune.words import DOUBTS, _reasons, _without_friction, answer, changes, failing, rows, window_lines
+from friso.views.tune.words import (
+    DOUBTS,
+    _no_relaxation,
+    _reasons,
+    _without_friction,
+    answer,
+    changes,
+    failing,
+    rows,
+    size_words,
+    slowest_time,
+    window_lines,
+)
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6)
@@ -582,6 +594,29 @@ def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     assert unmet_goals(*made_up(400, **dict.fromkeys(PARTS, range(12))), FORCE_LIMITED) == ()
     assert unmet_goals(*made_up(400, **dict.fromkeys(PARTS, range(20))), FORCE_LIMITED) == ("together",)  # by chance
     assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
+
+
+def test_a_time_that_may_be_never_has_its_lower_end() -> None:
+    """Of a hundred, the interval of the slowest twentieth is from the 90th to the 100th."""
+    words = [slowest_time(made_up(100, settling=range(late))[1], Goal()) for late in (0, 1, 6, 11)]
+    assert words == ["100 ms", "100 ms (100 ms or longer)", "100 ms or longer, possibly never", "never"]
+
+
+def test_sizes_tell_of_how_many_keys_a_factor_is() -> None:
+    """Keys that come or go have none."""
+    words = [size_words(ChangeSize(False, keys, 4.0, scaled)) for keys, scaled in ((1, 1), (2, 2), (3, 1), (3, 2))]
+    assert words == [
+        "1 key of the controller, by a factor of 4",
+        "2 keys of the controller, by a factor of 2 each on average",
+        "3 keys of the controller, one of them by a factor of 4",
+        "3 keys of the controller, 2 of them by a factor of 2 on average",
+    ]
+
+
+def test_relaxations_that_were_not_sought_are_told_as_that() -> None:
+    dithered, other = (SimpleNamespace(remedy=SimpleNamespace(verifiable=verifiable)) for verifiable in (False, True))
+    lines = [_no_relaxation(cast("Any", SimpleNamespace(outcomes=some))) for some in ([dithered], [dithered, other])]
+    assert ["not sought" in text for text in lines] == [True, False]
 
 
 def test_an_edge_that_was_not_searched_to_the_end_is_a_doubt() -> None:

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -28,6 +29,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
 T = TypeVar("T")
+
+SOURCES = (
+    *("studies", "virtual_rig", "frequency", "identification", "leaf_springs", "design_method"),
+    *("axis.py", "evidence.py", "evidence.toml", "intervals.py", "materials.py", "materials.toml", "shares.py"),
+)
+"""Parts of the package that decide on what is kept, beside those of the equations."""
 
 Findings = dict[str, Finding]
 """Findings by a name, such as that of a claim."""
@@ -108,7 +115,7 @@ class Kept:
         if self.folder is None:
             return None
         about_all = hashlib.sha256(
-            repr((equations_version(), _sources(), machine(), thesis_rig().to_toml(), about)).encode()
+            repr((equations_version(), code_digest(*SOURCES), _built_on(), thesis_rig().to_toml(), about)).encode()
         ).hexdigest()
         return self.folder / f"{about_all[:24]}.{suffix}"
 
@@ -130,6 +137,6 @@ def kept_findings(file: Path) -> Findings | None:
 
 
 @cache
-def _sources() -> str:
-    """A digest of the code that judges, beside that of the equations."""
-    return code_digest("studies/thesis", "studies/rig", "virtual_rig", "frequency", "identification", "leaf_springs")
+def _built_on() -> str:
+    """What decides on a result besides friso's code."""
+    return f"{machine()}, scipy {version('scipy')}"

@@ -137,7 +137,7 @@ def plausible(
                 elif COUNT in ways:
                     own[name] = ways[COUNT]
             if tally:
-                tally.add(work, f"draw {one.number + 1} of {draws}" if one in drawn else "friso's own choice")
+                tally.add(work, f"{one.name} of {draws}" if one in drawn else "friso's own choice")
     by_claim = {
         name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
     }

@@ -111,12 +111,21 @@ OPEN: tuple[OpenValue, ...] = (
 """All of them."""
 
 
+def draw_name(number: int) -> str:
+    """What a draw is called; people count from 1, seeds from 0."""
+    return f"draw {number + 1}"
+
+
 @dataclass(frozen=True)
 class Draw:
     """One joint draw: its number, and the values by name, in the order of `OPEN`."""
 
     number: int
     values: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        return draw_name(self.number)
 
     @property
     def changes(self) -> dict[str, Any]:

@@ -29,7 +29,7 @@ def _tree(value: Any, arrays: dict[str, np.ndarray]) -> Any:
         arrays[str(len(arrays))] = value
         return len(arrays) - 1
     if is_dataclass(value):
-        return [_tree(getattr(value, field.name), arrays) for field in fields(value)]
+        return {field.name: _tree(getattr(value, field.name), arrays) for field in fields(value)}
     if isinstance(value, tuple):
         return [_tree(item, arrays) for item in value]
     if isinstance(value, Mapping):
@@ -49,9 +49,10 @@ def _value(kind: Any, tree: Any, arrays: Mapping[str, np.ndarray]) -> Any:
     origin, parts = get_origin(kind), get_args(kind)
     if is_dataclass(kind):
         hints = get_type_hints(kind)
-        names = [field.name for field in fields(kind)]
-        values = {name: _value(hints[name], item, arrays) for name, item in zip(names, tree, strict=True)}
-        return cast("Any", kind)(**values)
+        names = {field.name for field in fields(kind)}
+        if not isinstance(tree, dict) or tree.keys() != names:
+            raise TypeError(f"{kind}: expected {', '.join(sorted(names))}")
+        return cast("Any", kind)(**{name: _value(hints[name], item, arrays) for name, item in tree.items()})
     if kind is np.ndarray:
         return arrays[str(tree)]
     if kind is slice:

@@ -14,6 +14,7 @@ from friso.hunting.criteria.peak_count import RULE
 from friso.quantities import percent
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.studies import STUDIES, ThesisStudy
+from friso.views.boundary.figures import DASHES
 from friso.views.check.figures import SHARES
 from friso.views.drawing.figure import GREY, INK, PINK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
 from friso.views.map.figures import map_panel
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from friso.studies.thesis import Reproduction
+    from friso.studies.thesis.cycles import Edge
 
 _TITLES = {
     "11": "Path; crossover and mass (joint locked)",
@@ -87,13 +89,13 @@ def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) ->
     figures = reproduction.cycles.get(study.name)
     if figures is None:
         return panel
-    lines = tuple(
-        Series(
-            edge.x, edge.y, *(_HUNTING if edge.symmetric else _PAIR), "solid" if edge.kind == "flip" else "dashed", 2.2
-        )
-        for edge in figures.edges
-    )
+    lines = tuple(_line(edge) for edge in figures.edges)
     return replace(panel, series=(*panel.series, *lines))
+
+
+def _line(edge: Edge) -> Series:
+    name, colour = _HUNTING if edge.symmetric else _PAIR
+    return Series(edge.x, edge.y, f"{name} ({edge.kind})", colour, DASHES[edge.kind], 2.2)
 
 
 def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:

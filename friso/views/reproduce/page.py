@@ -56,8 +56,10 @@ def reproduce_files(reproduction: Reproduction, laws: ConclusionsByLaw | None = 
 def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = None) -> str:
     """The whole page: all claims at a glance, then item by item in the order of the thesis. It opens offline."""
     verdicts = words.in_order(reproduction.verdicts)
-    parts = sections(reproduction_figures(reproduction), verdicts)
+    numbered = reproduction_figures(reproduction)
+    parts = sections(numbered, verdicts)
     figures = [section.figure for section in parts if section.figure]
+    keys = {section.figure.name: section.key for section in parts if section.figure}
     return Report(
         "reproduce",
         "Reproduction of the thesis",
@@ -71,6 +73,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "words": words,
             "places": {verdict.claim.id: s.key for s in parts for verdict in s.verdicts},
             "sections": parts,
+            "figure_links": [(number, keys[figure.name]) for number, figure in numbered.items()],
             "images": {figure.name: _printed(figure) for figure in figures},
             "interactive": {
                 figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in figures

@@ -33,10 +33,10 @@ from friso.views.drawing.figure import (
     Axis,
     Figure,
     Limit,
-    Map,
     Panel,
     Series,
 )
+from friso.views.rig.experiments.stroke_crossover import rails_panel
 
 if TYPE_CHECKING:
     from friso.studies.thesis.experiments import Experiments
@@ -217,10 +217,10 @@ def _moves(experiments: Experiments) -> dict[str, Figure]:
 
 def _grid(experiments: Experiments) -> dict[str, Figure]:
     grid = experiments.grid
-    field = Map(grid.strokes, grid.crossovers, grid.share.T, "Share of rails with counted peaks", "", limits=(0.0, 1.0))
-    panel = Panel("", Axis("Stroke", "m", log=True), Axis("Crossover", "Hz"), (), maps=(field,))
-    count = len(grid.rails)
-    caption = f"Moves of the virtual rig, joint free, each cell on {count} rails; the thesis shows counts of one."
+    panel = rails_panel(grid)
+    caption = (
+        f"Moves of the virtual rig, joint free, each cell on {len(grid.rails)} rails; the thesis shows counts of one."
+    )
     return {"26": Figure("figure-26", "Figure 26: stroke and crossover on the rig", caption, (panel,))}
 
 

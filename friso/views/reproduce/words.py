@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from friso.quantities import percent
 from friso.studies.thesis.plausible import POINTS
-from friso.studies.thesis.space import OPEN
+from friso.studies.thesis.space import OPEN, draw_name
 from friso.studies.thesis.verdicts import ClaimVerdict
 
 if TYPE_CHECKING:
@@ -78,7 +78,7 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     ]
     rows += [("Reason", verdict.reason)] if reason(verdict) != verdict.reason else []
     failures = verdict.space.failures if verdict.space else {}
-    rows += [(f"Draw {number}, undecided", text) for number, text in failures.items()]
+    rows += [(f"{draw_name(number).capitalize()}, undecided", text) for number, text in failures.items()]
     return rows + [("Method", text) for text in verdict.turned]
 
 
@@ -126,7 +126,7 @@ def fit_sentence(plausible: Plausible) -> str:
         if math.isfinite(fit.at_baseline)
         else "at friso's own choice not all of them are found"
     )
-    return f"{tried}, draw {fit.draw.number} fits best: {off}, by {compared}; {own}. Its values: {values}."
+    return f"{tried}, {fit.draw.name} fits best: {off}, by {compared}; {own}. Its values: {values}."
 
 
 def fit_rows(plausible: Plausible) -> list[Sequence[str]]:

@@ -12,7 +12,8 @@ from friso.views.tune.words import answer, changes, failing, unsure_why, why_unm
 
 
 def tune_document(tuning: Advice) -> dict[str, Any]:
-    """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
+    """The JSON document: SI units, the unit in the key's suffix; a time is null that is never, and the upper
+    end of its interval also where the machines are too few to bound it."""
     goal = tuning.goal
     first, *further = answer(tuning)
     return plain_json(

@@ -73,10 +73,12 @@ def time(seconds: float) -> str:
 def slowest_time(measured: Performance, goal: Goal) -> str:
     """The settling time of the slowest twentieth, with its interval."""
     low, high = measured.slowest_interval(goal)
-    if not math.isfinite(measured.slowest(goal)):
-        return ABSENT
-    between = range_with_unit(low, high, "s") if math.isfinite(high) else f"{with_unit(low, 's')} or longer"
     alone = time(measured.slowest(goal))
+    if not math.isfinite(low):
+        return alone
+    between = range_with_unit(low, high, "s") if math.isfinite(high) else f"{with_unit(low, 's')} or longer"
+    if alone == ABSENT:
+        return f"{between}, possibly {ABSENT}"
     return alone if between == alone else f"{alone} ({between})"
 
 
@@ -178,13 +180,14 @@ def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
 def size_words(size: ChangeSize) -> str:
     """How large a change is."""
     keys = [f"{size.keys} key{'s' * (size.keys != 1)} of the controller"] if size.keys else []
-    average = " each on average" if size.scaled > 1 else ""
-    factor = f", by a factor of {factor_text(size.mean)}{average}" if size.factor > 1 else ""
+    some = "" if size.scaled == size.keys else f"{'one' if size.scaled == 1 else size.scaled} of them "
+    average = f"{' each' * (not some)} on average" if size.scaled > 1 else ""
+    factor = f", {some}by a factor of {factor_text(size.mean)}{average}" if size.factor > 1 else ""
     return f"{' and '.join([*(['a joint'] if size.bought else []), *keys])}{factor}"
 
 
 def _brings(measured: Performance, tuning: Advice) -> str:
-    before = time(tuning.present.slowest(tuning.goal))
+    before = slowest_time(tuning.present, tuning.goal)
     as_is = "" if measured is tuning.present else f"; as it is: {before}"
     meet = share_with_interval(measured.share(tuning.goal))
     return (
@@ -233,8 +236,15 @@ def _nothing(tuning: Advice) -> list[str]:
     if not (tuning.goal.controller and tuning.goal.joint):
         lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
     if not tuning.relaxed and not tuning.interrupted:
-        lines.append("No relaxation of up to three parts of the goal was found with which an option meets it.")
+        lines.append(_no_relaxation(tuning))
     return lines
+
+
+def _no_relaxation(tuning: Advice) -> str:
+    """That no relaxation was found, or that none was sought."""
+    if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
+        return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
+    return "No relaxation of up to three parts of the goal was found with which an option meets it."
 
 
 def _relax(relaxed: RelaxedGoal) -> str:

@@ -43,20 +43,27 @@ def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, P
         Part(
             "Eq. 1 equals force over displacement of two springs in series",
             sp.simplify(derived - stiffness) == 0,
-            f"k_e = {derived}",
+            f"k_e = {_written(derived)}",
         ),
         Part(
             "Eq. 2 equals the derivative of that stiffness with respect to k_f, for all k_f and k_j",
             sp.simplify(slope - slope_printed) == 0,
-            f"d k_e / d k_f = {sp.factor(slope)}; minus Eq. 2 as printed: {sp.simplify(slope - slope_printed)}",
+            f"d k_e / d k_f = {_written(sp.factor(slope))}; minus Eq. 2 as printed: "
+            f"{_written(sp.simplify(slope - slope_printed))}",
         ),
         Part(
             "Eq. 2 vanishes with eta = k_j/k_f, whether k_j goes to 0 or k_f to infinity",
             all(limit == 0 for limit in limits),
-            f"limits {limits[0]} and {limits[1]}; the relative sensitivity, (k_f/k_e) d k_e / d k_f = {relative}, "
+            f"limits {limits[0]} and {limits[1]}; the relative sensitivity, (k_f/k_e) d k_e / d k_f = "
+            f"{_written(relative)}, "
             "vanishes too, but with eta instead of its square",
         ),
     )
+
+
+def _written(expression: sp.Basic) -> str:
+    """An expression as people write it."""
+    return str(expression).replace("**", "^").replace("*", " ")
 
 
 def in_the_plant(stiffness: sp.Expr, springs: Springs) -> Part:

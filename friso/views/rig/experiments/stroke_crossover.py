@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,10 @@ import numpy as np
 from friso.hunting.criteria.peak_count import CRITERION
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.outcome import Outcome
+from friso.views.drawing.colours import ramp
 from friso.views.drawing.figure import INK, Axis, Figure, Map, Panel, Series
 from friso.views.drawing.prefixes import with_unit
+from friso.views.map.words import QUIET
 from friso.views.rig.experiments.hunting import CRITERIA, runs_document, share_document
 from friso.views.rig.outcome_view import OutcomeView
 
@@ -55,12 +58,17 @@ def figures(outcome: Outcome) -> list[Figure]:
     counts: StrokeCrossover = outcome.result
     finite = np.isfinite(counts.limits) & (counts.limits > 0)
     border = Series(counts.strokes[finite], counts.limits[finite], "no counted peaks above", INK, width=2.0)
-    field = Map(
-        counts.strokes, counts.crossovers, counts.share.T, "Share of rails with counted peaks", "", limits=(0.0, 1.0)
-    )
-    panel = Panel("", Axis("Stroke", "m", log=True), Axis("Crossover", "Hz"), (border,), maps=(field,))
+    panel = replace(rails_panel(counts), series=(border,))
     caption = f"Each cell: {len(counts.rails)} rails, one move each, {CRITERION} (Fig. 26: of one run)."
-    return [Figure("stroke_crossover", "Joint free: share of rails with counted peaks", caption, (panel,))]
+    return [Figure("stroke_crossover", "Joint free: rails with counted peaks", caption, (panel,))]
+
+
+def rails_panel(counts: StrokeCrossover) -> Panel:
+    """On how many rails peaks are counted: the fewer, the lighter, none in the colour of rest."""
+    count = len(counts.rails)
+    label, colours = f"Rails with counted peaks, of {count}", (QUIET, *ramp(count)[::-1])
+    field = Map(counts.strokes, counts.crossovers, count * counts.share.T, label, "", colours=colours)
+    return Panel("", Axis("Stroke", "m", log=True), Axis("Crossover", "Hz"), (), maps=(field,))
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
