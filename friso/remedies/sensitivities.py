@@ -132,7 +132,8 @@ def sensitivity(
     named. The `edge` is located unless it is given (that of a check). Those of the settling time, too, if it is said
     what deviation counts as in position, `within` [m].
 
-    The cycle's and the settling time's are exact: from variational equations along the keys, with saltation at kinks.
+    The cycle's and the settling time's are exact: from variational equations along the keys, with saltation at kinks
+    (of the settling time, but for the share of a start that depends on keys, which is by central differences).
     The edge's follow from the multipliers, exact derivatives of the flow, whose own change is taken by central
     differences; they are those of a flip. The margin's are central differences of the loop at one frequency. Raises
     InputError for an unknown key, for a deviation that is not positive, and, of the settling time, for keys of the
