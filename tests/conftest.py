@@ -77,7 +77,7 @@ def own_bandwidth(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="session", autouse=True)
 def unprinted() -> Iterator[None]:
     """Pages hold empty prints, whose drawing takes most of a page's time; tests/test_check_views.py has one with its
-    own. Figures that are files are drawn everywhere."""
+    own. Figures that are files are drawn, but for tests that ask for `undrawn`."""
     from friso.views import pages  # slow
 
     with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda figure, form: b"<svg/>")}}):
@@ -94,7 +94,7 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files of figures are empty: what is tested is beside them."""
+    """Figures that are files are empty: what is tested is beside them."""
     monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", lambda figure, form: b"")
 
 

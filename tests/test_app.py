@@ -547,8 +547,11 @@ def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:
     assert b"answer 2" in newer
 
 
-def test_what_fails_once_it_is_overtaken_is_not_reported(capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_fails_once_it_is_overtaken_is_logged_alone(
+    capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
     """When the server ends, pools take no more work."""
+    caplog.set_level("DEBUG", "friso")
 
     def job(work: Work) -> Iterator[dict[str, Any]]:
         if overtaken:
@@ -561,6 +564,7 @@ def test_what_fails_once_it_is_overtaken_is_not_reported(capsys: pytest.CaptureF
         Work(parts.append).run(job)
         assert [part and part["kind"] for part in parts] == [kind, None]
         assert ("Traceback" in capsys.readouterr().err) == (not overtaken)
+        assert ("cannot schedule" in caplog.text) == overtaken
 
 
 def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> None:

@@ -21,6 +21,7 @@ from friso.escapes import escaped
 pytestmark = needs_browser
 
 RIG = Path(friso.example("thesis_rig"))
+FIELD = '[data-path="controller.crossover"] input[type=text]'
 
 
 class Browsed:
@@ -46,6 +47,32 @@ class Browsed:
         self.page.keyboard.press("Control+a")
         self.page.keyboard.type(text)
         self.page.keyboard.press("Enter")
+
+    def type_meanwhile(self, text: str, more: str) -> None:
+        """A crossover is typed, and more before its answer comes and is drawn."""
+        page, held = self.page, []
+        page.route("**/ask/machine", lambda route: held.append(route))
+        try:
+            with page.expect_request(re.compile("ask/machine")):
+                self.type("controller.crossover", text)
+            page.keyboard.press("Control+a")
+            page.keyboard.type(more)
+            with page.expect_response(re.compile("ask/machine")):
+                held.pop().continue_()
+            page.wait_for_timeout(300)
+        finally:
+            page.unroute("**/ask/machine")
+
+    def undo_to(self, value: str) -> None:
+        """Undo until the crossover is this one again."""
+        self.page.click("#undo")
+        while self.changes().get("controller.crossover") != value:
+            self.page.click("#undo")
+        self.page.wait_for_function(f"value => document.querySelector('{FIELD}').value === value", arg=value)
+
+    def changes(self) -> dict[str, Any]:
+        """What is changed of the machine that is shown."""
+        return self.page.evaluate("async () => (await import('/state.js')).changes()")
 
     def answered(self, text: str) -> None:
         """Wait until the answer has a text."""
@@ -108,26 +135,69 @@ def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browse
 
 
 def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> None:
-    page, field = browsed.page, '[data-path="controller.crossover"] input[type=text]'
-    before, held = page.input_value(field), []
-    page.route("**/ask/machine", lambda route: held.append(route))
-    try:
-        with page.expect_request(re.compile("ask/machine")):
-            browsed.type("controller.crossover", "11 Hz")
-        page.keyboard.press("Control+a")
-        page.keyboard.type("10.5 H")
-        with page.expect_response(re.compile("ask/machine")):
-            held.pop().continue_()
-        page.wait_for_timeout(300)  # it is drawn
-        page.keyboard.type("z")
-    finally:
-        page.unroute("**/ask/machine")
+    page, before = browsed.page, browsed.page.input_value(FIELD)
+    browsed.type_meanwhile("11 Hz", "10.5 H")
+    page.keyboard.type("z")
     with page.expect_request(re.compile("ask/machine")) as asked:
         page.keyboard.press("Enter")
     assert "10.5 Hz" in (asked.value.post_data or "")
-    page.click("#undo")
-    page.click("#undo")
-    page.wait_for_function("([field, value]) => document.querySelector(field).value === value", arg=[field, before])
+    browsed.undo_to(before)
+
+
+def test_a_refusal_is_said_while_something_else_is_typed(browsed: Browsed) -> None:
+    page, before = browsed.page, browsed.page.input_value(FIELD)
+    browsed.type_meanwhile("3 kg", "10.")
+    assert "convertible to Hz" in page.inner_text('[data-path="controller.crossover"] [role=alert]')
+    page.keyboard.type("5 Hz")
+    page.keyboard.press("Enter")
+    page.wait_for_selector('[data-path="controller.crossover"] .wrong', state="detached")
+    assert browsed.changes()["controller.crossover"] == "10.5 Hz"
+    browsed.undo_to(before)
+
+
+def test_the_first_click_after_typing_counts(browsed: Browsed) -> None:
+    """What is drawn anew while the pointer is pressed is drawn once it has clicked; what has the focus keeps it."""
+    page, before = browsed.page, browsed.page.input_value(FIELD)
+
+    def click(place: str) -> None:
+        page.hover(place)
+        page.mouse.down()
+        page.wait_for_timeout(300)  # a slow hand: answers come meanwhile
+        page.mouse.up()
+
+    browsed.type_meanwhile("11 Hz", "12 Hz")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("11 Hz")  # nothing to hand over
+    old = page.query_selector(FIELD)
+    assert old is not None
+    click("#keys-controller")
+    page.wait_for_function("field => !field.isConnected", arg=old)
+    assert page.locator("details[data-table=controller]").get_attribute("open") is not None
+    assert page.evaluate("document.activeElement.id") == "keys-controller"
+    page.click("#keys-controller")
+    page.focus(FIELD)
+    page.keyboard.press("Control+a")
+    page.keyboard.type("10 Hz")
+    click("[data-part=stage]")
+    page.wait_for_selector('[data-path="masses.stage"]')
+    page.click("[data-part=controller]")
+    assert page.input_value(FIELD) == "10 Hz"
+    browsed.undo_to(before)
+
+
+def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, tmp_path: Path) -> None:
+    page, before = browsed.page, browsed.page.input_value(FIELD)
+    (tmp_path / "another.toml").write_text(friso.load(RIG).replace({"controller.crossover": "15 Hz"}).to_toml())
+    page.focus(FIELD)
+    page.keyboard.press("Control+a")
+    page.keyboard.type("33 Hz")
+    page.set_input_files("#file", tmp_path / "another.toml")
+    page.wait_for_function(f"() => document.querySelector('{FIELD}').value.startsWith('15')")
+    page.keyboard.press("Enter")
+    assert browsed.changes() == {}
+    page.click("[aria-label='Close another.toml']")
+    page.wait_for_function(f"value => document.querySelector('{FIELD}').value === value", arg=before)
+    assert browsed.changes()["controller.crossover"] == before
 
 
 def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
@@ -140,6 +210,7 @@ def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
     page.mouse.down()
     page.mouse.move(slider["x"] + 0.7 * slider["width"], slider["y"] + slider["height"] / 2, steps=4)
     page.wait_for_function(f"before => JSON.stringify({last}) !== JSON.stringify(before)", arg=before, timeout=60_000)
+    assert page.eval_on_selector(FIELD, "field => field.value === field.defaultValue")  # nothing is being typed
     page.mouse.up()
     page.click("#undo")
 
@@ -189,6 +260,7 @@ def test_what_is_wrong_is_said_in_place(browsed: Browsed) -> None:
     browsed.type("controller.crossover", "3 kg")
     browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', timeout=30_000)
     assert "convertible to Hz" in browsed.page.inner_text('[data-path="controller.crossover"] .wrong')
+    assert browsed.page.input_value(FIELD) == "3 kg"
     browsed.page.click("#undo")
     browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', state="detached", timeout=30_000)
 

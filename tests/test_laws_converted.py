@@ -24,6 +24,8 @@ from friso.stage import Stage
 from friso.stage.lists import element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert, convertible, measure_friction
+from friso.views.convert.figures import conversion_figure
+from friso.views.drawing import matplotlib_renderer
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 LUGRE = VARIANTS["rigid"]
@@ -157,6 +159,11 @@ def test_the_command(tmp_path: Path, undrawn: None) -> None:
     assert "[friction]" in shown.stdout
     wrong = friso_inside(tmp_path, "convert", RIG, "--friction", "gms", "--elements", "13")
     assert wrong.returncode == 2
+
+
+def test_its_figure_can_be_drawn() -> None:
+    figure = conversion_figure(convert(LUGRE, "gms"))
+    assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("friction", [*STICKING, stribeck(2)])

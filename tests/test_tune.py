@@ -45,7 +45,9 @@ from friso.remedies.window import HALVINGS, POINTS, windows
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
+from friso.views.drawing import matplotlib_renderer
 from friso.views.tune.document import tune_document
+from friso.views.tune.figures import figures
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
@@ -311,6 +313,11 @@ def test_the_answer_as_files(tuning: Advice, undrawn: None) -> None:
     low, high = document["ways"]["bandwidth"]["slowest_twentieth_interval_s"]
     assert low <= document["ways"]["bandwidth"]["slowest_twentieth_s"]
     assert high is None  # of few machines
+
+
+def test_its_figures_can_be_drawn(tuning: Advice) -> None:
+    for figure in figures(tuning):
+        assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
 
 
 def test_a_stage_that_hunts_is_never_an_answer(rigid: Stage, goal: Goal, tuning: Advice) -> None:

@@ -19,8 +19,9 @@ from friso.stage.files import load, text_of
 PORT = 8741
 """The port unless another one is asked for: browsers keep what a page holds by its port."""
 
-GRACE = 5
-"""How long [s] the end of questions at work is waited for: a kernel that is compiled is not given up."""
+GRACE = 2
+"""How long [s] the end of questions at work is waited for at most: overtaken, they end within 0.1 s, unless they are in
+the middle of a figure or a solution."""
 
 TRIES = 20
 """Ports that are tried beyond it, where it is taken."""

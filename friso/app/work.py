@@ -66,6 +66,7 @@ class Work:
             self.put({"kind": "refused", "key": error.key, "text": str(error)})
         except Exception as error:  # a page is answered whatever happens; the terminal has the rest
             if self.flag[0]:  # nobody waits, and at the end of the process pools take no more work
+                logging.getLogger("friso").debug("failed once it was overtaken", exc_info=True)
                 self.put({"kind": "overtaken"})
             else:
                 traceback.print_exc()

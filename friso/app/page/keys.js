@@ -1,9 +1,10 @@
 // The keys of a part: value, unit, slider, meaning, uncertainty; and the stage file as text.
-import { dialog, el, words } from "./dom.js";
+import { $, dialog, el, words } from "./dom.js";
 import { PARTS } from "./drawing.js";
 
 const QUANTITY = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(\S.*)?$/i;
 const STEPS = 1000;
+const SLIDER = "-slider";
 const ranges = new Map();
 
 /** A value as it is written: its unit, and how large that is in SI; of an uncertain one, whose centre is used, in SI. */
@@ -31,11 +32,10 @@ export function typing() {
 
 export function keys(place, machine, part, changed, wrong, tell) {
   const about = PARTS.find((item) => item.id === part);
-  const held = document.activeElement?.closest?.("#keys [data-path]")?.dataset.path;
+  const held = place.contains(document.activeElement) ? document.activeElement.id : "";
   const opened = new Set([...place.querySelectorAll("details[open]")].map((item) => item.dataset.table));
-  const focus = document.activeElement?.type;
   const tables = about.tables.map((name) => machine.tables.find((table) => table.name === name));
-  const text = el("button", { type: "button", class: "plain", onclick: () => tell.edit() }, "Edit as text");
+  const text = el("button", { id: "keys-text", type: "button", class: "plain", onclick: () => tell.edit() }, "Edit as text");
   place.replaceChildren(el("h2", {}, about.label));
   for (const table of tables) {
     if (!table.present) {
@@ -45,59 +45,66 @@ export function keys(place, machine, part, changed, wrong, tell) {
       continue;
     }
     place.append(el("p", { class: "about" }, `[${table.name}] ${table.description}`));
-    const rows = table.keys.map((key) => [key, row(key, machine, changed, wrong, tell)]);
+    const rows = table.keys.map((key) => [key, row(key, machine, changed, tell)]);
     place.append(...rows.filter(([key]) => key.value !== undefined && key.value !== null).map(([, item]) => item));
     const more = rows.filter(([key]) => key.value === undefined || key.value === null).map(([, item]) => item);
     if (more.length) {
-      const summary = el("summary", {}, `${more.length} more keys of [${table.name}]`);
+      const summary = el("summary", { id: `keys-${table.name}` }, `${more.length} more keys of [${table.name}]`);
       place.append(el("details", { class: "more", "data-table": table.name, open: opened.has(table.name) }, summary, ...more));
     }
   }
   place.append(text);
-  if (held) {
-    const again = [...place.querySelectorAll(`[data-path="${held}"] input, [data-path="${held}"] select`)];
-    (again.find((item) => item.type === focus) ?? again[0])?.focus();
+  refuse(place, wrong);
+  if (held) ($(held) ?? $(held.replace(SLIDER, "")))?.focus();
+}
+
+/** Say what is wrong at its keys, and of no other one; they are not drawn again. */
+export function refuse(place, wrong) {
+  place.querySelectorAll(".wrong").forEach((item) => item.remove());
+  for (const item of place.querySelectorAll("[data-path]")) {
+    if (wrong?.keys.includes(item.dataset.path)) item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
   }
 }
 
-function row(key, machine, changed, wrong, tell) {
+/** A key as it was set last, which the server may not have read yet, or may have refused. */
+function row(key, machine, changed, tell) {
+  const value = key.path in changed ? changed[key.path] : key.value;
   const id = `key-${key.path.replaceAll(".", "-")}`;
   const label = el("label", { for: id, title: key.description }, words(key.path));
   const classes = `key${key.path in changed ? " changed" : ""}`;
   const item = el("div", { class: classes, "data-path": key.path }, label);
   if (key.kind === "switch") {
-    item.append(el("input", { id, type: "checkbox", checked: key.value === true, onchange: (event) => tell.set(key.path, event.target.checked) }));
+    item.append(el("input", { id, type: "checkbox", checked: value === true, onchange: (event) => tell.set(key.path, event.target.checked) }));
   } else if (key.kind === "word") {
-    const options = key.options.map((word) => el("option", { value: word, selected: word === key.value }, word));
-    if (key.value === undefined || key.value === null) options.unshift(el("option", { value: "", selected: true }, "–"));
+    const options = key.options.map((word) => el("option", { value: word, selected: word === value }, word));
+    if (value === undefined || value === null) options.unshift(el("option", { value: "", selected: true }, "–"));
     item.append(el("select", { id, onchange: (event) => event.target.value && tell.set(key.path, event.target.value) }, ...options));
   } else if (key.kind === "array") {
     item.append(el("button", { id, type: "button", onclick: () => tell.edit() }, "In the text"));
   } else {
-    item.append(...field(key, id, tell));
+    item.append(...field(key, value, id, tell));
   }
   if (machine.uncertain.includes(key.path)) item.append(el("span", { class: "uncertain" }, "uncertain: its centre is used"));
   item.append(el("span", { class: "help", id: `${id}-help` }, key.description));
-  if (wrong?.keys.includes(key.path)) item.append(el("p", { class: "wrong", role: "alert" }, wrong.text));
   return item;
 }
 
-function field(key, id, tell) {
-  const value = key.value === undefined || key.value === null ? "" : String(key.value);
+function field(key, value, id, tell) {
   const read = (text) => (text.trim() === "" ? null : !key.unit && Number.isFinite(Number(text)) ? Number(text) : text.trim());
-  const input = el("input", { id, type: "text", value, placeholder: `e.g. ${key.example}`, autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-help` });
+  const input = el("input", { id, type: "text", value: String(value ?? ""), placeholder: `e.g. ${key.example}`, autocomplete: "off", spellcheck: "false", "aria-describedby": `${id}-help` });
   input.addEventListener("change", () => {
     input.defaultValue = input.value; // handed over
     tell.set(key.path, read(input.value));
   });
-  if (!key.plain || !key.range || !QUANTITY.test(value)) return [input];
+  if (!key.plain || !key.range || !QUANTITY.test(String(key.value))) return [input];
   if (!ranges.has(key.path) || !inside(ranges.get(key.path), key.si)) ranges.set(key.path, key.range);
   const range = ranges.get(key.path);
-  const slider = el("input", { type: "range", min: 0, max: STEPS, value: place(range, key.si), "aria-label": `${words(key.path)}, slider` });
+  const slider = el("input", { id: id + SLIDER, type: "range", min: 0, max: STEPS, value: place(range, key.si), "aria-label": `${words(key.path)}, slider` });
   slider.addEventListener("pointerdown", tell.hold);
   slider.addEventListener("input", () => {
-    input.value = worded(key, at(range, slider.value), 4);
-    tell.set(key.path, worded(key, at(range, slider.value), 4), true);
+    const moved = worded(key, at(range, slider.value), 4);
+    input.value = input.defaultValue = moved; // handed over
+    tell.set(key.path, moved, true);
   });
   slider.addEventListener("change", tell.release);
   return [input, slider];

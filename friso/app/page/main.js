@@ -2,7 +2,7 @@
 import * as answers from "./answer.js";
 import { $, el, plain } from "./dom.js";
 import { drawing } from "./drawing.js";
-import { edit, forgetRanges, keys, typing, worded } from "./keys.js";
+import { edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
 import * as machines from "./state.js";
@@ -17,7 +17,9 @@ let answer = null;
 let timer = 0;
 let held = "";
 let begun = false;
-let late = false;
+let late = false; // what is on the left is drawn again once that takes nothing from under the hand
+let pressed = false;
+let drawn = {}; // the machine and the part whose keys are there
 
 const sent = () => ({ machine: machines.sent(), pinned: machines.pinned() });
 const set = (values, dragged = false) => machines.set(values, dragged);
@@ -51,6 +53,7 @@ function withUnits(values) {
 
 function changed(dragged) {
   bar();
+  late = false; // the answer draws it
   const machine = machines.current();
   if (!machine) return;
   clearTimeout(timer);
@@ -79,9 +82,8 @@ function described(part) {
     end("check");
     answers.progress(null);
     if (!shown) return answers.refused(part.text);
-    const known = shown.tables.flatMap((table) => table.keys).some((key) => wrong.keys.includes(key.path));
     left();
-    if (!known) answers.refused(part.text);
+    if (!$("keys").querySelector(".wrong")) answers.refused(part.text);
     return;
   }
   if (part.kind !== "answer") return;
@@ -119,16 +121,32 @@ function redraw() {
 }
 
 function left() {
+  late = pressed && !machines.dragging(); // what is clicked would go before the click
+  if (late) return;
   redraw();
   if (machines.dragging()) return; // the slider would go from under the hand; letting go asks again
-  late = typing(); // so would the field, with what is typed in it
-  if (late) return;
+  const machine = machines.current();
+  late = typing() && drawn.machine === machine && drawn.part === chosen; // so would the field, with what is typed in it
+  if (late) return refuse($("keys"), wrong);
+  drawn = { machine, part: chosen };
   keys($("keys"), shown, chosen, machines.changes(), wrong, {
-    set: (path, value, dragged = false) => set({ [path]: value }, dragged),
+    set: (path, value, dragged = false) => machine === machines.current() && set({ [path]: value }, dragged),
     hold: machines.hold,
     release: machines.release,
     edit: () => edit(shown.toml, (text) => machines.add(machines.current().name, text, true)),
   });
+}
+
+const caughtUp = () => setTimeout(() => late && left());
+
+/** Nothing on the left moves or goes from when the pointer is pressed to its click, which comes in one turn with its release. */
+function pointed(event) {
+  const before = pressed;
+  pressed = event.buttons % 2 === 1;
+  if (pressed === before) return;
+  if (pressed) return document.activeElement?.closest(".key")?.classList.add("held");
+  setTimeout(() => document.querySelector(".key.held")?.classList.remove("held"));
+  caughtUp();
 }
 
 function choose(part) {
@@ -179,21 +197,21 @@ function wire() {
   $("tour").addEventListener("click", () => tour());
   $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer, link: machines.link, files: report }));
   document.addEventListener("keydown", (event) => {
-    const typing = event.target.matches?.("input[type=text], textarea, select");
-    if (typing) return;
+    if (event.target.matches?.("input[type=text], textarea, select")) return;
     if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
       event.preventDefault();
       if (event.shiftKey) redo();
       else undo();
     } else if (event.key === "p" && !event.ctrlKey && !event.metaKey) machines.pin();
   });
-  $("keys").addEventListener("focusout", () => setTimeout(() => late && left()));
+  $("keys").addEventListener("focusout", caughtUp);
   document.addEventListener("dragover", (event) => event.preventDefault());
   document.addEventListener("drop", (event) => {
     event.preventDefault();
     trouble("");
     opened([...event.dataTransfer.files]);
   });
+  for (const moment of ["pointerdown", "pointermove", "pointerup", "pointercancel"]) document.addEventListener(moment, pointed, true);
   for (const end of ["pointerup", "pointercancel"]) document.addEventListener(end, machines.release);
   window.addEventListener("hashchange", linked);
   onReach((there, text) => {
