@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -210,6 +211,46 @@ def test_what_is_compiled_when_its_question_is_overtaken_is_there_for_the_next(
     Timer(0.3, go.set).start()
     work.finish(asked)
     assert len(begun) == 1
+
+
+def test_who_fails_leaves_what_another_waits_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And what nobody waits for any more is not begun."""
+    shared, failing, unwanted = requests(tmp_path, 3)
+    begun, may_end = [], {shared: Event(), failing: Event()}
+
+    class Building(Builder):
+        def build(self, request: Any) -> str:
+            begun.append(request)
+            while not may_end[request].wait(0.01) and not self.killed.is_set():
+                pass
+            return "" if request == failing or self.killed.is_set() else "name"
+
+    monkeypatch.setattr(building, "usable_cores", lambda: 2)
+    monkeypatch.setattr(building, "_taken", lambda surroundings: None)
+    monkeypatch.setattr(building, "_waiting", [])
+    monkeypatch.setattr(building, "_Builder", Building)
+    work, flag = building._Work(), np.zeros(1, np.int64)
+
+    def overtaken() -> None:
+        with ended_by(flag):
+            work.finish([shared, unwanted])
+
+    with ThreadPoolExecutor(3) as pool:
+        first = pool.submit(work.finish, [shared, failing])
+        while len(begun) < 2:
+            time.sleep(0.01)
+        second, third = pool.submit(work.finish, [shared]), pool.submit(overtaken)
+        time.sleep(0.3)  # they wait
+        flag[0] = 1
+        with pytest.raises(Overtaken):
+            third.result(10)
+        may_end[failing].set()
+        with pytest.raises(RuntimeError, match="could not be compiled"):
+            first.result(10)
+        may_end[shared].set()
+        second.result()
+    assert len(begun) == 2
+    assert unwanted not in begun
 
 
 def test_who_waits_for_another_that_compiles_can_be_interrupted(

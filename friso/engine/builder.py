@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import pickle
+import signal
 import sys
 from importlib import import_module
 from pathlib import Path
@@ -19,6 +20,7 @@ PATIENCE = 60.0  # [s] it holds 150 MB
 
 def main(folder: Path) -> None:
     """Build what is asked for on standard input."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it
     answers, sys.stdout = sys.stdout, sys.stderr  # what plug-ins print is no answer
     while True:
         patience = Timer(PATIENCE, os._exit, (0,))

@@ -16,11 +16,10 @@ from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, wait
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from threading import Lock, Semaphore, Thread
 
-from filelock import Timeout
+from filelock import FileLock, Timeout
 
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
 from friso.engine.overtaken import Overtaken, go_on
@@ -30,6 +29,9 @@ from friso.system import usable_cores
 _PATIENCE = 0.1
 """How long [s] is waited before it is looked whether there is still need."""
 
+_AT_THE_END = 2.0
+"""How long [s] it is waited at the end of the process until builders have ended."""
+
 
 def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
@@ -38,7 +40,7 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
     requests = list(requests)
     compiled = {request: request.entry() for request in requests}
     if missing := [request for request, entry in compiled.items() if entry is None]:
-        _work(os.getpid()).finish(missing)
+        _work().finish(missing)
         prune(cache_folder())
         compiled |= {request: request.entry() for request in missing}
     if dropped := [request.title for request, entry in compiled.items() if entry is None]:
@@ -47,43 +49,66 @@ def built_entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
 
 
 class _Work:
-    """What a process is building, each request once for all of its threads that wait for it, as many at a time as
-    there are cores."""
+    """What a process is building: each request once for all of its threads that wait for it, as many at a time as there
+    are cores."""
 
     def __init__(self) -> None:
         self._cores, self._turn = Semaphore(usable_cores()), Lock()
         self._jobs: dict[CodeRequest, _Job] = {}
 
     def finish(self, requests: list[CodeRequest]) -> None:
-        """Meet all requests. What ends this early ends the jobs that it began, unless it was overtaken."""
-        with self._turn:
-            began = [
-                _Job(request, f"{number} of {len(requests)}")
-                for number, request in enumerate(requests, 1)
-                if request not in self._jobs
-            ]
-            self._jobs |= {job.request: job for job in began}
-            jobs = [self._jobs[request] for request in requests]
-        for job in began:  # in threads that keep nobody from leaving
-            Thread(target=self._do, args=[job], daemon=True).start()
+        """Meet all requests. What ends this early ends the jobs for which nobody else waits; but where it is overtaken,
+        those that build already go on."""
+        requests = list(dict.fromkeys(requests))
+        jobs: list[_Job] = []
+        overtaken = False
         try:
+            for number, request in enumerate(requests, 1):
+                jobs.append(self._joined(request, f"{number} of {len(requests)}"))
             _wait(jobs)
         except Overtaken:
+            overtaken = True
             raise
-        except BaseException:
-            for job in began:  # all, before any has ended: one that starts now ends itself
+        finally:
+            wait(job.met for job in self._leave(jobs, overtaken))
+
+    def end(self) -> None:
+        """End all jobs."""
+        with self._turn:
+            jobs = [*self._jobs.values()]
+            for job in jobs:
                 job.give_up()
-            wait(job.met for job in began)
-            raise
+        wait([job.met for job in jobs], _AT_THE_END)
+
+    def _joined(self, request: CodeRequest, place: str) -> _Job:
+        """The job of a request, for which one more waits; begun where there is none, or one that was given up."""
+        with self._turn:
+            job = self._jobs.get(request)
+            if job is None or job.given_up:
+                job = _Job(request, place, self._cores)
+                Thread(target=self._do, args=[job], daemon=True).start()  # it keeps nobody from leaving
+                self._jobs[request] = job
+            job.waiting += 1
+            return job
+
+    def _leave(self, jobs: list[_Job], overtaken: bool) -> list[_Job]:
+        """Wait for jobs no longer; those that are given up, since nobody else does."""
+        with self._turn:
+            for job in jobs:
+                job.waiting -= 1
+            left = [job for job in jobs if not job.waiting and not (overtaken and job.builds)]
+            for job in left:  # all, before any has ended: a builder that starts now ends itself
+                job.give_up()
+        return left
 
     def _do(self, job: _Job) -> None:
-        with self._cores:
-            try:
-                job.meet()
-                error = None
-            except BaseException as raised:
-                error = raised
-            with self._turn:
+        error: BaseException | None = None
+        try:
+            job.meet()
+        except BaseException as raised:
+            error = raised
+        with self._turn:
+            if self._jobs.get(job.request) is job:
                 del self._jobs[job.request]
         if error is None:
             job.met.set_result(None)
@@ -91,10 +116,12 @@ class _Work:
             job.met.set_exception(error)
 
 
-@cache
-def _work(process: int) -> _Work:
-    """The work of a process: one that was forked has none of its own."""
-    return _Work()
+_works: dict[int, _Work] = {}
+
+
+def _work() -> _Work:
+    """The work of this process: one that was forked has its own."""
+    return _works.get(os.getpid()) or _works.setdefault(os.getpid(), _Work())
 
 
 def _wait(jobs: list[_Job]) -> None:
@@ -108,31 +135,32 @@ def _wait(jobs: list[_Job]) -> None:
 
 
 class _Job:
-    """A request that is to be met, and at last is; `place`: which of how many."""
+    """A request that is to be met, and at last is; `place`: which of how many; `waiting`: how many wait for it;
+    whether it `builds` already, and whether it was `given_up`."""
 
-    def __init__(self, request: CodeRequest, place: str) -> None:
-        self.request, self.met = request, Future[None]()
-        self._place = place
+    def __init__(self, request: CodeRequest, place: str, cores: Semaphore) -> None:
+        self.request, self.met, self.waiting = request, Future[None](), 0
+        self.builds = self.given_up = False
+        self._place, self._cores = place, cores
         self._builder: _Builder | None = None
-        self._given_up = False
 
     def give_up(self) -> None:
         """Have it end as soon as may be."""
-        self._given_up = True  # before the builder is ended: one that starts now ends itself
+        self.given_up = True  # before the builder is ended: one that starts now ends itself
         if builder := self._builder:
             builder.kill()
 
     def meet(self) -> None:
         """Meet the request."""
-        with self._turn():
+        with self._held(self.request.lock()):
             if self.request.entry() is None:  # no other process has built it meanwhile
-                logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
-                self.request.answer(self._built())
+                with self._core():
+                    logger.warning("compiling, once on this machine, %s: %s", self._place, self.request.title)
+                    self.request.answer(self._built())
 
     @contextmanager
-    def _turn(self) -> Iterator[None]:
+    def _held(self, lock: FileLock) -> Iterator[None]:
         """Hold the lock of what is requested, once no other process does."""
-        lock = self.request.lock()
         while not lock.is_locked:
             self._go_on()
             with suppress(Timeout):
@@ -142,8 +170,20 @@ class _Job:
         finally:
             lock.release()
 
+    @contextmanager
+    def _core(self) -> Iterator[None]:
+        """Have one of the cores, and build."""
+        while not self._cores.acquire(timeout=_PATIENCE):
+            self._go_on()
+        try:
+            self.builds = True
+            self._go_on()
+            yield
+        finally:
+            self._cores.release()
+
     def _go_on(self) -> None:
-        if self._given_up:
+        if self.given_up:
             raise RuntimeError("the kernels were not compiled: interrupted")
 
     def _built(self) -> str:
@@ -152,7 +192,7 @@ class _Job:
         while True:
             waiting = _taken(surroundings)
             self._builder = builder = waiting or _Builder(surroundings)
-            if self._given_up:
+            if self.given_up:
                 builder.kill()
             name = builder.build(self.request)
             self._builder = None
@@ -229,7 +269,8 @@ _taking = Lock()
 
 @atexit.register
 def _dismiss() -> None:
-    """End the builders of this process that wait."""
+    """End the builders of this process."""
+    _work().end()
     for builder in _waiting:
         if builder.surroundings.process == os.getpid():
             builder.kill()
