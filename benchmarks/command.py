@@ -151,8 +151,8 @@ def main() -> None:
     for command, goal in wanted.items():
         timed.append(time_command(command, goal, chosen.runs))
         print_table(HEAD, [timed[-1].row])
-    if chosen.write:
-        PAGE.write_text(page(timed, measured_on), encoding="utf-8")
+        if chosen.write:  # of what there is, should it be interrupted
+            PAGE.write_text(page(timed, measured_on), encoding="utf-8")
 
 
 def _check(cache: Path, *options: str) -> tuple[float, str]:
