@@ -24,6 +24,7 @@ from friso.identification.model_error import (
     with_possible_values,
 )
 from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
+from friso.identification.output_error.compliance import WORTH_TELLING, with_compliance
 from friso.identification.output_error.coverage import Coverage, coverage
 from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.fit import OutputErrorFit
@@ -37,6 +38,7 @@ from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, noise_of
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.progress import Progress, silent
+from friso.quantities import percent
 from friso.stage.controllers import CONTROLLER
 
 
@@ -108,6 +110,8 @@ def identify_moves(
     if not fit.explains(noise):
         fit = fit if fit.problem.closed else late_by_a_sample(fit)
         fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"))
+    if not (quality.failed or quality.rejected or is_free(flat)):
+        fit, quality = _with_compliance(fit, quality, log["position"][part], log.sample_time, inverse.bandwidth)
     fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
     estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
     if quality.failed:
@@ -147,6 +151,20 @@ def _with_directions(
         f"{apart.less:.2g} {unit} unexplained, both together {fit.left:.2g} {unit}"
     )
     return apart.fit, replace(quality, doubts=(*quality.doubts, doubt), spoilt=True)
+
+
+def _with_compliance(
+    fit: OutputErrorFit, quality: Quality, position: np.ndarray, sample_time: float, bandwidth: float
+) -> tuple[OutputErrorFit, Quality]:
+    """A fit with intervals that allow for a load on a compliant coupling, and the quality that says so."""
+    fit, share = with_compliance(fit, position, sample_time, bandwidth)
+    if share < WORTH_TELLING:
+        return fit, quality
+    doubt = (
+        "The force goes with the motion as that of a mass of which a part moves on a compliant coupling: the mass may "
+        f"be {percent(share)} smaller, and its interval reaches as far; a frequency response would show the coupling"
+    )
+    return fit, replace(quality, doubts=(*quality.doubts, doubt))
 
 
 def _with_changes(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,16 +57,14 @@ def drift_of_friction(fit: OutputErrorFit, velocity: np.ndarray) -> RecordDrift 
     the parameters, about the fit.
     """
     problem = fit.problem
-    names = [parameter.name for parameter in problem.parameters]
-    if "friction.coulomb" not in names:
+    if "friction.coulomb" not in [parameter.name for parameter in problem.parameters]:
         return None
-    free = np.isin(np.arange(len(names)), fit.free)
-    ((rest, slopes),) = problem.jacobians(fit.inner[None], free[None])
+    rest, slopes = fit.linearised()
     way = np.clip(velocity / (CREEPING * np.abs(velocity).max()), -1.0, 1.0)
     unit = SMALL * fit.value("friction.coulomb")
     bends = _bends(np.linspace(0.0, 1.0, len(rest)), problem.counted)
     forces = [base * bend for base in (-way, np.ones(len(way))) for bend in bends]
-    effects = [_effect(fit, rest, unit * force) / unit for force in forces]
+    effects = [effect_of(unit * force, fit, rest) / unit for force in forces]
     return _fitted(slopes, rest, effects, bends, problem.counted)
 
 
@@ -84,6 +83,21 @@ def _fitted(
 ) -> RecordDrift | None:
     """Least squares of a residual, shape (n,), on its derivatives to fitted numbers, shape (n, numbers), and to changes
     of friction and of constant force by the same `bends`, each of shape (n,)."""
+    explained = explained_by(slopes, rest, effects, counted)
+    if explained is None:
+        return None
+    moved, levels = explained
+    friction, constant = (part @ np.stack(bends) for part in np.split(levels, 2))
+    reaches = (float(np.abs(line).max()) for line in (friction, constant))
+    return RecordDrift(moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
+
+
+def explained_by(
+    slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """How far fitted numbers move, and the sizes of further effects beside them, that explain a residual, shape (n,);
+    derivatives of shape (n, numbers), effects and weights `counted` of shape (n,). None where the effects clearly
+    explain nothing."""
     every = np.column_stack([slopes, *effects])
     size = np.linalg.norm(every, axis=0)
     if not (np.isfinite(every).all() and (size > 0).all()):
@@ -93,10 +107,8 @@ def _fitted(
     independent = max(float(counted.sum()), 1.0) / correlation_length(left)
     if rest @ rest <= left @ left * (1 + chi2.ppf(SURE, len(effects)) / independent):
         return None
-    moved, levels = np.split(solution, [slopes.shape[1]])
-    friction, constant = (part @ np.stack(bends) for part in np.split(levels, 2))
-    reaches = (float(np.abs(line).max()) for line in (friction, constant))
-    return RecordDrift(moved, float(np.ptp(friction)), float(np.ptp(constant)), *reaches)
+    moved, sizes = np.split(solution, [slopes.shape[1]])
+    return moved, sizes
 
 
 def reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
@@ -108,6 +120,11 @@ def reaching(fit: OutputErrorFit, changes: RecordDrift) -> OutputErrorFit:
             further[i] += changes.friction_reach / fit.value(parameter.name)
         elif parameter.name.startswith("bias."):
             further[i] += changes.constant_reach
+    return reaching_over(fit, further)
+
+
+def reaching_over(fit: OutputErrorFit, further: np.ndarray) -> OutputErrorFit:
+    """The fit with deviations whose intervals reach `further`, shape (free,), each way."""
     deviation = np.sqrt(np.diag(fit.covariance))
     usable = np.isfinite(deviation) & (deviation > 0)
     wider = np.divide(further, COVERAGE * deviation, out=np.zeros_like(further), where=usable) + 1
@@ -131,7 +148,7 @@ def _bends(share: np.ndarray, counted: np.ndarray) -> list[np.ndarray]:
     return [shape - np.average(shape, weights=counted) for shape in shapes]
 
 
-def _effect(fit: OutputErrorFit, rest: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """What a further force [N] on the stage, shape (n,), changes of the residual of a fit."""
+def effect_of(force: np.ndarray, fit: OutputErrorFit, rest: np.ndarray) -> np.ndarray:
+    """What a further force [N] on the stage changes of the residual of a fit, `rest`; each of shape (n,)."""
     inputs = fit.problem.inputs
     return replace(fit.problem, inputs=replace(inputs, force=inputs.force + force)).residuals(fit.inner[None])[0] - rest

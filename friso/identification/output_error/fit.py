@@ -79,6 +79,12 @@ class OutputErrorFit:
         values = {parameter.name: parameter.outer(inner) for parameter, inner in parameters}
         return {**self.problem.flat, **keys_of(self.problem.flat, values)}
 
+    def linearised(self) -> tuple[np.ndarray, np.ndarray]:
+        """The residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
+        mask = np.isin(np.arange(len(self.inner)), self.free)
+        ((rest, slopes),) = self.problem.jacobians(self.inner[None], mask[None])
+        return rest, slopes
+
     def value(self, name: str) -> float:
         """The SI value of a parameter."""
         names = [parameter.name for parameter in self.problem.parameters]
