@@ -76,7 +76,7 @@ class AxisKind:
 
 _TURNED = re.compile(r"rad|N[*· ]m|kg[*· ]m")
 _PARTS = re.compile(r"(?<![A-Za-zµ^])(?P<prefix>[numµkM]??)(?P<base>kg|N|m)(?![A-Za-z])")
-_NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z]|[*·]m)(?:/m?s)?")
+_NUMBERS = re.compile(r"(?<=\d )(?:[numµkM]?m|k?N|m?N|kg)(?![A-Za-z]|[*·]m)(?:[*·]s/m|/m?s|/m)?(?![A-Za-z])")
 _SUFFIX = re.compile(r"(?P<name>.*?)(?P<unit>(?:_(?:m|n|ns|kg|s|s2|per|hz))*)")
 
 

@@ -17,15 +17,17 @@ from refusals import Refused, Wording
 import friso
 from friso.identification import moves as method
 from friso.identification.errors import errors_of
+from friso.identification.inverse_model import motion
 from friso.identification.logs.log import Log
 from friso.identification.moves import IdentifiedMoves, identify_moves, simulated_log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import profile as profiles
+from friso.identification.output_error.compliance import CUTOFF, with_compliance
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled
 from friso.identification.output_error.identifiable import BRISTLES
 from friso.identification.output_error.one_way import either_way
-from friso.identification.output_error.parameters import HIGHEST_RATIO, RATIO, SHORTEST, fit_parameters
+from friso.identification.output_error.parameters import HIGHEST_RATIO, MASS, RATIO, SHORTEST, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
 from friso.identification.output_error.refine import bounds_of, costs
 from friso.intervals import COVERAGE
@@ -166,14 +168,39 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
 
 def followed(log: Log, flat: dict[str, Any], count: int = 2500) -> OutputErrorFit:
     """A stage that follows the first moves of a log, fitted from its truth."""
-    part = slice(0, count)
+    truth = _at_truth(log, flat, slice(0, count))
+    return polished(truth.problem, truth.free, truth.inner)
+
+
+def _at_truth(log: Log, flat: dict[str, Any], part: slice) -> OutputErrorFit:
+    """A stage that follows a part of a log, with the true numbers, and a covariance that is next to nothing."""
     levels = {"mass": flat["masses.cart"], "offset": -flat["bias.cart"]}
     levels |= {name: flat[f"friction.{name}"] for name in ("coulomb", "viscous")}
     top = flat["motion.acceleration"] * flat["motion.acceleration_time"]
     parameters = fit_parameters(flat, levels, top, float(np.ptp(log["position"])), True)
     first = first_values(parameters)
     first[[one.name for one in parameters].index(RATIO)] = flat["friction.static"] / flat["friction.coulomb"]
-    return polished(tracking(flat, log, part, parameters, 20.0), tuple(range(len(parameters))), first)
+    problem, count = tracking(flat, log, part, parameters, 20.0), len(parameters)
+    return OutputErrorFit(problem, first, tuple(range(count)), 1e-12 * np.eye(count), np.zeros(len(problem.target)))
+
+
+def test_an_interval_of_the_mass_holds_what_a_load_behind_a_coupling_hides() -> None:
+    """A load of 10 % behind a coupling well above the motion makes the mass of a fit 1 % too large."""
+    machine, bandwidth = drawn(3, False), 10.0
+    log = moves(machine, bare=True)
+    moved = motion(log["position"], log.sample_time, CUTOFF * bandwidth).acceleration
+    load = np.gradient(np.gradient(moved, log.sample_time), log.sample_time)
+    load *= 0.1 * machine.flat["masses.cart"] / (2 * np.pi * 6 * bandwidth) ** 2
+    for hidden, off in ((0.0, 0.0), (1.0, 0.01)):
+        behind = replace(log, signals={**log.signals, "force": log["force"] - hidden * load})
+        rigid = _at_truth(behind, machine.flat, slice(0, 2500))
+        names = [parameter.name for parameter in rigid.problem.parameters]
+        free = tuple(names.index(name) for name in (MASS, "friction.coulomb", "friction.viscous", "bias.cart"))
+        heavier = rigid.inner + off * np.array([name == MASS for name in names])
+        fitted = replace(rigid, inner=heavier, free=free, covariance=1e-12 * np.eye(len(free)))
+        wider, share = with_compliance(fitted, log["position"][:2500], log.sample_time, bandwidth)
+        assert share == pytest.approx(off, rel=0.2, abs=2e-3)
+        assert COVERAGE * np.sqrt(wider.covariance[0, 0]) >= share
 
 
 def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:

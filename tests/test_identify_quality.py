@@ -13,7 +13,7 @@ import pytest
 from refusals import Wording
 from variants import VARIANTS
 
-from friso.identification.causes import causes
+from friso.identification.causes import causes, fragment
 from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
@@ -25,6 +25,7 @@ from friso.identification.model_error import (
     with_halves,
     with_model_error,
     with_possible_values,
+    without_bristles,
 )
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error.changes import changes_beside, inverse_reaching
@@ -202,6 +203,18 @@ def test_slow_friction_of_a_fit_that_lacks_something_is_less_certain() -> None:
     assert wide.half_width == pytest.approx(2 * stribeck.half_width)
 
 
+@pytest.mark.parametrize("wrong", [{"left": 1.0}, {"compliant": True}])
+def test_what_a_model_lacks_may_pass_for_bristles(wrong: dict[str, Any]) -> None:
+    good = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+    names = ("friction.bristle_stiffness", "friction.stribeck_velocity", "friction.bristle_damping")
+    estimates = tuple(Estimate.normal(name, "", 1.0, 0.1, "output error") for name in names)
+    correlation = np.array([[1.0, 0.2, 0.3], [0.2, 1.0, 0.4], [0.3, 0.4, 1.0]])
+    assert without_bristles(estimates, correlation, good) == (estimates, correlation)
+    answers, left = without_bristles(estimates, correlation, replace(good, **wrong))
+    assert [one.determined for one in answers] == [False, True, False]
+    assert left.tolist() == [[1.0]]
+
+
 def test_intervals_hold_only_values_that_keys_may_have() -> None:
     flat = VARIANTS["rigid"].flat()
     stiffness = Estimate("friction.bristle_stiffness", "N/m", 1e5, -1e4, 3e5, "")
@@ -368,15 +381,18 @@ def test_in_one_direction_no_interval_is_narrower_than_the_inverse_models() -> N
     assert fair.half_width <= viscous.half_width
 
 
-@pytest.mark.parametrize("what", ["a jump", "gaps", "coarse digits"])
+def test_a_record_in_pieces_says_how_little_is_fitted(wording: Wording) -> None:
+    log = axis()
+    assert fragment(log) == ""
+    wording(fragment(replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))))
+
+
+@pytest.mark.parametrize("what", ["a jump", "coarse digits"])
 def test_a_broken_record_says_what_is_broken(what: str, wording: Wording) -> None:
     log = axis()
-    if what == "gaps":
-        broken = replace(log, segments=tuple(slice(a, a + 400) for a in range(0, 7600, 401)))
-    else:
-        position = np.where(log.time > 3, log["position"] - 0.05, log["position"])
-        position = position if what == "a jump" else np.round(log["position"], 3)
-        broken = replace(log, signals={**log.signals, "position": position})
+    position = np.where(log.time > 3, log["position"] - 0.05, log["position"])
+    position = position if what == "a jump" else np.round(log["position"], 3)
+    broken = replace(log, signals={**log.signals, "position": position})
     wording(causes(broken, inverse_model(broken, 5.0), 0.0)[0].sentence)
 
 

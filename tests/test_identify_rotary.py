@@ -98,6 +98,7 @@ def test_units_of_an_axis_whose_forces_are_in_another_unit() -> None:
     amperes = LINEAR.per("A")
     assert [amperes.unit(unit) for unit in ("N", "kN", "N*s/m", "kg", "m/s")] == ["A", "kA", "A*s/m", "A*s^2/m", "m/s"]
     assert amperes.text("2 mm with 3 N of 5 kg") == "2 mm with 3 A of 5 A*s^2/m"
+    assert ROTARY.text("3 to 7 N*s/m, 2 N/m at 5 mm/s") == "3 to 7 N*m*s/rad, 2 N*m/rad at 5 mrad/s"
     assert [amperes.suffix(key) for key in ("force_n", "rate_n_per_s", "x_m")] == ["force_a", "rate_a_per_s", "x_m"]
     assert ROTARY.per("V").unit("kg") == "V*s^2/rad"
     volts = LINEAR.per("V")

@@ -129,7 +129,7 @@ def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
         ("acc_rms", ""),
         ("x_ref", ""),
         ("ms", ""),
-        ("force_N", "N"),
+        ("força_N", "N"),
         ("time_s", "s"),
         ("pos_in", ""),
         ("pos_min", ""),

@@ -43,20 +43,21 @@ def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
     """What may be wrong with a log that the inverse model does not describe, as far as the log tells; nothing where
     none of these explains it."""
     better = [Cause(other.sentence, other.model, True) for other in alternatives(log, inverse, cart_share)]
-    of_record = [_fragment(log), _jump(log), _coarse(log)]
+    of_record = [_jump(log), _coarse(log)]
     plain = [_constant(inverse, log.unit("force")), "" if better else _oscillation(inverse)]
     first, last = ([Cause(sentence) for sentence in sentences if sentence] for sentences in (of_record, plain))
     return [*first, *better, *_clipped(log), *last]
 
 
-def _fragment(log: Log) -> str:
+def fragment(log: Log) -> str:
+    """A sentence on a record of which gaps leave little to fit; "" for one that is whole, or nearly."""
     part, step = log.longest, log.sample_time
     count = part.stop - part.start
     if count > FRAGMENT * len(log.time):
         return ""
     return (
-        f"the record has gaps, and the longest stretch without one is {step * count:.3g} s of "
-        f"{step * len(log.time):.3g} s: export it without gaps"
+        f"The record has gaps, and the longest stretch without one, {step * count:.3g} s of "
+        f"{step * len(log.time):.3g} s, is all that is fitted: export it without gaps"
     )
 
 
@@ -100,4 +101,7 @@ def _oscillation(inverse: InverseModel) -> str:
     share = power[max(peak - 1, 0) : peak + 2].sum() / power.sum() if power.sum() > 0 else 0.0
     if share < PEAK or peak == 0:
         return ""
-    return f"{percent(share)} of the power of the residual is near {rates[peak]:.3g} Hz, probably a mode in the band"
+    return (
+        f"{percent(share)} of the power of the residual is near {rates[peak]:.3g} Hz: a mode in the band, or a force "
+        "that repeats along the way, such as cogging"
+    )

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.identification.causes import UNKNOWN, causes
+from friso.identification.causes import UNKNOWN, causes, fragment
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
@@ -44,12 +44,13 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
     left = fit.left
     noise_left = noise * fit.problem.passes
     flat, unit = fit.stage, log.unit("force")
-    plain = Quality(noise, left, noise_left, inverse.error, whole_error(flat, inverse))
+    doubts = [sentence for sentence in (fragment(log),) if sentence]
+    plain = Quality(noise, left, noise_left, inverse.error, whole_error(flat, inverse), tuple(doubts))
     if fit.problem.closed and fit.explains(noise):
         return plain
     force = float(np.sqrt(np.mean(log["force"][log.longest][fit.problem.counted > 0] ** 2)))
     beyond = inverse.error > POOR and left < UNSETTLED * force
-    doubts, poor = [], inverse.error > POOR and not beyond
+    poor = inverse.error > POOR and not beyond
     reasons = causes(log, inverse, cart_share) if plain.lacks_something or poor else []
     if beyond:
         reasons = [cause for cause in reasons if cause.without is None or CLEARLY * cause.without.error * force < left]

@@ -22,6 +22,7 @@ from friso.identification.model_error import (
     with_causes,
     with_halves,
     with_possible_values,
+    without_bristles,
 )
 from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
 from friso.identification.output_error.compliance import WORTH_TELLING, with_compliance
@@ -120,6 +121,7 @@ def identify_moves(
         estimates, correlation = of_inverse_model(inverse, flat, estimates)
     else:
         estimates = all_with_model_error(estimates, inverse, flat, quality)
+    estimates, correlation = without_bristles(estimates, correlation, quality)
     estimates, correlation = with_causes(estimates, correlation, inverse, flat, quality)
     estimates = with_halves(estimates, flat, quality)
     estimates, correlation = with_possible_values(estimates, correlation, flat)
@@ -164,7 +166,7 @@ def _with_compliance(
         "The force goes with the motion as that of a mass of which a part moves on a compliant coupling: the mass may "
         f"be {percent(share)} smaller, and its interval reaches as far; a frequency response would show the coupling"
     )
-    return fit, replace(quality, doubts=(*quality.doubts, doubt))
+    return fit, replace(quality, doubts=(*quality.doubts, doubt), compliant=True)
 
 
 def _with_changes(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.units import split_heading, unit_factor
+from friso.identification.logs.units import split_heading, unit_factor, without_accents
 from friso.quantities import quoted
 
 _SET = frozenset(
@@ -53,11 +53,16 @@ _KEYS = {
             "angolo",
             "posizione",
             "posicion",
+            "posicao",
         ]
     ),
-    "velocity": frozenset(["vel", "velo", "velocity", "speed", "geschwindigkeit", "vitesse", "velocidad"]),
+    "velocity": frozenset(
+        ["vel", "velo", "velocity", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocidade"]
+    ),
     "acceleration": frozenset(["acc", "accel", "acceleration"]),
-    "force": frozenset(["force", "torque", "current", "iq", "kraft", "strom", "drehmoment", "forza", "fuerza"]),
+    "force": frozenset(
+        ["force", "torque", "current", "iq", "kraft", "strom", "drehmoment", "forza", "fuerza", "forca"]
+    ),
     "disturbance": frozenset(["disturbance", "injected", "injection"]),
 }
 """Words in a name that tell what a channel is."""
@@ -80,8 +85,8 @@ class AssignedRole:
 
 
 def words(name: str) -> list[str]:
-    """Lower-case words of the last part of a dotted name: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
-    last = name.rstrip(". ").rsplit(".", 1)[-1]
+    """Lower-case words of the last part of a dotted name, without accents: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
+    last = without_accents(name).rstrip(". ").rsplit(".", 1)[-1]
     last = re.sub(r"([a-z])([A-Z])", r"\1 \2", last)
     parts = [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
     return [word for part in parts for word in _compound(part)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import unicodedata
 from functools import lru_cache
 
 from friso.axis import LINEAR, AxisKind
@@ -64,11 +65,16 @@ _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|
 _MEASURED_IN = {
     "s": {"t", "time", "zeit", "tempo", "temps", "tiempo"},
     "m": {"pos", "position", "x", "ref", "reference", "displacement"},
-    "N": {"force", "f", "kraft", "friction"},
+    "N": {"force", "f", "kraft", "friction", "forza", "fuerza", "forca"},
     "A": {"current", "iq", "i", "strom"},
     "V": {"voltage", "u", "command"},
 }
 """Words in a name that tell what is measured in these letters."""
+
+
+def without_accents(name: str) -> str:
+    """A name in plain letters: "força" is "forca"."""
+    return "".join(sign for sign in unicodedata.normalize("NFD", name) if not unicodedata.combining(sign))
 
 
 def spelled(text: str) -> str:
@@ -144,7 +150,7 @@ def _last_part(name: str) -> str:
     match = _GLUED.fullmatch(name)
     if match is None:
         return ""
-    words = {*re.split(r"[^a-z]+", match["stem"].lower())}
+    words = {*re.split(r"[^a-z]+", without_accents(match["stem"]).lower())}
     return match["unit"] or (match["letter"] if words & _MEASURED_IN[match["letter"]] else "")
 
 
