@@ -1,4 +1,5 @@
-"""Several things computed at once, each in a thread of its own: what runs leaves the interpreter to the others."""
+"""Several things computed at once, in as many threads as there are cores: what runs leaves the interpreter to the
+others."""
 
 from __future__ import annotations
 
@@ -19,21 +20,22 @@ _PATIENCE = 0.1
 
 
 _BESIDE: ContextVar[tuple[int, Sequence[Future]]] = ContextVar("beside", default=(1, ()))
-"""Among how many tasks the present one is, and those of them that have begun."""
+"""Among how many tasks the present one is, and the jobs of these."""
 
 
 def cores_to_use() -> int:
     """How many cores a batch of runs may take now: all, or its share beside the other tasks that still run. Fewer
     threads keep more of their lanes busy."""
-    tasks, begun = _BESIDE.get()
-    ended = sum(job.done() for job in begun)
+    tasks, jobs = _BESIDE.get()
+    ended = sum(job.done() for job in jobs)
     return max(1, usable_cores() // (tasks - ended))
 
 
 def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
-    """What the tasks return, in their order. What ends one of them early ends the others, too, at their next batch of
-    runs, and is raised. On a single core they are done one after the other."""
-    if len(tasks) < 2 or usable_cores() < 2:
+    """What the tasks return, in their order, as many of them at a time as there are cores. What ends one of them early
+    ends the others, too, at their next batch of runs, and is raised."""
+    at_once = min(len(tasks), usable_cores())
+    if at_once < 2:
         return [task() for task in tasks]
     flag = np.zeros(1, np.int64)
     jobs: list[Future[_T]] = []
@@ -42,7 +44,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
         _BESIDE.set((len(tasks), jobs))
         return task()
 
-    with ThreadPoolExecutor(len(tasks)) as pool:
+    with ThreadPoolExecutor(at_once) as pool:
         with ended_by(flag):
             jobs += [pool.submit(copy_context().run, beside_others, task) for task in tasks]
         try:
@@ -53,4 +55,5 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
             return [job.result() for job in jobs]
         except BaseException:
             flag[0] = 1
+            pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from friso.engine.side_by_side import side_by_side
 from friso.escapes import one_line
 from friso.progress import Tally
 from friso.shares import Share, share
@@ -120,24 +121,25 @@ def plausible(
     own: dict[str, Finding] = {}
     by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
     failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
-    for one in (*drawn, baseline()) if drawn else ():
-        groups = [(cheap, MAP_WORK)] + (
-            [(costly, COSTLY_WORK)] if one in drawn and one.number % EVERY == EVERY - 1 else []
-        )
-        for group, work in groups:
-            if not group:
-                continue
-            about = ("draw", sorted(group), POINTS, DRAW_RTOL, SEED, one.number)
-            findings = kept.findings(about, partial(_judged, group, one))
-            for name in group:
-                ways = _by_way(findings, name)
-                if one in drawn:
-                    by_claim_tried[name].append((one, ways))
-                    failures[name] |= {} if ways else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
-                elif COUNT in ways:
-                    own[name] = ways[COUNT]
-            if tally:
-                tally.add(work, f"{one.name} of {draws}" if one in drawn else "friso's own choice")
+    pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
+    pieces += [(one, costly, COSTLY_WORK) for one in drawn[EVERY - 1 :: EVERY] if costly]
+
+    def judged(one: Draw, group: Mapping[str, Registered], work: int) -> Findings:
+        about = ("draw", sorted(group), POINTS, DRAW_RTOL, SEED, one.number)
+        findings = kept.findings(about, partial(_judged, group, one))
+        if tally:
+            tally.add(work, f"{one.name} of {draws}" if one in drawn else "friso's own choice")
+        return findings
+
+    by_piece = side_by_side([partial(judged, *piece) for piece in pieces])
+    for (one, group, _), findings in zip(pieces, by_piece, strict=True):
+        for name in group:
+            ways = _by_way(findings, name)
+            if one in drawn:
+                by_claim_tried[name].append((one, ways))
+                failures[name] |= {} if ways else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
+            elif COUNT in ways:
+                own[name] = ways[COUNT]
     by_claim = {
         name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
     }

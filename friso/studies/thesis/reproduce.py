@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.engine.side_by_side import side_by_side
 from friso.errors import InputError
 from friso.frequency.bode import Bode, bode
 from friso.progress import Progress, Tally, silent
@@ -124,12 +126,16 @@ def reproduce(
         if part in EXPERIMENTS:
             getattr(base.experiments, part)
         tally.add(PART_WORK, part.replace("_", " "))
-    surveyed: dict[str, Surveyed] = {}
-    behind: dict[str, CyclesOnMap] = {}
-    for name, study in studies.items() if with_cycles else ():
-        surveyed[name] = survey(maps[name], kept)
-        behind[name] = map_cycles(study, maps[name], surveyed[name], kept)
+
+    def behind(study: ThesisStudy) -> tuple[Surveyed, CyclesOnMap]:
+        surveyed = survey(maps[study.name], kept)
+        cycles = map_cycles(study, maps[study.name], surveyed, kept)
         tally.add(SURVEY_WORK, f"what attracts, map {study.panel}")
+        return surveyed, cycles
+
+    found = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
+    surveyed = {name: of_map for name, (of_map, _) in zip(studies, found, strict=with_cycles)}
+    cycles = {name: of_map for name, (_, of_map) in zip(studies, found, strict=with_cycles)}
     ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
@@ -139,7 +145,7 @@ def reproduce(
     return Reproduction(
         shown.maps, shown.responses, base.linear, curves, base.identified if parts else None,
         frozenset(parts) & EXPERIMENTS.keys(), tolerances,
-        _changed(tolerances), verdicts, space, behind, points, rtol,
+        _changed(tolerances), verdicts, space, cycles, points, rtol,
     )  # fmt: skip
 
 
