@@ -44,8 +44,8 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
 
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
     """Put what `fill` writes in place of the store at `path`, whose lock is held, and which is deleted once that stands
-    there. Raises OSError, with the store as it was."""
-    with _made_aside(path, fill) as new:
+    there. Raises OSError, with the store as it was. Ctrl-C waits until one of the two stands there."""
+    with _made_aside(path, fill) as new, hold_interrupts():
         old = _free_name(path, _OLD)
         if not MOVES_OPEN_FOLDERS:
             lock.release()  # whoever takes it now keeps the folder from being renamed
