@@ -38,6 +38,8 @@ def percent(share: float, digits: int = 2, signed: bool = False) -> str:
         return NOTHING
     share = share if abs(share) > ROUNDING else 0.0
     number, plus = float(f"{100 * share:.{digits}g}"), "+" if signed else ""
+    if 0 < abs(number) < 1e-4:  # which g would write with an exponent
+        return f"{number:{plus}.{digits - 1 - math.floor(math.log10(abs(number)))}f} %"
     return f"{number:{plus}.0f} %" if abs(number) >= 10**digits else f"{number:{plus}g} %"
 
 

@@ -96,11 +96,12 @@ def test_values_in_sentences():
 
 def test_shares_in_percent_have_no_exponents():
     """A share of all is 100 %, not 1e+02 %."""
-    assert [percent(share) for share in (1.0, 0.954, 12.3, 0.00012, float("nan"))] == [
+    assert [percent(share) for share in (1.0, 0.954, 12.3, 0.00012, 1.9e-7, float("nan"))] == [
         "100 %",
         "95 %",
         "1200 %",
         "0.012 %",
+        "0.000019 %",
         "–",
     ]
 
@@ -266,3 +267,12 @@ def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     assert max(map(len, note)) < plotly_renderer.NARROW / 6
     assert narrow["height"] > wide["height"]
     assert narrow["annotations"][1]["yshift"] >= 4 * plotly_renderer.KEY_ROW
+
+
+@pytest.mark.parametrize(("columns", "lines", "orientation"), [(1, 6, "h"), (2, 2, "h"), (2, 6, "v")])
+def test_legends_beside_each_other_stay_above_their_axes(columns: int, lines: int, orientation: str) -> None:
+    """Plotly breaks the rows of a legend at the width of the figure: two that are wider than their axes overlap."""
+    series = tuple(Series(np.arange(2.0), np.arange(2.0), f"tuned to {k} Hz", GREY) for k in range(lines))
+    panel = Panel("model", Axis("x", ""), Axis("y", ""), series)
+    layout = plotly_renderer.parts(Figure("f", "", "", (panel,) * columns, columns))["layout"]
+    assert [layout[f"legend{name}"]["orientation"] for name in ("", "2")[:columns]] == [orientation] * columns

@@ -67,7 +67,7 @@ from friso.views.reproduce.document import reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
 from friso.views.reproduce.page import reproduce_files, reproduce_html
 from friso.views.reproduce.questions import QUESTIONS
-from friso.views.reproduce.words import details, in_order
+from friso.views.reproduce.words import SHORT, details, in_order, short
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
@@ -902,3 +902,14 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     assert reproduce_document(shown)["cycles"]["system"]["cells"] == 9
     labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
     assert "edge of the attracting cycle (flip)" in labels
+
+
+def test_what_is_shortened_ends_with_a_statement() -> None:
+    long = (
+        "the contact of cart and stage would, with the stiffness that Sec. 3.2.3 gives for limiters, not for bearings"
+        * 2
+    )
+    assert short(f"{long}. The next one. Assumed: nothing") == long
+    assert short("one; two. Three. Assumed: nothing") == "one; two. Three"
+    assert short(f"one. Two; {long}") == "one. Two"
+    assert len(short("A statement. " * 40)) <= SHORT

@@ -96,7 +96,7 @@ def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
     takes ten times as long as to make them. `width`: the least [px] that there is for the axes of all columns."""
     prepared = drawable(figure)
     plot = _plot_height(prepared, width)
-    heads = [_Head.of(panel, width // prepared.columns) for panel in prepared.panels]
+    heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
     header = max(head.height for head in heads)
     row = header + plot + FOOTER
     height = row * prepared.rows
@@ -124,6 +124,7 @@ def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
             x_domain = (x_domain[0], x_domain[1] - BAR)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
+        layout[f"legend{_suffix(number)}"] = heads[number].legend(x_domain[0], y_domain[1])
         layout["annotations"].append(heads[number].title(x_domain[0], y_domain[1]))
         traces += _traces(panel, number, bar)
     return {"data": traces + key_traces(prepared, key), "layout": layout}
@@ -131,24 +132,34 @@ def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class _Head:
-    """What stands above the axes of a panel: the lines of its title, and below them the rows of its legend."""
+    """What stands above the axes of a panel: the lines of its title, and below them the rows of its legend, whose
+    entries stand one below the other where they are `stacked`."""
 
     lines: tuple[str, ...]
     rows: int
+    stacked: bool
 
     @classmethod
-    def of(cls, panel: Panel, width: int) -> _Head:
-        """As title and legend are broken at this width [px]: entries stand in columns as wide as the longest."""
-        labels = _labels(panel)
+    def of(cls, panel: Panel, width: int, panels: int) -> _Head:
+        """As title and legend are broken where so many panels share this width [px]: entries stand in columns as wide
+        as the longest. Plotly breaks a row at the width of the figure alone, so beside other panels entries of more
+        than a row are stacked."""
+        labels, own = _labels(panel), width // panels
         entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
-        columns = max(1, int(width / entry))
-        lines = textwrap.wrap(panel.title, int(width / TITLE_LETTER)) or [""]
-        return cls(tuple(lines), max(1, math.ceil(len(labels) / columns)))
+        columns = max(1, int(own / entry))
+        stacked = panels > 1 and len(labels) > columns
+        lines = textwrap.wrap(panel.title, int(own / TITLE_LETTER)) or [""]
+        return cls(tuple(lines), max(1, len(labels) if stacked else math.ceil(len(labels) / columns)), stacked)
 
     @property
     def height(self) -> int:
         """Of all of it [px]."""
         return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
+
+    def legend(self, left: float, top: float) -> dict[str, Any]:
+        """The legend as plotly takes it, above axes that begin and end there, in shares of the figure."""
+        place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
+        return {"orientation": "v", "maxheight": 1, **place} if self.stacked else {"orientation": "h", **place}
 
     def title(self, left: float, top: float) -> dict[str, Any]:
         """The title as plotly takes it, above axes that begin and end there, in shares of the figure."""
@@ -186,7 +197,7 @@ def _add_panel(
     y_domain: tuple[float, float],
     links: dict[Axis, str],
 ) -> None:
-    """Axes and legend of one panel; panels with equal x axes are zoomed together."""
+    """The axes of a panel; panels with equal x axes are zoomed together."""
     suffix = _suffix(number)
     shape = {"constrain": "domain"} if panel.equal else {}
     x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
@@ -196,14 +207,6 @@ def _add_panel(
     layout[f"xaxis{suffix}"] = x_axis
     shape |= {"scaleanchor": f"x{suffix}"} if panel.equal else {}
     layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"} | shape
-    layout[f"legend{suffix}"] = {
-        "orientation": "h",
-        "x": x_domain[0],
-        "xanchor": "left",
-        "y": y_domain[1],
-        "yanchor": "bottom",
-        "bgcolor": "rgba(0,0,0,0)",
-    }
 
 
 def _axis(axis: Axis) -> dict[str, Any]:

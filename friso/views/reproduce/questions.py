@@ -184,4 +184,4 @@ def _number(verdict: object, part: int) -> str:
 
 
 def _gain_text(proportional: float, integral: float, derivative: float) -> str:
-    return f"kp {proportional:.4g} N/m, ki {integral:.4g} N/(m s), kd {derivative:.4g} N s/m"
+    return f"kp {proportional:.0f} N/m, ki {integral:.0f} N/(m s), kd {derivative:.4g} N s/m"

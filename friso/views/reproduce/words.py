@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -28,11 +29,10 @@ def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
 
 
 def short(text: str) -> str:
-    """The first statement of a number: up to its first semicolon or sentence, if that is short enough."""
+    """The first statements of a number or a reason, as many as stand within `SHORT` characters, but one at least."""
     first = text.split(". Assumed", 1)[0]
-    if len(first) > SHORT:
-        first = first.split("; ", 1)[0]
-    return first if len(first) <= SHORT else first[:SHORT].rsplit(" ", 1)[0] + " …"
+    ends = [match.start() for match in re.finditer(r"; |\. (?=[A-Z])|$", first)]
+    return first[: max((end for end in ends if end <= SHORT), default=ends[0])]
 
 
 def numbers(verdict: ClaimVerdict) -> str:

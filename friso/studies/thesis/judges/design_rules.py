@@ -51,7 +51,7 @@ def _soft(evidence: Evidence) -> Part:
         bool(softest.all() and np.mean(limit < stiffness[-1]) > 0.5),
         f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
         f"{limit.min():.3g} to "
-        f"{limit.max():.3g} N/m on",
+        f"{limit.max():.0f} N/m on",
     )
 
 
@@ -106,7 +106,7 @@ def _stroke(evidence: Evidence) -> Part:
     nearest = int(np.abs(stiffness - 2.4e3).argmin())
     needed = float(by_stiffness[nearest])
     return Part(
-        f"with {stiffness[nearest]:.3g} N/m at 8 Hz, nothing keeps moving from a stroke of {_STROKE * 1e3:g} mm on",
+        f"with {stiffness[nearest]:.0f} N/m at 8 Hz, nothing keeps moving from a stroke of {_STROKE * 1e3:g} mm on",
         needed <= _STROKE,
         f"{needed * 1e3:.3g} mm needed",
         why="it depends on the limiter's damping, which is open",

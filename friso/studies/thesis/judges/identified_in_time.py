@@ -130,7 +130,7 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
         name: [passage.spread / abs(passage.mean.value) for passage in friction.passes]
         for name, friction in named.items()
     }
-    listed = "; ".join(f"{name} {', '.join(f'{s:.2g}' for s in shares)}" for name, shares in swings.items())
+    listed = "; ".join(f"{name} {', '.join(map(percent, shares))}" for name, shares in swings.items())
     rows = tuple(
         (name, f"{1e3 * speed:g} mm/s", f"{passage.mean.value:.3g} N", percent(swing))
         for name, friction in named.items()

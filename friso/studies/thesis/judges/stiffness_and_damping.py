@@ -32,7 +32,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
     works = ~moving[0]  # strokes at which the softest joint of the range comes to rest
     rises = trend(stroke[works], limits[works])
     shortest = stroke[works][0] * 1e3 if works.any() else np.nan
-    span = f"{limits[works][0]:.3g} N/m at {shortest:.2g} mm, {limits[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
+    span = f"{limits[works][0]:.0f} N/m at {shortest:.2g} mm, {limits[-1]:.0f} N/m at {stroke[-1] * 1e3:.2g} mm"
     force = limits[works] * stroke[works]
     static = evidence.rig.flat()["friction.static"]
     why = (
@@ -49,7 +49,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
                 "at the largest stroke the stage comes to rest with the softest joint and keeps moving with the "
                 "stiffest",
                 bool(not moving[0, -1] and moving[-1, -1]),
-                f"limit {limits[-1]:.3g} N/m"
+                f"limit {limits[-1]:.0f} N/m"
                 if moving[:, -1].any()
                 else "comes to rest at every stiffness of the range",
             ),
