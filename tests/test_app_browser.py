@@ -310,6 +310,38 @@ def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_th
     assert float(page.input_value(field).split()[0]) > 20
 
 
+def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:
+    """Its text can be mended on the page."""
+    page = browsed.page
+    (tmp_path / "wrong.toml").write_text(RIG.read_text().replace('"8 Hz"', '"8 kg"'))
+    page.set_input_files("#file", tmp_path / "wrong.toml")
+    browsed.answered("convertible to Hz")
+    assert page.locator(".key, [data-part], .figure:visible, #pictures-bar button").count() == 0
+    assert page.is_disabled("#out")
+    page.click("text=Edit the file")
+    page.fill("#dialog textarea", RIG.read_text())
+    page.click("text=Use this text")
+    page.wait_for_selector(FIELD, timeout=30_000)
+    assert page.input_value(FIELD) == "8 Hz"
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+
+
+def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browsed: Browsed) -> None:
+    page, slider = browsed.page, '[data-path="controller.crossover"] input[type=range]'
+    page.click("#tab-bode")
+    told = "() => document.getElementById('picture').innerText.includes('How fast this controller can be')"
+    page.wait_for_function(told, timeout=60_000)
+    with page.expect_response(re.compile("ask/loops")):
+        page.eval_on_selector(slider, "one => { one.value = 300; one.dispatchEvent(new Event('input')); }")
+    page.wait_for_function(f"() => !({told})()")
+    assert page.locator(".figure:not(.stale) .main-svg").count() > 0
+    page.eval_on_selector(slider, "one => one.dispatchEvent(new Event('change'))")
+    page.wait_for_function(told, timeout=60_000)
+    page.click("#undo")
+    page.click("#tab-run")
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+
+
 def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> None:
     page, moved = browsed.page, motion()
     log = write_text(

@@ -67,16 +67,25 @@ def parts_of(
     asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any
 ) -> AnswerPart:
     """An answer as a page shows it, each figure with what is shown `beside`."""
+    return {**drawn(asked, answer, beside), **told(answer), **more}
+
+
+def drawn(asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure]) -> AnswerPart:
+    """The figures of an answer, without words."""
     with speaking_of(answer.axis_kind):
         figures = [figure_on_page(beside(figure), asked.narrow) for figure in answer.figures()]
+    return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}
+
+
+def told(answer: Answer) -> AnswerPart:
+    """The words of an answer, without figures: those that are shown stay."""
+    with speaking_of(answer.axis_kind):
         return {
             "kind": "answer",
             "sentences": [*answer.sentences()],
             "tables": [{"title": item.title, "columns": item.columns, "rows": item.rows} for item in answer.tables()],
             "details": [*answer.details()],
             "failure": answer.failure,
-            "figures": figures,
-            **more,
         }
 
 
@@ -126,12 +135,24 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The loop in the limit cases."""
+    """The loop in the limit cases: the figures, and then how fast the controller may be, which takes longer."""
+    answer, picture = _loops(asked, work)
+    lines = _lines("bode", asked)
+    yield {**picture, **lines, "kind": "partly"}
+    yield {**told(answer), **lines}
+
+
+def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """The same while a slider moves: the figures alone."""
+    yield {**_loops(asked, work)[1], **_lines("bode", asked)}
+
+
+def _loops(asked: PageRequest, work: Work) -> tuple[Answer, AnswerPart]:
     asked.chosen()
-    pinned = None if asked.pinned is None else friso.bode(asked.pinned.stage)
+    pinned = None if asked.pinned is None else _bode(asked.pinned)
     work.notes.clear()
     answer = friso.bode(asked.machine.stage, progress=work.progress)
-    yield parts_of(asked, answer, ghosts_of(pinned), **_lines("bode", asked))
+    return answer, drawn(asked, answer, ghosts_of(pinned))
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -262,6 +283,7 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
     "verdict": verdict,
     "check": check,
     "bode": bode,
+    "loops": loops,
     "flexure": flexure,
     "map": map_study,
     "boundary": boundary,
@@ -310,6 +332,11 @@ def _lines(
 @lru_cache(8)
 def _run(which: Machine) -> Any:
     return friso.simulate(which.stage)
+
+
+@lru_cache(2)
+def _bode(which: Machine) -> Any:
+    return friso.bode(which.stage)
 
 
 @lru_cache(2)

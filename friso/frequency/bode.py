@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,28 +71,51 @@ class Bode:
     """The linear analysis of a stage.
 
     `omega` (k,) [rad/s], the frequencies of all curves; the limit `cases` by name, among them, if asked for, those with
-    the thesis's formula for a touched limiter ("-series"); the `scan` of the family, and its loops over `omega`; its
-    `worst` member, and the worst of the `settled` ones (limit cases, and stuck under any bias), each with its margins;
-    the ranges of speed that are `unstable`; the loops at `prescribed` speeds of the cart, the limiter free; `limits` by
-    joint ("locked" and "free", or "given" without one); and, of a cascade, each of its loops, `cascades` by limit case.
+    the thesis's formula for a touched limiter ("-series"); the `scan` of the family; the loops at `prescribed` speeds
+    of the cart, the limiter free; and, of a cascade, each of its loops, `cascades` by limit case. What no figure shows
+    is computed once it is asked for.
     """
 
     stage: Stage
     omega: np.ndarray
     cases: Mapping[str, BodeCase]
     scan: Scan
-    loops: np.ndarray
-    worst: tuple[Members, Margins]
-    settled: tuple[Members, Margins]
-    unstable: tuple[Unstable, ...]
     prescribed: tuple[Prescribed, ...]
-    limits: Mapping[str, Limits]
     cascades: Mapping[str, CascadeLoops]
 
     @property
     def stable(self) -> bool:
         """Whether the one controller is stable in every state of the family."""
         return bool(self.scan.stable.all())
+
+    @cached_property
+    def loops(self) -> np.ndarray:
+        """The loops L of the family over `omega`, complex, shape (members, k)."""
+        return loops(self.scan.flat, self.scan.members, self.omega)
+
+    @cached_property
+    def worst(self) -> tuple[Members, Margins]:
+        """The worst member of the family, with its margins."""
+        return self._with_margins(self.scan.worst())
+
+    @cached_property
+    def settled(self) -> tuple[Members, Margins]:
+        """The worst of the settled members (limit cases, and stuck under any bias), with its margins."""
+        return self._with_margins(self.scan.worst(self.scan.members.settled))
+
+    @cached_property
+    def unstable(self) -> tuple[Unstable, ...]:
+        """The ranges of speed at which the stage is not stable."""
+        return _unstable(self.scan.flat, self.scan.members)
+
+    @cached_property
+    def limits(self) -> Mapping[str, Limits]:
+        """How fast the controller may be, by joint: "locked" and "free", or "given" without one."""
+        return {name: limits(flat) for name, flat in _by_joint(self.stage).items()}
+
+    def _with_margins(self, number: int) -> tuple[Members, Margins]:
+        member = self.scan.members[number]
+        return member, margins(self.scan.flat, member)
 
 
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
@@ -104,13 +128,13 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     states = {name: (flat, member) for name, member in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     margins_of = {name: margins(*state) for name, state in states.items()}
     low, high = band or _mattering(flat, margins_of.values())
+    for keys in _by_joint(
+        stage
+    ).values():  # whether the delay is too long is told now, not once the limits are asked for
+        closed_loop_poles(keys, concatenate_families([*limit_cases(keys).values()]))
     together = concatenate_families([*limit_cases(flat).values()])
     resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]
     omega = with_resonances(np.geomspace(low, high, POINTS) * 2 * np.pi, resonant)
-    scanned = scan_stability(flat, family(flat))
-    worst = scanned.members[scanned.worst()]
-    settled = scanned.members[scanned.worst(scanned.members.settled)]
-    variants = stage.variants()
     return Bode(
         stage=stage,
         omega=omega,
@@ -123,17 +147,16 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
             )
             for name, (keys, member) in states.items()
         },
-        scan=scanned,
-        loops=loops(flat, scanned.members, omega),
-        worst=(worst, margins(flat, worst)),
-        settled=(settled, margins(flat, settled)),
-        unstable=_unstable(flat, scanned.members),
+        scan=scan_stability(flat, family(flat)),
         prescribed=_prescribed(flat, omega),
-        limits={
-            name: limits(member.flat()) for name, member in variants.items() if name != "given" or len(variants) == 1
-        },
         cascades={name: cascade_loops(*state, omega) for name, state in states.items()} if is_cascade(flat) else {},
     )
+
+
+def _by_joint(stage: Stage) -> dict[str, Mapping[str, Any]]:
+    """The stage with its joint "locked" and "free", or as it is "given" without one."""
+    variants = stage.variants()
+    return {name: member.flat() for name, member in variants.items() if name != "given" or len(variants) == 1}
 
 
 def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Complex:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ from friso.frequency.family import (
 )
 from friso.frequency.members import Members, concatenate_families, family, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
+from friso.frequency.system import Complex
 
 WANTED = 0.5
 """Modulus margin that is called comfortable: a peak sensitivity of 2, 6 dB."""
@@ -69,10 +71,10 @@ class Limits:
 
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
-    ends, members = searched_crossovers(flat), settled_members(flat)
-    crossover = _stated(flat)
-    stable = stable_crossovers(flat, members)
-    close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
+    search = _Search(flat, settled_members(flat))
+    ends, crossover = search.ends, _stated(flat)
+    stable = search.stable()
+    close = ranges_below(search.at, lambda f: WANTED - search.distance(f).min(axis=1))
     comfortable = shared(close, stable)
     highest, calm = (range_end(ranges, crossover) for ranges in (stable, comfortable))
     above, beyond = (np.array([end * (1 + JUST) if end else crossover]) for end in (highest, calm))
@@ -82,15 +84,14 @@ def limits(flat: Mapping[str, Any]) -> Limits:
         comfortable,
         highest,
         calm,
-        first_lost=None if highest == ends[1] else members[int(_abscissa(flat, members, above)[0].argmax())],
-        closest=None if calm == ends[1] else members[int(_distance(flat, members, beyond)[0].argmin())],
+        first_lost=None if highest == ends[1] else search.members[int(search.abscissa(above)[0].argmax())],
+        closest=None if calm == ends[1] else search.members[int(search.distance(beyond)[0].argmin())],
     )
 
 
 def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range, ...]:
     """The crossovers [Hz] (or factors of the bandwidth) at which all members are stable."""
-    at = np.geomspace(*searched_crossovers(flat), STEPS)
-    return ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
+    return _Search(flat, members).stable()
 
 
 def range_end(ranges: Sequence[Range], crossover: float) -> float | None:
@@ -131,22 +132,54 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
     return faster(flat, crossover / _stated(flat))
 
 
-def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
-    """Real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
-    return _stability(flat, members, crossover).abscissa.reshape(len(crossover), len(members))
+@dataclass(frozen=True)
+class _Search:
+    """The members of a stage whose controller is made faster and slower; crossovers are of shape (crossovers,). What
+    does not depend on them is computed once."""
 
+    flat: Mapping[str, Any]
+    members: Members
 
-def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
-    """Least distance of the loop from -1, shape (crossovers, members)."""
-    # frequencies that show the loop at all crossovers searched, always the same: the distance stays a smooth function
-    omega = np.unique(
-        np.concatenate([frequency_grid(_at(flat, np.array(end)), DENSITY) for end in searched_crossovers(flat)])
-    )
-    loops_of, held = bare_loops(flat, members, omega), DriveTiming.of(flat).transfer(omega)
-    shared = np.array([distance_to_lines(loops_of(_at(flat, f)) * held) for f in crossover])
-    return np.minimum(shared, _stability(flat, members, crossover).resonant.reshape(shared.shape))
+    @cached_property
+    def ends(self) -> Range:
+        return searched_crossovers(self.flat)
 
+    @cached_property
+    def at(self) -> np.ndarray:
+        """The crossovers between which ends of ranges are looked for."""
+        return np.geomspace(*self.ends, STEPS)
 
-def _stability(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> PoleStability:
-    """All members at the first crossover, then at the second, and so on."""
-    return stability_by_poles(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
+    def stable(self) -> tuple[Range, ...]:
+        """The crossovers at which all members are stable."""
+        return ranges_below(self.at, lambda f: self.abscissa(f).max(axis=1))
+
+    def abscissa(self, crossover: np.ndarray) -> np.ndarray:
+        """Real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
+        return self._by_poles(crossover).abscissa.reshape(len(crossover), -1)
+
+    def distance(self, crossover: np.ndarray) -> np.ndarray:
+        """Least distance of the loop from -1, shape (crossovers, members)."""
+        omega, loops_of = self._loops
+        held = DriveTiming.of(self.flat).transfer(omega)
+        shared = np.array([distance_to_lines(loops_of(_at(self.flat, f)) * held) for f in crossover])
+        return np.minimum(shared, self._by_poles(crossover).resonant.reshape(shared.shape))
+
+    @cached_property
+    def _loops(self) -> tuple[np.ndarray, Callable[[Mapping[str, Any]], Complex]]:
+        """Frequencies [rad/s] that show the loop at all crossovers searched, always the same, so that the distance is a
+        smooth function; and the loops there for the keys of any controller."""
+        grids = [frequency_grid(_at(self.flat, np.array(end)), DENSITY) for end in self.ends]
+        omega = np.unique(np.concatenate(grids))
+        return omega, bare_loops(self.flat, self.members, omega)
+
+    def _by_poles(self, crossover: np.ndarray) -> PoleStability:
+        return self._by_poles_at_all if crossover is self.at else self._looked_at(crossover)
+
+    @cached_property
+    def _by_poles_at_all(self) -> PoleStability:
+        return self._looked_at(self.at)
+
+    def _looked_at(self, crossover: np.ndarray) -> PoleStability:
+        """All members at the first crossover, then at the second, and so on."""
+        keys = _at(self.flat, np.repeat(crossover, len(self.members)))
+        return stability_by_poles(keys, self.members.repeated(len(crossover)))

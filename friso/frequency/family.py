@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -44,16 +45,34 @@ CLOSEST = 16
 
 @dataclass(frozen=True)
 class Scan:
-    """Members with the real part of their rightmost closed-loop pole `abscissa` [1/s] and the least distance of their
-    loop from -1, `distance`, over frequencies, both of shape (members,)."""
+    """The `members` of a stage, with the keys `flat`: whether they are stable, and their modulus margins, which are
+    computed once they are asked for; arrays of shape (members,)."""
 
+    flat: Mapping[str, Any]
     members: Members
-    abscissa: np.ndarray
-    distance: np.ndarray
+    by_poles: PoleStability
+
+    @property
+    def abscissa(self) -> np.ndarray:
+        """Real part [1/s] of the rightmost closed-loop pole."""
+        return self.by_poles.abscissa
 
     @property
     def stable(self) -> np.ndarray:
         return self.abscissa < 0
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        """Least distance of the loop from -1: on frequencies that all share and about a member's own closed-loop
+        resonances, and exactly for those that come closest to -1 there."""
+        omega = frequency_grid(self.flat, DENSITY)
+        parts = (self.members[part] for part in _split(np.arange(len(self.members))))
+        shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(self.flat, part, omega)), parts))
+        distance = np.minimum(shared, self.by_poles.resonant)
+        for k in np.argsort(np.where(self.stable, distance, np.inf))[:CLOSEST]:
+            exact = margins(self.flat, self.members[k]).modulus_margin
+            distance[k] = distance[k] if np.isnan(exact) else exact
+        return distance
 
     def worst(self, among: np.ndarray | None = None) -> int:
         """The number of the worst (of those that `among` marks): the least stable if any is unstable, else the one
@@ -65,17 +84,8 @@ class Scan:
 
 
 def scan_stability(flat: Mapping[str, Any], members: Members) -> Scan:
-    """Stability of every member, and its modulus margin: on frequencies that all share and about its own closed-loop
-    resonances, and exactly for those that come closest to -1 there."""
-    omega = frequency_grid(flat, DENSITY)
-    by_poles = stability_by_poles(flat, members)
-    parts = (members[part] for part in _split(np.arange(len(members))))
-    shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(flat, part, omega)), parts))
-    distance = np.minimum(shared, by_poles.resonant)
-    for k in np.argsort(np.where(by_poles.abscissa < 0, distance, np.inf))[:CLOSEST]:
-        exact = margins(flat, members[k]).modulus_margin
-        distance[k] = distance[k] if np.isnan(exact) else exact
-    return Scan(members, by_poles.abscissa, distance)
+    """Stability of every member, and its modulus margin."""
+    return Scan(flat, members, stability_by_poles(flat, members))
 
 
 class PoleStability(NamedTuple):

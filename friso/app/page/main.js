@@ -81,7 +81,7 @@ function described(part) {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
     answers.progress(null);
-    if (!shown) return answers.refused(part.text);
+    if (!shown || held !== machines.current().text) return without(part.text);
     left();
     if (!$("keys").querySelector(".wrong")) answers.refused(part.text);
     return;
@@ -90,6 +90,7 @@ function described(part) {
   const another = wrong !== null || held !== machines.current().text;
   wrong = null;
   shown = part;
+  $("out").disabled = false;
   if (held !== machines.current().text) {
     held = machines.current().text;
     forgetRanges();
@@ -101,6 +102,20 @@ function described(part) {
   if (another) follow(machines.dragging());
   clearTimeout(timer);
   if (!machines.dragging()) timer = setTimeout(check, CHECKED_AFTER);
+}
+
+/** A file that holds no machine: nothing of another one stays beside it, and its text can be mended here. */
+function without(text) {
+  const { name, text: toml } = machines.current();
+  shown = null;
+  held = "";
+  verdict.stop();
+  pictures.none();
+  $("out").disabled = true;
+  document.title = plain(`${name}: friso`);
+  $("drawing").replaceChildren();
+  $("keys").replaceChildren(el("button", { type: "button", onclick: () => edit(toml, (mended) => machines.add(name, mended, true)) }, "Edit the file"));
+  answers.refused(text);
 }
 
 async function check() {

@@ -15,10 +15,8 @@ export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
   constructor(sent, tell) {
     Object.assign(this, { sent, tell, shown: "run", then: null, machine: null, answer: null, timer: 0, kept: new Map() });
-    this.live = new Live("run", "picture", 3000, (answer, then) => {
-      this.arrived(answer);
-      if (answer.kind !== "message") this.goOn(then);
-    });
+    this.live = this.follows("run");
+    this.loops = this.follows("loops");
     this.tabs = [
       { id: "run", label: "Run" },
       { id: "check", label: "Hunting" },
@@ -33,6 +31,14 @@ export class Pictures {
     this.own = { remedies: new Remedies(sent, tell), logs: new Logs(sent, tell) };
     window.addEventListener("resize", () => {
       if (this.narrow !== this.was) this.ask();
+    });
+  }
+
+  /** What answers a question again and again while a slider moves. */
+  follows(question) {
+    return new Live(question, "picture", 3000, (answer, then) => {
+      this.arrived(answer);
+      if (answer.kind !== "message") this.goOn(then);
     });
   }
 
@@ -65,6 +71,7 @@ export class Pictures {
     this.shown = id;
     this.goOn();
     this.live.stop();
+    this.loops.stop();
     this.beside.leave();
     const place = $("picture");
     if (this.plots) clear(this.plots);
@@ -72,6 +79,17 @@ export class Pictures {
     this.bar();
     this.begin(place);
     this.ask();
+  }
+
+  /** There is no machine. */
+  none() {
+    this.machine = null;
+    this.show("run");
+    this.live.stop();
+    if (this.plots) clear(this.plots);
+    this.below?.replaceChildren();
+    $("pictures-bar").replaceChildren();
+    $("picture").removeAttribute("aria-labelledby");
   }
 
   /** What stands above the plots of a tab. */
@@ -94,8 +112,9 @@ export class Pictures {
     if (!this.plots) this.begin($("picture"));
     if (this.shown === "run") this.live.ask(this.body(), then);
     else {
-      stale($("picture"));
       clearTimeout(this.timer);
+      if (dragged && this.shown === "bode") return this.loops.ask(this.body());
+      stale($("picture"));
       if (!dragged) this.timer = setTimeout(() => this.ask(), AT_REST);
     }
   }
@@ -135,7 +154,7 @@ export class Pictures {
     }
     if (answer.kind !== "partly") this.tell.progress(null);
     this.answer = answer;
-    draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) });
+    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) });
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = answer.drawing ? [this.drawn(answer.drawing)] : [];
     this.below.replaceChildren(...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
