@@ -24,10 +24,10 @@ class ExportAnswer(Answer):
         self.result, self.axis_kind = result, result.stage.axis_kind
 
     def sentences(self) -> Sequence[str]:
-        """What the numbers are, and what to know of them."""
-        from friso.views.export.words import notes, title
+        """The gains in units of drives, and what to know of them."""
+        from friso.views.export.words import sentences
 
-        return [f"{title(self.result)}, in the units of drives.", *(f"{note}." for note in notes(self.result))]
+        return sentences(self.result)
 
     def blocks(self) -> Sequence[str]:
         """The loop drawn, and the parameters of a drive."""

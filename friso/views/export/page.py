@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from friso.drives.gains import Gains
-from friso.views.export.words import COLUMNS, notes, rows, title
+from friso.views.export.words import COLUMNS, rows, sentences, title
 from friso.views.files import Content
 from friso.views.pages import Report
 
@@ -19,7 +19,7 @@ def export_files(gains: Gains) -> dict[str, Content]:
 def export_html(gains: Gains) -> str:
     """The whole page."""
     values = {
-        "notes": notes(gains),
+        "sentences": sentences(gains),
         "columns": COLUMNS,
         "rows": rows(gains),
         "drawing_of_loop": gains.diagram,

@@ -15,6 +15,12 @@ def title(gains: Gains) -> str:
     return f"Gains of {gains.stage.name or 'the stage'}"
 
 
+def sentences(gains: Gains) -> list[str]:
+    """The gains as they are typed into a drive, each in one of its units, and what to know of them."""
+    typed = [f"{row.symbol} = {_with_unit(row.values[min(1, len(row.values) - 1)])}" for row in gains.conversions]
+    return [f"{title(gains)}, in units of drives: {', '.join(typed)}.", *(f"{note}." for note in notes(gains))]
+
+
 def rows(gains: Gains) -> list[tuple[str, list[str]]]:
     """Each gain with its symbol and its values."""
     return [

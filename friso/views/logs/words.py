@@ -12,6 +12,9 @@ from friso.views.drawing.prefixes import NOTHING, range_with_unit, with_unit
 COLUMNS = ("Unit", "Role, and why", "Range", "Course", "Samples")
 """Columns of the table of channels."""
 
+PLAIN = 1e7
+"""Numbers below this one stand without an exponent."""
+
 _BLOCKS = "▁▂▃▄▅▆▇█"
 
 
@@ -58,7 +61,13 @@ def _range(channel: ChannelContent) -> str:
     ends = channel.range
     if ends is None:
         return NOTHING
-    return f"{ends[0]:.4g}" if ends[0] == ends[1] else f"{ends[0]:.4g} to {ends[1]:.4g}"
+    return " to ".join(_number(end) for end in dict.fromkeys(ends))
+
+
+def _number(value: float) -> str:
+    """Four digits, without an exponent where a plain number is as short to read."""
+    text = f"{value:.4g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < PLAIN else text
 
 
 def _samples(channel: ChannelContent) -> str:
