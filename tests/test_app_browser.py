@@ -329,14 +329,14 @@ def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, t
 def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browsed: Browsed) -> None:
     page, slider = browsed.page, '[data-path="controller.crossover"] input[type=range]'
     page.click("#tab-bode")
-    told = "() => document.getElementById('picture').innerText.includes('How fast this controller can be')"
-    page.wait_for_function(told, timeout=60_000)
+    said = "() => document.getElementById('picture').innerText.includes('How fast this controller can be')"
+    page.wait_for_function(said, timeout=60_000)
     with page.expect_response(re.compile("ask/loops")):
         page.eval_on_selector(slider, "one => { one.value = 300; one.dispatchEvent(new Event('input')); }")
-    page.wait_for_function(f"() => !({told})()")
+    page.wait_for_function(f"() => !({said})()")
     assert page.locator(".figure:not(.stale) .main-svg").count() > 0
     page.eval_on_selector(slider, "one => one.dispatchEvent(new Event('change'))")
-    page.wait_for_function(told, timeout=60_000)
+    page.wait_for_function(said, timeout=60_000)
     page.click("#undo")
     page.click("#tab-run")
     page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)

@@ -67,17 +67,17 @@ def parts_of(
     asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any
 ) -> AnswerPart:
     """An answer as a page shows it, each figure with what is shown `beside`."""
-    return {**drawn(asked, answer, beside), **told(answer), **more}
+    return {**figures_of(asked, answer, beside), **words_of(answer), **more}
 
 
-def drawn(asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure]) -> AnswerPart:
+def figures_of(asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure]) -> AnswerPart:
     """The figures of an answer, without words."""
     with speaking_of(answer.axis_kind):
         figures = [figure_on_page(beside(figure), asked.narrow) for figure in answer.figures()]
     return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}
 
 
-def told(answer: Answer) -> AnswerPart:
+def words_of(answer: Answer) -> AnswerPart:
     """The words of an answer, without figures: those that are shown stay."""
     with speaking_of(answer.axis_kind):
         return {
@@ -139,7 +139,7 @@ def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     answer, picture = _loops(asked, work)
     lines = _lines("bode", asked)
     yield {**picture, **lines, "kind": "partly"}
-    yield {**told(answer), **lines}
+    yield {**words_of(answer), **lines}
 
 
 def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -152,7 +152,7 @@ def _loops(asked: PageRequest, work: Work) -> tuple[Answer, AnswerPart]:
     pinned = None if asked.pinned is None else _bode(asked.pinned)
     work.notes.clear()
     answer = friso.bode(asked.machine.stage, progress=work.progress)
-    return answer, drawn(asked, answer, ghosts_of(pinned))
+    return answer, figures_of(asked, answer, ghosts_of(pinned))
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
