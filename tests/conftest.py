@@ -80,7 +80,7 @@ def unprinted() -> Iterator[None]:
     own. Figures that are files are drawn, but for tests that ask for `undrawn`."""
     from friso.views import pages  # slow
 
-    with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda figure, form: b"<svg/>")}}):
+    with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda figure, form, headed=True: b"<svg/>")}}):
         yield
 
 
@@ -95,7 +95,7 @@ def printed(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures that are files are empty: what is tested is beside them."""
-    monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", lambda figure, form: b"")
+    monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", lambda *_, **__: b"")
 
 
 @pytest.fixture(scope="session")

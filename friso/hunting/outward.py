@@ -236,7 +236,7 @@ class Outward:
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest, reserve = start, PRECISE
 
-        def over(point: Point) -> bool:
+        def over(_: Point, point: Point) -> bool:
             nonlocal farthest
             ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
             farthest = farthest if ended else point

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib import resources
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -103,5 +103,5 @@ def _escaped_text(value: Any) -> Any:
 
 def print_image(figure: Figure) -> str:
     """The figure as an SVG data address: what is printed, and what is seen without scripts."""
-    svg = matplotlib_renderer.image(replace(figure, title="", subject=""), "svg")
+    svg = matplotlib_renderer.image(figure, "svg", headed=False)
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

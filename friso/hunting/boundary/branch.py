@@ -44,18 +44,20 @@ TURN = 0.3
 
 @dataclass(frozen=True)
 class Point:
-    """A cycle on a branch, its place on the line, and the logarithms of its distance [m] and its time of return [s]."""
+    """A cycle on a branch, its place on the line, and the logarithms of its distance [m] and its time of return [s];
+    with the Jacobian that it was closed with (see `Followed`), if it was followed."""
 
     place: float
     distance: float
     time: float
     cycle: Cycles
+    jacobians: np.ndarray | None = None
 
     @classmethod
-    def of(cls, stages: Ensemble, place: float, cycle: Cycles) -> Point:
+    def of(cls, stages: Ensemble, place: float, cycle: Cycles, jacobians: np.ndarray | None = None) -> Point:
         """The point of one cycle."""
         distance = abs(float(cycle.states[0, stages.sticking]))
-        return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle)
+        return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle, jacobians)
 
     @property
     def multiplier(self) -> float:
@@ -99,20 +101,27 @@ class Tracer:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
         near it, or from about its own states (1, states); None if none is found."""
         border = Border(normal[None, :], np.array([normal @ target]))
-        begin = near.cycle.states * np.exp(target[1] - near.distance) if states is None else states
-        times = near.cycle.orbits.times * np.exp(target[2] - near.time)
-        orbits, places = close_along(self.family, begin, times, target[:1], border, self.sign, self.rtol, self.swings)
+        begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
+        if states is not None or near.jacobians is None:
+            begin = begin * np.exp(target[1] - near.distance) if states is None else states
+            times, place = times * np.exp(target[2] - near.time), target[:1]
+        orbits, places, jacobians = close_along(
+            self.family, begin, times, place, border, self.sign, self.rtol, self.swings, near.jacobians
+        )
         if not orbits.closed[0]:
             return None
         stages = self.family(np.zeros(1, np.int64), places)
         cycle = described(stages, orbits, self.rtol)
         if not np.isfinite(cycle.multiplier[0]) or not np.isfinite(cycle.amplitude[0]):
             return None
-        return Point.of(stages, float(places[0]), cycle)
+        return Point.of(stages, float(places[0]), cycle, jacobians)
 
-    def walk(self, start: Point, ahead: float, until: Callable[[Point], bool] | None = None) -> tuple[list[Point], str]:
-        """The points that follow the start on one side, and how they end; `ahead` is 1 or -1. The first point of which
-        `until` holds is the last, and asymmetric cycles are then followed on where they meet the symmetric one."""
+    def walk(
+        self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
+    ) -> tuple[list[Point], str]:
+        """The points that follow the start on one side, and how they end; `ahead` is 1 or -1. The first point of which,
+        with the one before it, `until` holds is the last, and asymmetric cycles are then followed on where they meet
+        the symmetric one."""
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
         while len(points) <= MOST:
             last = points[-1]
@@ -138,7 +147,7 @@ class Tracer:
             if until is None and self._is_mirrored(start, point):
                 return points[1:], "it meets the symmetric cycle"
             points.append(point)
-            if until is not None and until(point):
+            if until is not None and until(last, point):
                 return points[1:], REACHED
             step = min(1.5 * step, self.longest)
             if reason := self._stop(point):

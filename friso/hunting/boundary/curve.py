@@ -6,9 +6,11 @@ its own: at a flip it is moved along the key, at a fold, beyond which there is n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.polynomial.polynomial import polyder, polyfit, polyval
 
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
 from friso.hunting.boundary.locate import Bifurcation, LocatedPoint, corrected
@@ -70,6 +72,27 @@ class Curve:
         return np.array([spot.at for spot in self.spots])
 
 
+@dataclass(frozen=True)
+class Expected:
+    """About where a point of a curve will be, shape (2,), the logarithms of its cycle's distance [m] and time [s], the
+    cycle's states (1, states), and the direction of the curve there, shape (2,)."""
+
+    at: np.ndarray
+    size: np.ndarray
+    states: np.ndarray
+    direction: np.ndarray
+
+    @classmethod
+    def beyond(cls, spots: Sequence[Spot], step: float) -> Expected:
+        """A step beyond points of a curve: on the parabola through the last three, or the straight line through two."""
+        last = spots[-3:]
+        away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
+        rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
+        parabola = polyfit(away, rows, len(last) - 1)
+        there, ahead = polyval(step, parabola), polyval(step, polyder(parabola))
+        return cls(there[:2], there[2:4], there[None, 4:], _unit(ahead[:2]))
+
+
 class CurveTracer:
     """Follows the points of one kind through the box of two keys."""
 
@@ -78,21 +101,32 @@ class CurveTracer:
         self.kind: Bifurcation = kind
 
     def on_line(
-        self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, size: np.ndarray | None = None
+        self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, expected: Expected | None = None
     ) -> Spot | None:
-        """The point of the curve on the line through an origin of the box along a direction, found from one near it;
-        `size` is about what the logarithms of its distance and time will be."""
+        """The point of the curve on the line through an origin of the box along a direction, found from one near it, or
+        from about what is expected there."""
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol)
-        point = near.special.point
-        start = np.concatenate([[0.0], near.size if size is None else size])
+        point, special = near.special.point, near.special
+        size, states, slope = near.size, point.cycle.states, np.nan
+        if expected is not None:
+            size, states, slope = expected.size, expected.states, self._slope(near, across, expected)
+        start = np.concatenate([[0.0], size])
         direction, far = np.array([1.0, 0.0, 0.0]), reach
         if self.kind == "fold":
-            direction, far = near.special.direction * [0.0, 1.0, 1.0], DEEP
+            direction, far = special.direction * [0.0, 1.0, 1.0], DEEP
             direction = direction / np.linalg.norm(direction)
-        special = corrected(tracer, point, start, direction, self.kind, far)
-        if special is None or abs(special.point.place) > reach:
+        found = corrected(tracer, point, start, direction, self.kind, far, states, slope)
+        if found is None or abs(found.point.place) > reach:
             return None
-        return Spot(origin + special.point.place * across, special, across)
+        return Spot(origin + found.point.place * across, found, across)
+
+    def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
+        """About how fast the multiplier changes along the line on which a point is expected: across the curve as at the
+        point near it, along a line at an angle to it less."""
+        if self.kind == "fold":
+            return near.special.slope
+        normal = expected.direction[::-1] * [-1.0, 1.0]
+        return near.special.slope * float(normal @ across / (normal @ near.across) / near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
         """The whole curve through a point; None if no second point is found next to it."""
@@ -117,12 +151,13 @@ class CurveTracer:
         start, step = spots[0], FIRST
         direction = _unit(spots[1].at - spots[0].at)
         while len(spots) <= MOST:
-            before, last = spots[-2:]
+            last = spots[-1]
             ahead = last.at + step * direction
             if np.any((ahead < 0) | (ahead > 1)):
-                return [*spots, *self._at_the_side(last, direction, step)], END_OF_RANGE
-            size = last.size + step / np.linalg.norm(last.at - before.at) * (last.size - before.size)
-            spot = self.on_line(ahead, direction[::-1] * [-1.0, 1.0], last, ASIDE * step, size)
+                return [*spots, *self._at_the_side(spots, direction, step)], END_OF_RANGE
+            across, expected = direction[::-1] * [-1.0, 1.0], Expected.beyond(spots, step)
+            ahead = ahead + (expected.at - ahead) @ across * across
+            spot = self.on_line(ahead, across, last, ASIDE * step, expected)
             moved = np.zeros(2) if spot is None else spot.at - last.at
             if spot is None or moved @ direction < np.cos(TURN) * np.linalg.norm(moved):
                 step /= 2
@@ -135,15 +170,17 @@ class CurveTracer:
                 return spots, CLOSED
         return spots, "it was followed for as many steps as there may be"
 
-    def _at_the_side(self, last: Spot, direction: np.ndarray, step: float) -> list[Spot]:
+    def _at_the_side(self, spots: list[Spot], direction: np.ndarray, step: float) -> list[Spot]:
         """The point at which the curve leaves the box."""
+        last = spots[-1]
         with np.errstate(divide="ignore", invalid="ignore"):
             times = np.where(
                 direction > 0, (1 - last.at) / direction, np.where(direction < 0, -last.at / direction, np.inf)
             )
         side = int(np.argmin(times))
         across = np.array([0.0, 1.0]) if side == 0 else np.array([1.0, 0.0])
-        spot = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), across, last, 2 * step)
+        expected = Expected.beyond(spots, times[side])
+        spot = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), across, last, 2 * step, expected)
         inside = spot is not None and bool(np.all((spot.at >= 0) & (spot.at <= 1)))
         return [spot] if spot is not None and inside else []
 

@@ -24,13 +24,15 @@ TIGHTER = 0.01
 
 @dataclass(frozen=True)
 class LocatedPoint:
-    """A point at which a branch stops attracting (or begins to), with the direction of the branch there, and by how
-    much its place may be off: what the search has left, and the change at a hundredth of the tolerance."""
+    """A point at which a branch stops attracting (or begins to), with the direction of the branch there, by how much
+    its place may be off (what the search has left, and the change at a hundredth of the tolerance), and how fast the
+    multiplier changes along that direction."""
 
     kind: Bifurcation
     point: Point
     direction: np.ndarray
     error: float
+    slope: float = np.nan
 
 
 def distance_to(kind: Bifurcation, point: Point) -> float:
@@ -121,35 +123,41 @@ def _special_point(
     """The point with its error; infinite where it cannot be computed at the tighter tolerance."""
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
-        return LocatedPoint(kind, point, direction, np.inf)
+        return LocatedPoint(kind, point, direction, np.inf, slope)
     moved = (abs(distance_to(kind, tight) - distance_to(kind, point)) + abs(distance_to(kind, point))) / abs(slope)
-    return LocatedPoint(kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])))
+    return LocatedPoint(
+        kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])), slope
+    )
 
 
 def corrected(
-    tracer: Tracer, near: Point, origin: np.ndarray, direction: np.ndarray, kind: Bifurcation, reach: float
+    tracer: Tracer,
+    near: Point,
+    origin: np.ndarray,
+    direction: np.ndarray,
+    kind: Bifurcation,
+    reach: float,
+    states: np.ndarray,
+    slope: float = np.nan,
 ) -> LocatedPoint | None:
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
-    time), not farther from it than `reach`, from a cycle near it; None if there is none."""
-    points: dict[float, Point] = {}
-    latest, other = 0.0, ASIDE
-    for place in (latest, other):
-        point = tracer.solve(near, origin + place * direction, direction)
-        if point is None:
-            return None
-        points[place] = point
+    time), not farther from it than `reach`, from a cycle near it; None if there is none. The search begins with
+    about its `states` (1, states), and with the `slope` of the multiplier, if that is known."""
+    places, points = [0.0], [tracer.solve(near, origin, direction, states)]
     for _ in range(TRIES):
-        slope = (distance_to(kind, points[latest]) - distance_to(kind, points[other])) / (latest - other)
-        step = -distance_to(kind, points[latest]) / slope if slope else np.inf
-        if not abs(latest + step) <= reach:
+        if (latest := points[-1]) is None:
             return None
-        if abs(step) < PRECISE:
-            return _special_point(tracer, kind, points[latest], direction, slope)
-        other, latest = latest, latest + step
-        point = tracer.solve(points[other], origin + latest * direction, direction)
-        if point is None:
+        if len(points) > 1:
+            slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
+        step = -distance_to(kind, latest) / slope if slope else np.inf
+        if len(points) == 1 and not abs(step) <= reach:
+            step = ASIDE
+        elif not abs(places[-1] + step) <= reach:
             return None
-        points[latest] = point
+        elif abs(step) < PRECISE:
+            return _special_point(tracer, kind, latest, direction, slope)
+        places.append(places[-1] + step)
+        points.append(tracer.solve(latest, origin + places[-1] * direction, direction))
     return None
 
 

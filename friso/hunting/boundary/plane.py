@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -132,10 +131,10 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     across = (end - start) / mesh
     tracer = Tracer(space.lines(start[None], across[None]), cycle.sign, rtol, farthest=mesh)
     first = Point.of(space.stages(start[None]), 0.0, cycle)
-    points, reason = tracer.walk(first, 1.0)
-    for pair in pairwise([first, *points]):
-        kinds = changes(*pair)
-        if kinds:
-            special = located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
-            return (Spot(start + special.point.place * across, special, across) if special else None), reason
-    return None, reason
+    points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)))
+    pair = (*[first, *points][-2:],)
+    kinds = changes(*pair) if points else ()
+    if not kinds:
+        return None, reason
+    special = located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
+    return (Spot(start + special.point.place * across, special, across) if special else None), reason

@@ -21,6 +21,9 @@ WITHOUT_FRICTION = 1e-6
 PER_STAGE = ("symmetric", "length", "scales", "relaxed", "per_newton", "balancing")
 """Properties of the stages one by one, which are kept with them."""
 
+OF_ALL = ("structure", "kernel")
+"""Properties that all stages share, which are kept with any of them."""
+
 
 @dataclass(frozen=True)
 class Ensemble:
@@ -46,14 +49,15 @@ class Ensemble:
         flat = {key: value[numbers] if getattr(value, "ndim", 0) else value for key, value in self.flat.items()}
         taken = replace(self, flat=flat, count=len(numbers))
         computed = {name: value[numbers] for name, value in vars(self).items() if name in PER_STAGE}
-        vars(taken).update(computed)  # what has been computed of the stages already
+        shared = {name: value for name, value in vars(self).items() if name in OF_ALL}
+        vars(taken).update(computed | shared)  # what has been computed of the stages already
         return taken
 
     @cached_property
     def structure(self) -> Structure:
         return self.form or shared_structure(self.flat)
 
-    @property
+    @cached_property
     def kernel(self) -> Kernel:
         return kernel(self.structure)
 
@@ -176,7 +180,8 @@ class Ensemble:
         run_options = {"least_swing": np.inf, **run_options}
         options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **run_options)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
-        parts = list(run_chunks(kernel(self.structure, variational, along=along), flat, self.count, options, starts))
+        runs_by = kernel(self.structure, variational, along=along) if variational or along else self.kernel
+        parts = list(run_chunks(runs_by, flat, self.count, options, starts))
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
         rooms = [_with_room(part.results, room) for part in parts]
         results = rooms[0]

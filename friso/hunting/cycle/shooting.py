@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -131,6 +131,15 @@ Family = Callable[[np.ndarray, np.ndarray], Ensemble]
 """Stages that depend on a number each, their place: from their numbers (count,) and places (count,)."""
 
 
+class Followed(NamedTuple):
+    """Orbits, the places of their stages, and the last Jacobians that they were closed with, shape (count, states + 2,
+    states + 2), with which orbits near them may begin."""
+
+    orbits: Orbits
+    places: np.ndarray
+    jacobians: np.ndarray
+
+
 def close_along(
     family: Family,
     states: np.ndarray,
@@ -140,14 +149,19 @@ def close_along(
     sign: float,
     rtol: float,
     swings: int | None = None,
-) -> tuple[Orbits, np.ndarray]:
+    jacobians: np.ndarray | None = None,
+) -> Followed:
     """Close orbits as `close` does, from states and times [s], their stages being free to change their places so that
-    each comes to lie on its border; orbits and places. Goes round folds, at which there is no orbit at a place beyond.
+    each comes to lie on its border. Goes round folds, at which there is no orbit at a place beyond. With `jacobians`
+    of closed orbits at these states, times and places, or near them, the step to the border is made before anything is
+    run.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
+    if jacobians is not None:
+        following.begin_with(jacobians)
     orbits = _iterated(following).orbits
-    return replace(orbits, swings=swings or orbits.swings), following.best_places
+    return Followed(replace(orbits, swings=swings or orbits.swings), following.best_places, following.jacobians)
 
 
 _S = TypeVar("_S", bound="_Shooting")
@@ -201,8 +215,9 @@ class _Shooting:
         kept = self.serves[which] | self.chatters  # the others are shot once more from where they are
         self._keep_best(which[kept], gaps[kept])
         residual = self._residual(which, stages)
-        for k, miss, other in zip(which[kept], misses[kept], residual[kept], strict=True):
-            self._step(k, self.inverses[k] @ -np.concatenate([miss, other]), stages.sticking)
+        scales = stages.scales
+        for k, miss, other, scale in zip(which[kept], misses[kept], residual[kept], scales[kept], strict=True):
+            self._step(k, np.concatenate([miss, other]), stages.sticking, scale)
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
         """Derivatives of the misses and of the phase by the states and the time."""
@@ -232,15 +247,16 @@ class _Shooting:
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
-    def _step(self, k: int, step: np.ndarray, sticking: int) -> None:
-        """Take a step of one orbit, shortened to the stride."""
-        size = self.states.shape[1]
+    def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
+        """Take a step of one orbit, shortened to the stride; what it was. `scales` are those of its states."""
+        step, size = self.inverses[k] @ -residual, self.states.shape[1]
         far = abs(step[sticking]) / (STRIDE * abs(self.states[k, sticking]))
         late = abs(step[size]) / (STRIDE * self.times[k])
         step = step / max(far, late, 1.0)
         self.states[k] += step[:size]
         self.times[k] += step[size]
         self.places[k] += step[size + 1 :].sum()
+        return step
 
     @property
     def orbits(self) -> Orbits:
@@ -254,17 +270,56 @@ class _Following(_Shooting):
 
     border: Border
 
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        size = self.states.shape[1] + 2
+        self.jacobians = np.full((len(self.times), size, size), np.nan)
+        self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(
+            self.times
+        )  # a step, and what it was for
+
+    def begin_with(self, jacobians: np.ndarray) -> None:
+        """Take Jacobians of closed orbits to begin with, and the step with these to the border."""
+        self.jacobians = jacobians.copy()
+        which = np.arange(len(self.times))
+        stages = self.family(which, self.places)
+        self._set_border(which, stages)
+        residual, scales, gaps = self._residual(which, stages), stages.scales, np.zeros(self.states.shape[1])
+        for k in which:
+            self.inverses[k] = _inverse(self.jacobians[k])
+            self._step(k, np.concatenate([gaps, residual[k]]), stages.sticking, scales[k])
+            self.latest[k] = None  # its gaps are not known
+        self.serves[:] = True
+
+    def _step(self, k: int, residual: np.ndarray, sticking: int, scales: np.ndarray) -> np.ndarray:
+        """Take a step, once the Jacobian tells how far the last one came (Broyden 1965, doi:10.2307/2003941)."""
+        if latest := self.latest[k]:
+            step, before = latest
+            inverse, weights = self.inverses[k], np.concatenate([scales, [self.times[k], 1.0]]) ** -2.0
+            row, closer = weights * step @ inverse, inverse @ (residual - before)
+            if change := float(weights * step @ closer):
+                self.inverses[k] = inverse + np.outer(step - closer, row) / change
+                self.jacobians[k] = _inverse(self.inverses[k])
+        step = super()._step(k, residual, sticking, scales)
+        self.latest[k] = step, residual
+        return step
+
+    def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
+        """Derivatives of how far orbits are from their borders."""
+        along, out, late = self.border.normal[which].T
+        self.jacobians[which, -1] = 0.0
+        self.jacobians[which, -1, stages.sticking] = out / self.states[which, stages.sticking]
+        self.jacobians[which, -1, -2] = late / self.times[which]
+        self.jacobians[which, -1, -1] = along
+
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
-        plain = super()._jacobians(which, stages, shot)
-        size, line = shot.ends.shape[1], self.border
-        jacobians = np.pad(plain, ((0, 0), (0, 1), (0, 1)))
+        self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
         behind, ahead = self._beside(which)
-        jacobians[:, : size + 1, -1] = (ahead - behind) / (2 * NUDGE)
-        along, out, late = line.normal[which].T
-        jacobians[:, -1, stages.sticking] = out / self.states[which, stages.sticking]
-        jacobians[:, -1, size] = late / self.times[which]
-        jacobians[:, -1, -1] = along
-        return jacobians
+        self.jacobians[which, :-1, -1] = (ahead - behind) / (2 * NUDGE)
+        self._set_border(which, stages)
+        for k in which:
+            self.latest[k] = None
+        return self.jacobians[which]
 
     def _beside(self, which: np.ndarray) -> np.ndarray:
         """Where the orbits end, and how far their phase is off, with the stages a little farther back and ahead along

@@ -7,6 +7,7 @@ Texts are drawn as they stand: a dollar sign in a stage's name starts no formula
 from __future__ import annotations
 
 import io
+from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -26,6 +27,7 @@ from matplotlib.ticker import (
     NullFormatter,
     ScalarFormatter,
 )
+from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
 from friso.views.drawing.drawable import drawable, word_ticks
@@ -126,29 +128,37 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
     return places
 
 
-def image(figure: Figure, form: str) -> bytes:
-    """The figure as the bytes of a file; `form` is one of FORMATS (ValueError otherwise)."""
+def image(figure: Figure, form: str, headed: bool = True) -> bytes:
+    """The figure as the bytes of a file, with its heading or cut off below it; `form` is one of FORMATS (ValueError
+    otherwise)."""
     if form not in FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
     stream = io.BytesIO()
     with _style():
-        _laid_out(figure).savefig(stream, format=form, metadata=_METADATA[form])
+        canvas = _laid_out(figure)
+        if heading := canvas._suptitle:  # type: ignore[attr-defined]
+            heading.set_visible(headed)
+        height = canvas.get_figheight() - (HEADER_HEIGHT if heading and not headed else 0)
+        area = Bbox([[0, 0], [WIDTH, height]])
+        canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=None if headed else area)
     return stream.getvalue()
 
 
 def _laid_out(figure: Figure) -> Canvas:
-    """The figure on a canvas whose parts have their places; that of the last figure is kept for its next format."""
-    last = _last.get("canvas")
-    if last is None or last[0] is not figure:
-        canvas = render(figure)
-        if engine := canvas.get_layout_engine():
-            engine.execute(canvas)
-        canvas.set_layout_engine(None)  # with any, each format is drawn twice
-        last = _last["canvas"] = (figure, canvas)
-    return last[1]
+    """The figure on a canvas whose parts have their places; those of the last figures are kept for their next format: a
+    page shows them, and they are files as well."""
+    for drawn, canvas in tuple(_last):
+        if drawn is figure:
+            return canvas
+    canvas = render(figure)
+    if engine := canvas.get_layout_engine():
+        engine.execute(canvas)
+    canvas.set_layout_engine(None)  # with any, each format is drawn twice
+    _last.append((figure, canvas))
+    return canvas
 
 
-_last: dict[str, tuple[Figure, Canvas]] = {}
+_last: deque[tuple[Figure, Canvas]] = deque(maxlen=6)
 
 
 def save(figure: Figure, path: Path) -> None:
