@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyfit, polyval
 
+from friso.engine.side_by_side import side_by_side
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
 from friso.hunting.boundary.locate import Bifurcation, LocatedPoint, corrected
 from friso.hunting.boundary.space import Space
@@ -140,10 +142,10 @@ class CurveTracer:
                 break
         else:
             return None
-        after, last = self.walk([first, second])
+        ways = [first, second], [second, first]
+        (after, last), (before, beginning) = side_by_side([partial(self.walk, way) for way in ways])
         if last == CLOSED:
             return Curve(self.kind, self.sign, tuple(after), (CLOSED, CLOSED))
-        before, beginning = self.walk([second, first])
         return Curve(self.kind, self.sign, (*before[:1:-1], *after), (beginning, last))
 
     def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import count
 
 import numpy as np
 
+from friso.engine.side_by_side import side_by_side
 from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import END_OF_RANGE, Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
@@ -18,6 +21,9 @@ from friso.hunting.loop import unstable_among
 
 NODES = 13
 """Stages along either side of the grid from which curves are looked for."""
+
+PATIENCE = 60
+"""Points of a branch between two neighbours at most: one that winds for longer hardly leads to a curve."""
 
 SAME = 0.2
 """Distance of a curve from the way between two stages, as a share of it, at which their change is that of the curve."""
@@ -47,25 +53,11 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     basin appears."""
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
-    curves: list[Curve] = []
-    gaps: list[np.ndarray] = []
     stages = space.stages(points[allowed])
     hunting, searches = _searches(stages, rtol)
-    for cycles, inside, outside in searches:
-        new_curves: list[Curve] = []
-        for a, b in _changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes)):
-            if any(_crossed(curve, points[a], points[b]) for curve in new_curves):
-                continue
-            cycle = cycles.take(np.flatnonzero(allowed == a))
-            spot, end = _first(space, points[a], points[b], cycle, rtol)
-            if spot is None and end == END_OF_RANGE:  # the neighbour has the cycle too, it was not found there
-                continue
-            curve = spot and CurveTracer(space, spot.special.kind, cycle.sign, rtol).curve(spot)
-            if curve:
-                new_curves.append(curve)
-            else:
-                gaps.append((points[a] + points[b]) / 2)
-        curves += new_curves
+    found = side_by_side([partial(_sought, space, points, allowed, search, rtol) for search in searches])
+    curves = [curve for of_one, _ in found for curve in of_one]
+    gaps = [gap for _, of_one in found for gap in of_one]
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     undecided = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
     if undecided.size:
@@ -81,9 +73,41 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, unstable, tuple(gaps))
 
 
-def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:
-    """The hunting cycles of stages, and what to look for: cycles, the numbers of the stages on one side of a curve, and
-    of those on the other. A stage whose cycle could not be closed is on neither."""
+def _sought(
+    space: Space,
+    points: np.ndarray,
+    allowed: np.ndarray,
+    search: Search,
+    rtol: float,
+) -> tuple[list[Curve], list[np.ndarray]]:
+    """The curves between the stages on one side and on the other, and where none could be begun at; `allowed` are the
+    numbers of the stages among all points (points, 2)."""
+    curves: list[Curve] = []
+    gaps: list[np.ndarray] = []
+    cycles, inside, outside = search
+    nodes = round(np.sqrt(len(points)))
+    for a, b in _changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes)):
+        if any(_crossed(curve, points[a], points[b]) for curve in curves):
+            continue
+        cycle = cycles.take(np.flatnonzero(allowed == a))
+        spot, end = _first(space, points[a], points[b], cycle, rtol)
+        if spot is None and end == END_OF_RANGE:  # the neighbour has the cycle too, it was not found there
+            continue
+        curve = spot and CurveTracer(space, spot.special.kind, cycle.sign, rtol).curve(spot)
+        if curve:
+            curves.append(curve)
+        else:
+            gaps.append((points[a] + points[b]) / 2)
+    return curves, gaps
+
+
+Search = tuple[Cycles, np.ndarray, np.ndarray]
+"""Cycles, the numbers of the stages on one side of a curve, and of those on the other."""
+
+
+def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[Search]]:
+    """The hunting cycles of stages, and what to look for; where no cycle could be closed, the stage is on neither
+    side."""
     hunting, *pairs = families(stages, rtol)
     outside = ~hunting.attracting & ~hunting.uncertain
     searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
@@ -131,10 +155,10 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     across = (end - start) / mesh
     tracer = Tracer(space.lines(start[None], across[None]), cycle.sign, rtol, farthest=mesh)
     first = Point.of(space.stages(start[None]), 0.0, cycle)
-    points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)))
-    pair = (*[first, *points][-2:],)
-    kinds = changes(*pair) if points else ()
-    if not kinds:
+    steps = count(1)
+    points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= PATIENCE)
+    last, point = [first, first, *points][-2:]
+    if not (kinds := changes(last, point)):
         return None, reason
-    special = located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
+    special = located(tracer, last, point, "fold" if "fold" in kinds else kinds[0])
     return (Spot(start + special.point.place * across, special, across) if special else None), reason
