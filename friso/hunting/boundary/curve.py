@@ -91,7 +91,7 @@ class Expected:
         away = [-float(np.linalg.norm(spot.at - last[-1].at)) for spot in last]
         rows = [np.concatenate([spot.at, spot.size, spot.special.point.cycle.states[0]]) for spot in last]
         parabola = polyfit(away, rows, len(last) - 1)
-        there, ahead = polyval(step, parabola), polyval(step, polyder(parabola))
+        there, ahead = (np.asarray(polyval(step, of)) for of in (parabola, polyder(parabola)))
         return cls(there[:2], there[2:4], there[None, 4:], _unit(ahead[:2]))
 
 

@@ -274,9 +274,8 @@ class _Following(_Shooting):
         super().__init__(*arguments)
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
-        self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(
-            self.times
-        )  # a step, and what it was for
+        # of each orbit its last step, and what that was to bring to zero
+        self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
     def begin_with(self, jacobians: np.ndarray) -> None:
         """Take Jacobians of closed orbits to begin with, and the step with these to the border."""
@@ -285,7 +284,7 @@ class _Following(_Shooting):
         stages = self.family(which, self.places)
         self._set_border(which, stages)
         residual, scales, gaps = self._residual(which, stages), stages.scales, np.zeros(self.states.shape[1])
-        for k in which:
+        for k in range(len(which)):
             self.inverses[k] = _inverse(self.jacobians[k])
             self._step(k, np.concatenate([gaps, residual[k]]), stages.sticking, scales[k])
             self.latest[k] = None  # its gaps are not known
