@@ -117,10 +117,10 @@ class CurveTracer:
         if self.kind == "fold":
             direction, far = special.direction * [0.0, 1.0, 1.0], DEEP
             direction = direction / np.linalg.norm(direction)
-        found = corrected(tracer, point, start, direction, self.kind, far, states, slope)
-        if found is None or abs(found.point.place) > reach:
+        located = corrected(tracer, point, start, direction, self.kind, far, states, slope)
+        if located is None or abs(located.point.place) > reach:
             return None
-        return Spot(origin + found.point.place * across, found, across)
+        return Spot(origin + located.point.place * across, located, across)
 
     def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
         """About how fast the multiplier changes along the line on which a point is expected: across the curve as at the

@@ -55,9 +55,9 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])
     hunting, searches = _searches(stages, rtol)
-    found = side_by_side([partial(_sought, space, points, allowed, search, rtol) for search in searches])
-    curves = [curve for of_one, _ in found for curve in of_one]
-    gaps = [gap for _, of_one in found for gap in of_one]
+    parts = side_by_side([partial(_sought, space, points, allowed, search, rtol) for search in searches])
+    curves = [curve for of_one, _ in parts for curve in of_one]
+    gaps = [gap for _, of_one in parts for gap in of_one]
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     undecided = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
     if undecided.size:
@@ -77,7 +77,7 @@ def _sought(
     space: Space,
     points: np.ndarray,
     allowed: np.ndarray,
-    search: Search,
+    search: CurveSearch,
     rtol: float,
 ) -> tuple[list[Curve], list[np.ndarray]]:
     """The curves between the stages on one side and on the other, and where none could be begun at; `allowed` are the
@@ -101,11 +101,11 @@ def _sought(
     return curves, gaps
 
 
-Search = tuple[Cycles, np.ndarray, np.ndarray]
+CurveSearch = tuple[Cycles, np.ndarray, np.ndarray]
 """Cycles, the numbers of the stages on one side of a curve, and of those on the other."""
 
 
-def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[Search]]:
+def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[CurveSearch]]:
     """The hunting cycles of stages, and what to look for; where no cycle could be closed, the stage is on neither
     side."""
     hunting, *pairs = families(stages, rtol)
