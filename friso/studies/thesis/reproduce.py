@@ -133,9 +133,9 @@ def reproduce(
         tally.add(SURVEY_WORK, f"what attracts, map {study.panel}")
         return surveyed, cycles
 
-    found = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
-    surveyed = {name: of_map for name, (of_map, _) in zip(studies, found, strict=with_cycles)}
-    cycles = {name: of_map for name, (_, of_map) in zip(studies, found, strict=with_cycles)}
+    studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
+    surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
+    cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
     ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
