@@ -180,7 +180,8 @@ def main() -> None:
         begun = perf_counter()
         advice = tune(stage, goal, chosen=options.ways)
         seconds = perf_counter() - begun
-        machines = machines_of_search(stage, Correlations(), Budget(), advice.seed).take(np.arange(Budget().machines))
+        machines = machines_of_search(stage, Correlations(), Budget(), advice.seed, goal, stage)
+        machines = machines.take(np.arange(Budget().machines))
         fresh = draw_fleet(stage, Correlations(), options.fresh, 77)
         for outcome in advice.outcomes:
             row = (name, outcome.remedy.name, outcome.certainty)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.kernel import KernelRequest, kernels
+from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
 from friso.equations.settings import SETTINGS
 from friso.equations.structure import structure
@@ -25,6 +26,7 @@ from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
 from friso.remedies.search import Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
+from friso.remedies.trials import modulus_margins
 from friso.remedies.verified import (
     Performance,
     RemedyOutcome,
@@ -51,6 +53,13 @@ FRESH = 1000
 
 UNSEEN = 2000
 """The same for those on which no choice was made either."""
+
+USUAL, MANY = 3000, 200
+"""The same for those that tell how robust machines usually are, and how many of these."""
+
+FAR, FEW = 0.5, 0.2
+"""A machine is far less robust with less than this share of the modulus margin of others; and how many are a few, as a
+share of those that may miss the goal."""
 
 
 @dataclass(frozen=True)
@@ -132,7 +141,7 @@ def tune(
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     fresh = draw_fleet(ideal, correlations, budget.fresh, seed + FRESH)
     unseen = draw_fleet(ideal, correlations, budget.fresh, seed + UNSEEN)
-    machines = machines_of_search(ideal, correlations, budget, seed)
+    machines = machines_of_search(ideal, correlations, budget, seed, goal, stage)
     report("the stage as it is")
     case, present = verified(ideal), performance_of(ideal, fresh, goal, stage)
     if not unmet_goals(case, present, goal):
@@ -174,9 +183,20 @@ def tune(
     )
 
 
-def machines_of_search(stage: Stage, correlations: Correlations, budget: Budget, seed: int) -> Fleet:
-    """The machines that searches see: for settings that settle soonest the first of them."""
-    return draw_fleet(stage, correlations, MORE * budget.machines, seed)
+def machines_of_search(
+    stage: Stage, correlations: Correlations, budget: Budget, seed: int, goal: Goal, drive: Stage
+) -> Fleet:
+    """The machines that searches see: for settings that settle soonest the first of them. One that is far less robust
+    than all but a few of the share that may miss the goal would stand for many among so few: it is left out, and
+    another taken twice. The sampling and delay are those of the stage `drive`."""
+    machines = draw_fleet(stage, correlations, MORE * budget.machines, seed)
+    many = draw_fleet(stage, correlations, MANY, seed + USUAL)
+    own, flat = Remedy.settled_on("", stage), drive.flat()
+    robust = limits(linear_flat(drive, flat)).highest_comfortable
+    slower = max(1.0, (bandwidth(flat) or 1.0) / robust) if robust else 1.0
+    seen, usual = (modulus_margins(own, np.zeros((1, 0)), fleet, drive, slower)[0] for fleet in (machines, many))
+    common = np.flatnonzero(seen >= FAR * np.quantile(usual, FEW * (1 - goal.share)))
+    return machines.take(np.resize(common, machines.count))
 
 
 @dataclass

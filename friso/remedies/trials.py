@@ -80,10 +80,13 @@ def timing(drive: Stage) -> dict[str, float]:
 
 
 @np.errstate(all="ignore")
-def modulus_margins(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage) -> np.ndarray:
+def modulus_margins(
+    remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float = 1.0
+) -> np.ndarray:
     """The least modulus margin of the limit cases (0: not stable), shape (points, machines), with the sampling and
-    delay of the stage `drive`."""
+    delay of the stage `drive`, and a bandwidth lower by a factor `slower`."""
     flat = {**machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), **timing(drive)}
+    flat = faster(flat, 1 / slower)
     count = len(shares) * machines.count
     return linear_loops(remedy.stage, linear_flat(drive, flat), count).margin.reshape(len(shares), machines.count)
 

@@ -26,6 +26,9 @@ from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, share
 from friso.views.loop_words import unstable_loop
 from friso.views.machine_words import spread_sentences
 
+GIVEN_UP = "given up"
+"""What stands for a remedy of which no setting could be tried within its work."""
+
 DOUBTS = {
     "verdict": "friso check does not say that it settles",
     "certain": "friso check is not certain that nothing attracts it",
@@ -271,7 +274,8 @@ def failing(tuning: Advice) -> list[str]:
     lines = []
     for outcome in tuning.outcomes:
         if outcome.certainty == "does not work":
-            lines.append(f"{outcome.remedy.name}: does not work. {why_unmet(outcome, tuning)}")
+            verdict = GIVEN_UP if outcome.points is None else "does not work"
+            lines.append(f"{outcome.remedy.name}: {verdict}. {why_unmet(outcome, tuning)}")
         elif outcome.certainty == "unsure" and tuning.working:
             lines.append(f"{outcome.remedy.name}: not sure to work: {unsure_why(outcome)}.")
     return lines
@@ -280,7 +284,7 @@ def failing(tuning: Advice) -> list[str]:
 def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Why no setting of a remedy meets the goal."""
     if outcome.points is None:
-        return "It was given up: its motions take too much computing."
+        return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
     sentence = next(_reasons(points, outcome, goal))
     return f"{sentence}{_edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ''}"
@@ -342,9 +346,11 @@ def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
     for outcome in tuning.outcomes:
-        cells = [words[outcome.certainty], *[NOTHING] * (len(COLUMNS) - 1)]
+        untried = outcome.certainty == "does not work" and outcome.points is None
+        works = GIVEN_UP if untried else words[outcome.certainty]
+        cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
         if outcome.measured is not None:
-            cells = _row(outcome.measured, tuning, words[outcome.certainty])
+            cells = _row(outcome.measured, tuning, works)
         table.append((outcome.remedy.name, cells))
     return table
 
