@@ -13,6 +13,7 @@ from friso.identification.inverse_model import InverseModel
 from friso.identification.output_error.identifiable import BRISTLES
 from friso.identification.output_error.parameters import is_free
 from friso.identification.quality import Quality
+from friso.identification.slow_records import without
 from friso.quantities import non_negative, positive
 from friso.stage import numeric_keys
 
@@ -66,12 +67,7 @@ def without_bristles(
     an interval that did not hold it when it was twice as wide as its noise allowed."""
     if not (quality.lacks_something or quality.compliant):
         return tuple(estimates), correlation
-    kept = [one.name not in BRISTLES for one in estimates if one.determined]
-    answers = tuple(
-        Estimate.unknown(one.name, one.unit, one.method, IMITATED) if one.determined and one.name in BRISTLES else one
-        for one in estimates
-    )
-    return answers, correlation[np.ix_(kept, kept)]
+    return without(estimates, correlation, dict.fromkeys(BRISTLES, IMITATED))
 
 
 def with_causes(

@@ -40,7 +40,7 @@ def without_sliding(
         return tuple(estimates), correlation
     dry = f": {level.value:.3g} {unit} is dry friction there" if level else ""
     why = f"the log moves at {top * 1e3:.3g} mm/s at most, where the Stribeck effect may still act{dry}"
-    return _without(estimates, correlation, dict.fromkeys(SLIDING, why))
+    return without(estimates, correlation, dict.fromkeys(SLIDING, why))
 
 
 def with_unexplained_inertia(
@@ -57,7 +57,7 @@ def with_unexplained_inertia(
     if inertia < unexplained:
         left = f"{unexplained:.2g} {unit}"
         why = f"its inertia, {inertia:.2g} {unit}, is less than what the model leaves unexplained, {left}"
-        return _without(estimates, correlation, dict.fromkeys(masses, why))
+        return without(estimates, correlation, dict.fromkeys(masses, why))
     least = (unexplained / inertia) ** 2 if masses and inertia > 0 else 0.0
     return tuple(_no_narrower(one, least) if one.name in masses else one for one in estimates), correlation
 
@@ -68,7 +68,7 @@ def _no_narrower(estimate: Estimate, share: float) -> Estimate:
     return replace(estimate, low=min(estimate.low, estimate.value - off), high=max(estimate.high, estimate.value + off))
 
 
-def _without(estimates: Sequence[Estimate], correlation: np.ndarray, reasons: Mapping[str, str]) -> Known:
+def without(estimates: Sequence[Estimate], correlation: np.ndarray, reasons: Mapping[str, str]) -> Known:
     """The estimates without those for which there are reasons."""
     kept = [estimate.name not in reasons for estimate in estimates if estimate.determined]
     answers = tuple(_withdrawn(estimate, reasons.get(estimate.name, "")) for estimate in estimates)
