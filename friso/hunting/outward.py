@@ -64,8 +64,9 @@ FINER = 4
 @dataclass(frozen=True)
 class AttractionEnd:
     """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
-    orbit was followed to its end at `inside`, and simulations at `outside` all settled. That end is known up to a share
-    of it, the `reserve`."""
+    orbit was followed to its end at `inside`, and simulations at `outside` all settled; or where it was followed to
+    `inside` and lost there, and simulations all settled that began about it at factors in between as well. That end is
+    known up to a share of it, the `reserve`: of an orbit that was lost to the first of these."""
 
     inside: float
     outside: float
@@ -92,6 +93,14 @@ class _Suggested:
     cycles: tuple[Cycles, ...]
     motions: list[Swinging]
     held: np.ndarray
+
+    def like(self, orbit: Swinging) -> np.ndarray:
+        """At which factors there is a cycle of the kind of an orbit, attracting or not, (factors,)."""
+        assert orbit.cycles is not None
+        kind, found = (orbit.cycles.sign, orbit.cycles.swings), np.zeros(len(self.factors), bool)
+        for cycles in self.cycles:
+            found |= cycles.closed & ((cycles.sign, cycles.swings) == kind)
+        return found
 
     def of(self, numbers: np.ndarray) -> tuple[Cycles, ...]:
         """The cycles at the factors with these numbers."""
@@ -149,9 +158,11 @@ class Outward:
             if survey.attracts[0]:
                 place.at, place.motions = next_to, survey.motions
                 continue
-            closer, decided = self._between(suggested)
+            known_beyond = suggested.like(orbit) if ended else np.zeros(suggested.factors.size, bool)
+            closer, decided = self._between(suggested, ALONG * distance, known_beyond)
             if closer is None:
-                return AttractionEnd(at, next_to, ended and decided and bool(survey.decided[0]), reserve)
+                known = reserve if ended else max(reserve, abs(float(suggested.factors[0]) / at - 1))
+                return AttractionEnd(at, next_to, decided and bool(survey.decided[0]), known)
             (place.at, place.motions), place.outside = closer, next_to
         return self._quiet_from(place.at, place.motions)
 
@@ -164,18 +175,22 @@ class Outward:
         motions = [m for family in cycles for m in of_cycles(np.arange(factors.size), family, stages.sticking)]
         return _Suggested(factors, cycles, motions, np.hstack([held_beside(stages, family) for family in cycles]))
 
-    def _between(self, suggested: _Suggested) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
+    def _between(
+        self, suggested: _Suggested, distances: np.ndarray, known_beyond: np.ndarray
+    ) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
         """The last factor but that next to an end, at which nothing attracts, at which something does of what is
-        suggested, and what; None if there is none; and whether that is decided."""
+        suggested, or of what simulations find that begin at `distances` [m], (n,), about the orbit that ended, too;
+        and what; None if there is none; and whether that is decided. Where that orbit is `known_beyond` its end,
+        (factors,), its return map tells what attracts beside it, and is tried alone."""
         last = len(suggested.factors) - 1
         motions, decided = [motion for motion in suggested.motions if motion.stage < last], True
         nearest = max((motion.stage for motion in motions), default=-1)
-        doubtful = np.flatnonzero(np.isfinite(suggested.held[:last]).any(axis=1))
+        about = np.where(known_beyond[:last, None], np.nan, distances)
+        starts = np.hstack([suggested.held[:last], about])
+        doubtful = np.flatnonzero(np.isfinite(starts).any(axis=1))
         doubtful = doubtful[doubtful > nearest]
         if doubtful.size:
-            survey = self.surveyed(
-                suggested.factors[doubtful], suggested.held[doubtful], suggested=suggested.of(doubtful)
-            )
+            survey = self.surveyed(suggested.factors[doubtful], starts[doubtful], suggested=suggested.of(doubtful))
             motions += [replace(motion, stage=int(doubtful[motion.stage])) for motion in survey.motions]
             decided = bool(survey.decided.all())
         if not motions:
@@ -266,11 +281,14 @@ class Outward:
         flip: tuple[float, float] | None = None
         for _ in range(2):
             factors = np.geomspace(at, outside, SPREAD)
-            cycles = hunting_cycles(self._stages(factors))
-            closed = np.flatnonzero(cycles.closed)
-            if closed.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[closed]) - 1)):
+            beyond = self._excess(factors[ENOUGH:])
+            if not np.any(beyond > 0):  # it ends in another way
                 break
-            places, excess = np.linspace(0, 1, SPREAD)[closed], np.abs(cycles.multiplier[closed]) - 1
+            excess = np.append(self._excess(factors[:ENOUGH]), beyond)
+            closed = np.isfinite(excess)
+            if np.count_nonzero(closed) < ENOUGH or not np.any(excess < 0):
+                break
+            places, excess = np.linspace(0, 1, SPREAD)[closed], excess[closed]
             curve = np.polyfit(places, excess, 3)
             roots = np.roots(curve)
             real = roots.real[np.abs(roots.imag) < 1e-9]
@@ -285,6 +303,11 @@ class Outward:
             flip = flip_at, uncertainty if before is None else max(uncertainty, abs(flip_at / before[0] - 1))
             at, outside = flip_at / NEAR, flip_at * NEAR  # a curve over less is closer
         return flip
+
+    def _excess(self, factors: np.ndarray) -> np.ndarray:
+        """By how much the size of the simplest cycle's multiplier exceeds 1 at factors (NaN: none was closed)."""
+        cycles = hunting_cycles(self._stages(factors))
+        return np.where(cycles.closed, np.abs(cycles.multiplier) - 1, np.nan)
 
     def _simulated(
         self, at: float, motions: tuple[Swinging, ...], outside: float

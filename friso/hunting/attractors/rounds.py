@@ -34,7 +34,7 @@ KEPT = 32
 ROOM, MOST_SWINGS = 1 << 20, 1 << 14
 """Room for turning points of all runs of a round together, and of one: runs that need more are run again."""
 
-BUDGET = 2_000_000
+BUDGET = 4_000_000
 """Steps that a run takes in a round at most."""
 
 LEG = 0.25

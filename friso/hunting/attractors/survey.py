@@ -13,8 +13,9 @@ from friso.hunting.cycle.find import Cycles
 ROUNDS = 5
 """Rounds at most: the last takes two thousand typical periods."""
 
-STEPS, FEWER = 10_000_000, 6_000_000
-"""Steps that all runs of a stage take together at most until they are given up, in a thorough survey and in others."""
+STEPS, FEWER = 16_000_000, 6_000_000
+"""Steps that all runs of a stage take together at most until they are given up, in a survey that has to decide and in
+others."""
 
 UNPROVED = 400_000
 """Steps that a run takes in a round at most where nothing has to be proved: of many stages at once a single one keeps
@@ -133,7 +134,8 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
 @dataclass
 class Survey:
     """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or
-    takes motions that have converged for attracted. The motions that attract; and of which stages that is `unknown`,
+    takes motions that have converged for attracted; all runs of a stage take so many `steps` at most. The motions that
+    attract; and of which stages that is `unknown`,
     because a run failed or had to be given up, the time constant of the cycle that repels most slowly, `slowest` [s]
     (0: none), and the steps that its runs may take still, `left`, all of shape (count,)."""
 
@@ -141,6 +143,7 @@ class Survey:
     thorough: bool
     rtol: float
     prove: bool = True
+    steps: int = FEWER
     attracting: list[Swinging] = field(default_factory=list)
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
@@ -151,7 +154,7 @@ class Survey:
 
     def __post_init__(self) -> None:
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
-        self.left = np.full(self.count, float(STEPS if self.thorough else FEWER))
+        self.left = np.full(self.count, float(self.steps))
 
     @property
     def attracted(self) -> np.ndarray:
