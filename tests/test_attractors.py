@@ -191,6 +191,65 @@ def test_many_stages_at_once_are_judged_alike_where_basins_are_narrow() -> None:
     assert list(judge_many(several, len(crossovers), 1e-6) == "bistable") == [True] * 5 + [False]
 
 
+DOUBLED = Stage(
+    masses={"cart": "3.17348 kg", "stage": "0.19508 kg"},
+    friction={
+        "model": "lugre",
+        "static": "11.1269 N",
+        "coulomb": "4.89224 N",
+        "stribeck_velocity": "0.00488045 m/s",
+        "stribeck_exponent": 2.413573913315823,
+        "viscous": "0.0665788 N*s/m",
+        "asymmetry": 0.11556827315012663,
+        "bristle_stiffness": "2.3886e+06 N/m",
+        "bristle_damping": "1770.67 N*s/m",
+    },
+    bias={"cart": "0.197415 N"},
+    controller={"kind": "pid", "crossover": "17.4 Hz", "alpha": 0.16935034862753084, "beta": 1.8573402854241317},
+    motion={"kind": "step", "duration": "20 s", "size": "0.196438 m"},
+)
+"""Its cycle flips at 17.841 Hz, beyond which one of twice the period attracts up to 17.88 Hz: by brute force, and by
+SciPy at 17.8762 Hz, +-0.17156 mm (`benchmarks.truth --seed 1301 --number 72`)."""
+
+
+def test_beyond_the_end_of_a_cycle_others_attract_close_by() -> None:
+    edge = margin(DOUBLED, attracting=True)
+    assert edge is not None
+    assert edge.crossover is not None
+    assert edge.crossover > 17.8762
+
+
+SMALLER = Stage(
+    masses={"cart": "2.66715 kg", "stage": "0.629963 kg"},
+    friction={
+        "model": "lugre",
+        "static": "6.6025 N",
+        "coulomb": "1.57348 N",
+        "stribeck_velocity": "0.000112272 m/s",
+        "stribeck_exponent": 2.0,
+        "viscous": "0.19127 N*s/m",
+        "bristle_stiffness": "3.12902e+06 N/m",
+        "bristle_damping": "268.046 N*s/m",
+    },
+    controller={
+        "kind": "pid",
+        "crossover": "30.8841 Hz",
+        "alpha": 0.25051635335746625,
+        "beta": 3.0275067598355063,
+        "tuned_mass": "2.67429 kg",
+    },
+    motion={"kind": "release", "displacement": "23 mm", "duration": "20 s"},
+)
+"""Just beyond the fold of its symmetric cycle, with one of half its size, which few starts end in: by brute force, and
+by SciPy, +-32.79 um (`benchmarks.truth --seed 1301 --number 90`)."""
+
+
+def test_just_beyond_a_fold_a_smaller_cycle_is_found() -> None:
+    survey = Outward(SMALLER.flat(), 10.0).surveyed_at_once(np.ones(1), np.full(1, 6.158e-5))
+    assert survey.attracts[0]
+    assert min(motion.amplitude for motion in survey.motions) == pytest.approx(3.279e-5, rel=1e-2)
+
+
 UNWOUND = VARIANTS["rigid, limit, back-calculation"].replace(
     {
         "controller.force_limit": "12 N",

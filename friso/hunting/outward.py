@@ -13,7 +13,7 @@ from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
-from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
+from friso.hunting.boundary.branch import END_OF_RANGE, NO_FARTHER, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, families, hunting_cycles
@@ -48,6 +48,13 @@ known."""
 NEAR = 1.03
 """The range of factors about the flip over which that curve is laid again."""
 
+FOUND, LOST, UNCLEAR = "found", "lost", "unclear"
+"""What is known of the end of an orbit."""
+
+FIRM = 0.95
+"""Size of the multiplier below which an orbit attracts well, when it is lost: it has met a corner of the friction or of
+a limiter there. Closer to 1 it may attract from too narrow a range for simulations to tell that it does no more."""
+
 HOPS = 8
 """Orbits that are followed one after the other at most: beyond the end of one another may attract."""
 
@@ -64,8 +71,8 @@ FINER = 4
 @dataclass(frozen=True)
 class AttractionEnd:
     """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
-    orbit was followed to its end at `inside`, and simulations at `outside` all settled; or where it was followed to
-    `inside` and lost there, and simulations all settled that began about it at factors in between as well. That end is
+    orbit was followed to its end at `inside`, and simulations at `outside` all settled; or where it was lost at
+    `inside`, while it attracted well, and simulations about it at factors in between all settled as well. That end is
     known up to a share of it, the `reserve`: of an orbit that was lost to the first of these."""
 
     inside: float
@@ -97,10 +104,10 @@ class _Suggested:
     def like(self, orbit: Swinging) -> np.ndarray:
         """At which factors there is a cycle of the kind of an orbit, attracting or not, (factors,)."""
         assert orbit.cycles is not None
-        kind, found = (orbit.cycles.sign, orbit.cycles.swings), np.zeros(len(self.factors), bool)
+        kind, closed = (orbit.cycles.sign, orbit.cycles.swings), np.zeros(len(self.factors), bool)
         for cycles in self.cycles:
-            found |= cycles.closed & ((cycles.sign, cycles.swings) == kind)
-        return found
+            closed |= cycles.closed & ((cycles.sign, cycles.swings) == kind)
+        return closed
 
     def of(self, numbers: np.ndarray) -> tuple[Cycles, ...]:
         """The cycles at the factors with these numbers."""
@@ -145,9 +152,9 @@ class Outward:
                 continue
             flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
             if flip:
-                (place.at, reserve), distance, ended = flip, orbit.distance, True
+                (place.at, reserve), distance, end = flip, orbit.distance, FOUND
             else:
-                place.at, distance, ended, reserve = self._followed(at, orbit)
+                place.at, distance, end, reserve = self._followed(at, orbit)
             at = place.at
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
@@ -158,11 +165,12 @@ class Outward:
             if survey.attracts[0]:
                 place.at, place.motions = next_to, survey.motions
                 continue
-            known_beyond = suggested.like(orbit) if ended else np.zeros(suggested.factors.size, bool)
-            closer, decided = self._between(suggested, ALONG * distance, known_beyond)
+            mapped = {FOUND: suggested.like(orbit), LOST: False, UNCLEAR: True}[end]
+            closer, decided = self._between(suggested, ALONG * distance, mapped)
             if closer is None:
-                known = reserve if ended else max(reserve, abs(float(suggested.factors[0]) / at - 1))
-                return AttractionEnd(at, next_to, decided and bool(survey.decided[0]), known)
+                if end == LOST:
+                    reserve = max(reserve, abs(float(suggested.factors[0]) / at - 1))
+                return AttractionEnd(at, next_to, end != UNCLEAR and decided and bool(survey.decided[0]), reserve)
             (place.at, place.motions), place.outside = closer, next_to
         return self._quiet_from(place.at, place.motions)
 
@@ -176,16 +184,17 @@ class Outward:
         return _Suggested(factors, cycles, motions, np.hstack([held_beside(stages, family) for family in cycles]))
 
     def _between(
-        self, suggested: _Suggested, distances: np.ndarray, known_beyond: np.ndarray
+        self, suggested: _Suggested, distances: np.ndarray, mapped: np.ndarray | bool
     ) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
         """The last factor but that next to an end, at which nothing attracts, at which something does of what is
         suggested, or of what simulations find that begin at `distances` [m], (n,), about the orbit that ended, too;
-        and what; None if there is none; and whether that is decided. Where that orbit is `known_beyond` its end,
-        (factors,), its return map tells what attracts beside it, and is tried alone."""
+        and what; None if there is none; and whether that is decided. At factors that are `mapped`, (factors,) or all,
+        the return map tells what attracts beside that orbit, which repels there, and is tried alone."""
         last = len(suggested.factors) - 1
         motions, decided = [motion for motion in suggested.motions if motion.stage < last], True
         nearest = max((motion.stage for motion in motions), default=-1)
-        about = np.where(known_beyond[:last, None], np.nan, distances)
+        mapped = np.broadcast_to(mapped, (last + 1,))[:last]
+        about = np.where(mapped[:, None], np.nan, distances)
         starts = np.hstack([suggested.held[:last], about])
         doubtful = np.flatnonzero(np.isfinite(starts).any(axis=1))
         doubtful = doubtful[doubtful > nearest]
@@ -236,10 +245,10 @@ class Outward:
         return 1.0 if self.farthest >= at else -1.0
 
     @np.errstate(all="ignore")
-    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float, bool, float]:
-        """The last factor at which a closed orbit attracts, the distance [m] at which the stage sticks there, whether
-        it was followed to its end: a flip, a fold or a torus, and not lost on the way; and up to what share of it the
-        factor is known."""
+    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float, str, float]:
+        """The last factor at which a closed orbit attracts, the distance [m] at which the stage sticks there; whether
+        its end was `FOUND`: a flip, a fold or a torus, or it was `LOST` on the way, where it attracted well, or that is
+        `UNCLEAR`; and up to what share of it the factor is known."""
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
 
@@ -270,7 +279,9 @@ class Outward:
                 ended, reserve = bool(np.isfinite(rough)), float(np.fmax(PRECISE, rough))
         elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):
             raise Beyond
-        return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), ended, reserve
+        lost = LOST if reason.startswith(NO_FARTHER) and abs(farthest.multiplier) < FIRM else UNCLEAR
+        end = FOUND if ended else lost
+        return float(at * np.exp(ahead * farthest.place)), orbit_distance(farthest, orbit), end, reserve
 
     @np.errstate(all="ignore")
     def _flip(self, at: float, outside: float) -> tuple[float, float] | None:

@@ -10,7 +10,7 @@ import numpy as np
 from friso.engine.allowance import Exhausted
 from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.attractors.starts import Starts
-from friso.hunting.attractors.survey import FEWER, STEPS, Survey, Swinging
+from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, families
 
@@ -111,13 +111,12 @@ def attractors(
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the `distances` [m], (count, n), too, where they are finite. Without
     `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
-    All starts are tried at once, twice as many, and beside the cycles, by a thorough survey and where nothing is
-    thought to attract, so that the cycles are known already, `suggested`: one run alone takes as long as eight
-    together. A thorough survey
-    whose allowance is used up tells what it has found by then, which is decided where an orbit was closed; others raise
-    Exhausted."""
+    Starts are tried at once, and beside the cycles, by a thorough survey and where nothing is thought to attract, so
+    that the cycles are known already, `suggested`: one run alone takes as long as eight together. Where none could be
+    closed, these are as many as those of a thorough survey. A thorough survey whose allowance is used up tells what it
+    has found by then, which is decided where an orbit was closed; others raise Exhausted."""
     at_once = thorough or bool(suggested)
-    survey = Survey(stages.count, thorough, rtol, prove=cycles, steps=STEPS if at_once else FEWER)
+    survey = Survey(stages.count, thorough, rtol, prove=cycles, decides=at_once)
     numbers = np.arange(stages.count)
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
     try:
@@ -126,7 +125,7 @@ def attractors(
         starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
         if distances is not None:
             starts.stuck_at(distances)
-        starts.spread(at_once)
+        starts.spread(thorough or (at_once and not any(cycles.closed.any() for cycles in suggested)))
         _take_notice(starts, survey, numbers, suggested)
         for runs, owners in starts.waves(at_once):
             survey.follow(runs, owners)
@@ -171,7 +170,7 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
     if not which.size:
         return first
-    survey = Survey(stages.count, False, rtol, steps=STEPS)
+    survey = Survey(stages.count, False, rtol, decides=True)
     survey.attracting += [motion for motion in first.motions if motion.stage in proved]
     starts = Starts(stages, TIGHT)
     starts.spread(thorough=False)

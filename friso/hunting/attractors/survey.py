@@ -14,7 +14,7 @@ ROUNDS = 5
 """Rounds at most: the last takes two thousand typical periods."""
 
 STEPS, FEWER = 16_000_000, 6_000_000
-"""Steps that all runs of a stage take together at most until they are given up, in a survey that has to decide and in
+"""Steps that all runs of a stage take together at most until they are given up, in a survey that decides, and in
 others."""
 
 UNPROVED = 400_000
@@ -134,16 +134,16 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
 @dataclass
 class Survey:
     """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or
-    takes motions that have converged for attracted; all runs of a stage take so many `steps` at most. The motions that
-    attract; and of which stages that is `unknown`,
-    because a run failed or had to be given up, the time constant of the cycle that repels most slowly, `slowest` [s]
-    (0: none), and the steps that its runs may take still, `left`, all of shape (count,)."""
+    takes motions that have converged for attracted; one that `decides` may take more steps. The motions that attract;
+    and of which stages that is `unknown`, because a run failed or had to be given up, the time constant of the cycle
+    that repels most slowly, `slowest` [s] (0: none), and the steps that its runs may take still, `left`, all of shape
+    (count,)."""
 
     count: int
     thorough: bool
     rtol: float
     prove: bool = True
-    steps: int = FEWER
+    decides: bool = False
     attracting: list[Swinging] = field(default_factory=list)
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
@@ -154,7 +154,7 @@ class Survey:
 
     def __post_init__(self) -> None:
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
-        self.left = np.full(self.count, float(self.steps))
+        self.left = np.full(self.count, float(STEPS if self.decides else FEWER))
 
     @property
     def attracted(self) -> np.ndarray:

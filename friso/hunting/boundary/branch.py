@@ -38,6 +38,9 @@ END_OF_RANGE = "end of the range"
 REACHED = "it reached the end of the requested range"
 """How one ends that was followed until something happened."""
 
+NO_FARTHER = "it could not be followed farther"
+"""How one begins to say it ends whose next cycle was not found."""
+
 TURN = 0.3
 """Largest change of direction [rad] from one step to the next."""
 
@@ -136,7 +139,7 @@ class Tracer:
             if point is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
                 step /= 3  # and along the direction that the branch turned out to have
                 if step < SHORTEST:
-                    return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
+                    return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
             coarse = abs(point.multiplier - last.multiplier) > self.smooth and abs(last.multiplier) < STEEP
             if coarse and step > self.first:
