@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import browsed, needs_browser
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from made_up import (
     NO_RETURN,
     both_joints,
@@ -41,6 +43,7 @@ from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
 from friso.views.check.page import check_html, conclusion, verdict_sentence
 from friso.views.check.table import rows
+from friso.views.check.words import edge_text
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Figure
@@ -478,10 +481,24 @@ def test_windows_are_told_beside_the_edge() -> None:
     assert "40.04 Hz" in unsure
 
 
-def test_an_edge_is_told_with_the_digits_that_hold() -> None:
-    """One that is known to 0.3 % is about 5.60 Hz, in the sentence and in the table."""
+@settings(deadline=None)
+@given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
+def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
+    """What is told holds the whole of what is known, rounding and all."""
+    case = replace(fake_case(), judgement=settles())
+    assert case.judgement.margin
+    edge = factor * case.judgement.margin.crossover / case.judgement.margin.factor
+    told = edge_text(case, AttractionEnd(factor, 1.1 * factor, True, reserve))
+    value, unit, share = re.search(r"about ([\d.]+) (m?Hz) \(± ([\d.]+) %\)", told).groups()
+    centre, known = float(value) * (1e-3 if unit == "mHz" else 1.0), float(share) / 100
+    for end in (1 - reserve, 1 + reserve):
+        assert abs(edge * end / centre - 1) <= known * (1 + 1e-6) + 2e-6
+
+
+def test_an_edge_is_told_with_what_is_known_of_it() -> None:
+    """In the sentence and in the table."""
     rough = Margin(0.6998, 5.598, True, 0.7068, 0.0028)
-    edge = "5.60 Hz (± 0.3 %)"
+    edge = "5.598 Hz (± 0.3 %)"
     assert edge in sentence(settles(margin=rough))
     assert edge in changed_rows(tabled(settles()), tabled(settles(margin=rough)))
 

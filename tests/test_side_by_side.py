@@ -1,7 +1,8 @@
 """Several things computed at once: their order, and what ends them."""
 
-from threading import Event
-from time import monotonic
+from functools import partial
+from threading import Barrier, Event
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
@@ -49,6 +50,34 @@ def test_all_end_where_nobody_waits_any_more(monkeypatch: pytest.MonkeyPatch) ->
     with ended_by(flag), pytest.raises(Overtaken):
         side_by_side([lambda: _until_ended(ended)] * 2)
     assert ended == [True, True]
+
+
+def test_no_more_are_under_way_than_there_are_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "usable_cores", lambda: 2)
+    under_way, most = [], []
+
+    def task(number: int) -> int:
+        under_way.append(number)
+        most.append(len(under_way))
+        sleep(0.01)
+        under_way.remove(number)
+        return number
+
+    assert side_by_side([partial(task, number) for number in range(5)]) == [0, 1, 2, 3, 4]
+    assert max(most) == 2
+
+
+def test_tasks_within_a_task_share_its_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "usable_cores", lambda: 8)
+    begun = Barrier(4)
+
+    def inner() -> int:
+        begun.wait(10)
+        cores = cores_to_use()
+        begun.wait(10)
+        return cores
+
+    assert side_by_side([lambda: side_by_side([inner, inner])] * 2) == [[2, 2], [2, 2]]
 
 
 def test_a_task_takes_the_cores_of_those_that_have_ended(monkeypatch: pytest.MonkeyPatch) -> None:

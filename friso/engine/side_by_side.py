@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from contextvars import ContextVar, copy_context
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -19,16 +20,29 @@ _PATIENCE = 0.1
 """How long [s] is waited before it is looked again whether anybody waits for all of it still."""
 
 
-_BESIDE: ContextVar[tuple[int, Sequence[Future]]] = ContextVar("beside", default=(1, ()))
-"""Among how many tasks the present one is, and the jobs of these."""
+@dataclass(frozen=True)
+class _Beside:
+    """Among how many tasks the present one is, their jobs, and what stood beside the one that began them."""
+
+    tasks: int
+    jobs: Sequence[Future]
+    about: _Beside | None
+
+    @property
+    def cores(self) -> int:
+        """The share of one of those that have not ended."""
+        cores = self.about.cores if self.about else usable_cores()
+        return max(1, cores // (self.tasks - sum(job.done() for job in self.jobs)))
+
+
+_BESIDE: ContextVar[_Beside | None] = ContextVar("beside", default=None)
 
 
 def cores_to_use() -> int:
-    """How many cores a batch of runs may take now: all, or its share beside the other tasks that still run. Fewer
+    """How many cores a batch of runs may take now: all, or its share beside the other tasks that have not ended. Fewer
     threads keep more of their lanes busy."""
-    tasks, jobs = _BESIDE.get()
-    ended = sum(job.done() for job in jobs)
-    return max(1, usable_cores() // (tasks - ended))
+    beside = _BESIDE.get()
+    return beside.cores if beside else usable_cores()
 
 
 def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
@@ -41,7 +55,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
     jobs: list[Future[_T]] = []
 
     def beside_others(task: Callable[[], _T]) -> _T:
-        _BESIDE.set((len(tasks), jobs))
+        _BESIDE.set(_Beside(len(tasks), jobs, _BESIDE.get()))
         return task()
 
     with ThreadPoolExecutor(at_once) as pool:

@@ -128,9 +128,7 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     states = {name: (flat, member) for name, member in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     margins_of = {name: margins(*state) for name, state in states.items()}
     low, high = band or _mattering(flat, margins_of.values())
-    for keys in _by_joint(
-        stage
-    ).values():  # whether the delay is too long is told now, not once the limits are asked for
+    for keys in _by_joint(stage).values():  # a delay that is too long is refused now, not once the limits are asked for
         closed_loop_poles(keys, concatenate_families([*limit_cases(keys).values()]))
     together = concatenate_families([*limit_cases(flat).values()])
     resonant = [closed_loop_poles(flat, together), plant_poles(flat, together)]

@@ -196,7 +196,7 @@ def machines_of_search(
     slower = max(1.0, (bandwidth(flat) or 1.0) / robust) if robust else 1.0
     seen, usual = (modulus_margins(own, np.zeros((1, 0)), fleet, drive, slower)[0] for fleet in (machines, many))
     common = np.flatnonzero(seen >= FAR * np.quantile(usual, FEW * (1 - goal.share)))
-    return machines.take(np.resize(common, machines.count))
+    return machines.take(np.resize(common, machines.count)) if common.size else machines
 
 
 @dataclass

@@ -189,13 +189,20 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
         return f"somewhere between {low} and {high}"
     if end.reserve < ROUGH:
         return _bandwidth(case, end.inside, up=None, digits=4)
-    return f"about {_bandwidth(case, end.inside, up=None)} (± {percent(rounded_up(end.reserve, 1), 1)})"
+    value = end.inside * (_present_bandwidth(case) or 1.0)
+    known = end.reserve + abs(float(f"{value:.4g}") / value - 1)
+    return f"about {_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(known, 1), 1)})"
+
+
+def _present_bandwidth(case: Case) -> float | None:
+    """The bandwidth of the case [Hz]; None where its controller states none."""
+    edge = case.judgement.margin
+    return edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
 
 
 def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
     """A bandwidth that is a factor of that of the case, rounded upward, downward or (None) to the nearest."""
-    edge = case.judgement.margin
-    crossover = edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
+    crossover = _present_bandwidth(case)
     value = factor * (crossover or 1.0)
     if up is not None:
         value = (rounded_up if up else rounded_down)(value, digits)

@@ -23,6 +23,9 @@ VIRIDIS = (
     "#fde725",
 )
 
+MORE = VIRIDIS[::-1]
+"""From little to much: little, which lies beside cells that rest, is as light as these."""
+
 
 @dataclass(frozen=True)
 class ColourScale:
@@ -63,12 +66,12 @@ def scale(field: Coloured) -> ColourScale:
         return ColourScale(-0.5, count - 0.5, field.colours, True, ticks, tuple(map(str, ticks)))
     low, high = _limits(field)
     if not field.log:
-        return ColourScale(low, high, VIRIDIS)
+        return ColourScale(low, high, MORE)
     low, high = math.log10(low), math.log10(high)
     step = max(1, math.ceil((high - low) / 6))
     decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, step)
     texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))  # `painted` lifts what is lower
-    return ColourScale(low, high, VIRIDIS, False, (low, *decades), texts)
+    return ColourScale(low, high, MORE, False, (low, *decades), texts)
 
 
 def ramp(count: int) -> tuple[str, ...]:
