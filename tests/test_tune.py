@@ -28,6 +28,7 @@ from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.margin import search_bandwidths
 from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
+from friso.remedies import method
 from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
@@ -644,3 +645,19 @@ def test_a_motion_that_needs_not_settle_is_refused(rigid: Stage, motion: str) ->
     keys = {"motion": {"kind": motion, "duration": "1 s", **({"velocity": "1 mm/s"} if motion == "ramp" else {})}}
     with pytest.raises(InputError):
         tune(Stage(**{**rigid.as_written(), **keys}))
+
+
+@pytest.mark.parametrize(("margins", "kept"), [([0.6, 0.0, 0.5], [0, 2, 0]), ([0.6, 0.3, 0.5], [0, 1, 2])])
+def test_a_rare_machine_does_not_stand_for_a_twentieth(
+    rigid: Stage, monkeypatch: pytest.MonkeyPatch, margins: list[float], kept: list[int]
+) -> None:
+    """One that is far less robust than all but a few of many is left out, others are not."""
+    drawn = draw_fleet(rigid, Correlations(), 3, 1)
+
+    def of(remedy: Remedy, shares: np.ndarray, machines: Fleet, drive: Stage, slower: float) -> np.ndarray:
+        return np.array([margins if machines.count == drawn.count else [0.5] * machines.count])
+
+    monkeypatch.setattr(method, "modulus_margins", of)
+    monkeypatch.setattr(method, "MORE", 1)
+    machines = method.machines_of_search(rigid, Correlations(), Budget(machines=3), 1, Goal(), rigid)
+    assert np.array_equal(machines.travel, drawn.travel[kept])
