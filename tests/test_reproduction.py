@@ -681,10 +681,10 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         with pytest.raises(KeyboardInterrupt):
             reproduce(**orders, kept=kept, progress=stop)
         before = {file: file.stat().st_mtime_ns for file in (tmp_path / "kept").iterdir()}
-        assert kept.count == len(before) == 5  # two maps at two tolerances, and a draw
+        assert kept.count == len(before) >= 5  # two maps at two tolerances, and a draw; beside it another may be done
         resumed = reproduce(**orders, kept=kept)
         assert all(file.stat().st_mtime_ns == time for file, time in before.items())
-        assert kept.count == len(before) + 2  # the other draw, and friso's own choice
+        assert kept.count == 7  # the other draw, and friso's own choice
         whole = reproduce(**orders)
     assert reproduce_document(resumed) == reproduce_document(whole)
     assert resumed.maps.keys() == {"friction", "isolator-friction"}
