@@ -28,7 +28,7 @@ from friso.identification.model_error import (
     without_bristles,
 )
 from friso.identification.output_error import fit as fitting
-from friso.identification.output_error.changes import changes_beside, inverse_reaching
+from friso.identification.output_error.changes import changes_beside, explained_by, inverse_reaching
 from friso.identification.output_error.fit import OutputErrorFit, first_values
 from friso.identification.output_error.parameters import FitParameter, fit_parameters
 from friso.identification.output_error.problem import tracking
@@ -191,6 +191,15 @@ def test_a_log_that_changes_while_it_is_taken_says_so_and_its_intervals_hold_it_
         assert all(answers[name].holds(level) for level in levels)
     assert answers["mass"].holds(MASS)
     assert answers["viscous"].holds(VISCOUS)
+
+
+@pytest.mark.parametrize("odd", [0.0, np.nan, np.inf])
+def test_a_number_of_which_nothing_is_known_does_not_move_and_hides_nothing(odd: float) -> None:
+    wave, line, counted = np.sin(np.arange(500.0)), np.linspace(-1.0, 1.0, 500), np.ones(500)
+    noise = 0.01 * np.random.default_rng(1).standard_normal(500)
+    explained = explained_by(np.column_stack([wave, odd * counted]), noise - 2 * wave - 3 * line, [line], counted)
+    assert explained is not None
+    assert np.concatenate(explained) == pytest.approx([2.0, 0.0, 3.0], abs=0.01)
 
 
 def test_slow_friction_of_a_fit_that_lacks_something_is_less_certain() -> None:

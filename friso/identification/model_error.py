@@ -61,7 +61,7 @@ def without_bristles(
     estimates: Sequence[Estimate], correlation: np.ndarray, quality: Quality
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The estimates, and the correlation of the shown ones, without the bristles where the fit lacks something or a
-    load moves on a coupling: a coupling that bends, a delay and the like pass for them.
+    coupling seems to bend: that, a delay and the like pass for them.
 
     Of a load behind a coupling of 40 Hz, and of a force 2 ms early, their stiffness came out at half of the truth, with
     an interval that did not hold it when it was twice as wide as its noise allowed."""

@@ -158,15 +158,24 @@ def _with_directions(
 def _with_compliance(
     fit: OutputErrorFit, quality: Quality, position: np.ndarray, sample_time: float, bandwidth: float
 ) -> tuple[OutputErrorFit, Quality]:
-    """A fit with intervals that allow for a load on a compliant coupling, and the quality that says so."""
+    """A fit with intervals that allow for a coupling between force and position, and the quality that says so, unless
+    another cause is named already: an averaged motion, and others, make such a force too."""
     fit, share = with_compliance(fit, position, sample_time, bandwidth)
-    if share < WORTH_TELLING:
+    if abs(share) < WORTH_TELLING:
         return fit, quality
-    doubt = (
-        "The force goes with the motion as that of a mass of which a part moves on a compliant coupling: the mass may "
-        f"be {percent(share)} smaller, and its interval reaches as far; a frequency response would show the coupling"
+    quality = replace(quality, compliant=True)
+    if quality.spoilt or quality.without:
+        return fit, quality
+    where, way = (
+        ("a part of the load moved on a coupling behind the measured position", "smaller")
+        if share > 0
+        else ("the position were measured behind a coupling", "larger")
     )
-    return fit, replace(quality, doubts=(*quality.doubts, doubt), compliant=True)
+    doubt = (
+        f"The force goes with the motion as if {where}: the mass may be {percent(abs(share))} {way}, for which the "
+        "intervals allow; a frequency response would show the coupling"
+    )
+    return fit, replace(quality, doubts=(*quality.doubts, doubt))
 
 
 def _with_changes(

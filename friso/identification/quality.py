@@ -40,8 +40,8 @@ class Quality:
     friction and mass of the whole model; sentences that say what is wrong (`doubts`); whether the whole model was
     `rejected`, and whether nothing holds (`failed`); the quantities whose `halves` differ; the inverse models `without`
     a cause, of a log rid of what may be wrong with it; whether the record is `spoilt`, so that what is wrong with it
-    passes for slow friction, whether much is left that is `unsettled`: for which no cause was found, and whether a load
-    seems to move on a `compliant` coupling."""
+    passes for slow friction, whether much is left that is `unsettled`: for which no cause was found, and whether a
+    `compliant` coupling seems to be between force and position."""
 
     noise: float
     left: float

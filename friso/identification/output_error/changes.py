@@ -96,14 +96,17 @@ def explained_by(
     slopes: np.ndarray, rest: np.ndarray, effects: Sequence[np.ndarray], counted: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """How far fitted numbers move, and the sizes of further effects beside them, that explain a residual, shape (n,);
-    derivatives of shape (n, numbers), effects and weights `counted` of shape (n,). None where the effects clearly
-    explain nothing."""
+    derivatives of shape (n, numbers), effects and weights `counted` of shape (n,). A number that changes nothing, or of
+    which nothing finite is known, does not move. None where the effects clearly explain nothing."""
     every = np.column_stack([slopes, *effects])
     size = np.linalg.norm(every, axis=0)
-    if not (np.isfinite(every).all() and (size > 0).all()):
+    usable = np.isfinite(size) & (size > 0)
+    if not (usable[slopes.shape[1] :].all() and np.isfinite(rest).all()):
         return None
-    solution = np.linalg.lstsq(every / size, -rest, rcond=ALIKE)[0] / size
-    left = rest + every @ solution
+    solution = np.zeros(len(size))
+    scaled = every[:, usable] / size[usable]
+    solution[usable] = np.linalg.lstsq(scaled, -rest, rcond=ALIKE)[0] / size[usable]
+    left = rest + every[:, usable] @ solution[usable]
     independent = max(float(counted.sum()), 1.0) / correlation_length(left)
     if rest @ rest <= left @ left * (1 + chi2.ppf(SURE, len(effects)) / independent):
         return None
