@@ -241,13 +241,13 @@ def test_an_interval_of_the_mass_holds_the_truth_where_a_coupling_moves_the_fit(
     assert share == pytest.approx(off, rel=0.3)
     plain = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
     seen = log["position"], log.sample_time, bandwidth
-    told, silent = (
+    unspoilt, spoiled = (
         method._with_compliance(fitted, replace(plain, spoilt=spoilt), *seen)[1] for spoilt in (False, True)
     )
-    wording(" ".join(told.doubts))
-    assert told.compliant
-    assert silent.compliant
-    assert not silent.doubts  # a cause that has been named makes such a force too
+    wording(" ".join(unspoilt.doubts))
+    assert unspoilt.compliant
+    assert spoiled.compliant
+    assert not spoiled.doubts  # a cause that has been named makes such a force too
 
 
 def test_no_coupling_is_seen_where_there_is_none() -> None:
