@@ -250,6 +250,51 @@ def test_just_beyond_a_fold_a_smaller_cycle_is_found() -> None:
     assert min(motion.amplitude for motion in survey.motions) == pytest.approx(3.279e-5, rel=1e-2)
 
 
+LOSING = Stage(
+    masses={"cart": "6.02292 kg", "stage": "1.25651 kg"},
+    friction={
+        "model": "lugre",
+        "static": "16.7585 N",
+        "coulomb": "15.9195 N",
+        "stribeck_velocity": "0.000124955 m/s",
+        "stribeck_exponent": 2.0,
+        "viscous": "23.3012 N*s/m",
+        "bristle_stiffness": "8.27899e+07 N/m",
+        "bristle_damping": "2354.68 N*s/m",
+    },
+    joint={
+        "stiffness": "54788.4 N/m",
+        "damping": "1.40538 N*s/m",
+        "stroke": "6.60098 um",
+        "limiter_stiffness": "3.35181e+07 N/m",
+        "limiter_damping": "132.774 N*s/m",
+    },
+    parasitic={"frequency": "232.739 Hz", "mass": "0.682278 kg", "damping_ratio": 0.022817854116299795},
+    controller={"kind": "pid", "crossover": "9.79954 Hz", "alpha": 0.07577805075007032, "beta": 2.1042478163947367},
+    motion={"kind": "step", "duration": "20 s", "size": "1 mm"},
+)
+"""Followed from 1.3 times its bandwidth, its cycle is lost at 1.8997 times, while it attracts well
+(`benchmarks.truth --seed 1301 --number 3`)."""
+
+
+def test_an_orbit_that_is_lost_while_it_attracts_well_is_certain_to_a_thousandth_or_an_interval() -> None:
+    outward = Outward(LOSING.flat(), 10.0)
+    end = outward.end(1.3, outward.surveyed(np.array([1.3])).motions, 2.0)
+    assert end.inside == pytest.approx(1.8997, rel=2e-3)
+    assert end.outside == pytest.approx(1.01 * end.inside)
+    if end.certain:
+        assert end.reserve == pytest.approx(1e-3, rel=0.01)
+
+
+def test_thorough_starts_are_those_of_single_stages() -> None:
+    stages = Ensemble.held(VARIANTS["rigid"].flat(), 3)
+    begun = starts.Starts(stages)
+    begun.spread(np.array([False, True, False]))
+    few, many, same = np.bincount(np.concatenate(begun.owners)).tolist()
+    assert few == same == sum(map(len, starts.DISTANCES))
+    assert many == sum(map(len, starts.THOROUGH_DISTANCES)) + len(starts.PUSHES)
+
+
 UNWOUND = VARIANTS["rigid, limit, back-calculation"].replace(
     {
         "controller.force_limit": "12 N",

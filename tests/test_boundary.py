@@ -10,7 +10,8 @@ from variants import VARIANTS
 
 import friso
 from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
-from friso.hunting.boundary.branch import Point, Tracer
+from friso.hunting.boundary.branch import REACHED, Point, Tracer
+from friso.hunting.boundary.locate import changes, corrected
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
@@ -95,6 +96,49 @@ def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) 
         branch = tracer.branch(Point.of(stages, place, symmetric_cycles(stages)))
         folds.append(max(point.place for point in branch.points))
     assert over_crossover.value(folds[0]) == pytest.approx(over_crossover.value(folds[1]), abs=1e-3)
+
+
+@pytest.mark.parametrize("poison", [np.nan, 0.0, 1.0, 1e6])
+def test_a_wrong_jacobian_does_not_end_a_walk(over_crossover: Diagram, poison: float) -> None:
+    """From 9.6 Hz to the flip, with one to begin with that is none, singular, or of something else."""
+    space = over_crossover.space
+    place = float(CROSSOVER.place(np.array(9.6)))
+    stages = space.stages(np.array([[place]]))
+    cycle = symmetric_cycles(stages)
+    size = cycle.states.shape[1] + 2
+    tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), -1.0)
+    wrong = poison * np.random.default_rng(0).normal(size=(1, size, size))
+    start = Point.of(stages, place, cycle, wrong)
+    points, reason = tracer.walk(start, 1.0, lambda last, point: "flip" in changes(last, point))
+    assert reason == REACHED
+    assert over_crossover.value(points[-1].place) == pytest.approx(9.78, abs=0.2)
+
+
+def test_a_branch_that_turns_back_does_not_reach_the_farthest_place(over_crossover: Diagram) -> None:
+    """The pair from 9.5 Hz on: it meets the symmetric cycle at 9.77 Hz, and goes on as its own mirror image."""
+    space = over_crossover.space
+    (pair,) = (branch for branch in over_crossover.branches if branch.sign > 0)
+    near = min(pair.points, key=lambda point: abs(over_crossover.value(point.place) - 9.6))
+    tracer = Tracer(space.lines(np.full((1, 1), near.place), np.ones((1, 1))), 1.0, farthest=0.02)
+    start = Point.of(space.stages(np.array([[near.place]])), 0.0, near.cycle)
+    points, reason = tracer.walk(start, 1.0, lambda last, point: False)
+    assert not tracer.reaches(points, reason)
+    points, reason = tracer.walk(start, 1.0)
+    assert "symmetric" in reason
+
+
+def test_a_flip_is_not_where_a_wrong_slope_says(over_crossover: Diagram) -> None:
+    """Begun 0.2 % beside it, with a slope by which it is there already."""
+    space = over_crossover.space
+    value, flip = min(special(over_crossover, symmetric=True)["flip"], key=lambda item: item[0])
+    place = float(CROSSOVER.place(np.array(0.998 * value)))
+    stages = space.stages(np.array([[place]]))
+    tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), -1.0)
+    near = Point.of(stages, place, symmetric_cycles(stages))
+    along = np.array([1.0, 0.0, 0.0])
+    found = corrected(tracer, near, near.vector, along, "flip", 0.02, near.cycle.states, slope=1e9)
+    assert found is not None
+    assert found.point.place == pytest.approx(flip.point.place, abs=1e-6)
 
 
 @pytest.fixture(scope="module")

@@ -35,8 +35,9 @@ class Margin:
     `factor` is the bandwidth at the edge over that of the stage, `crossover` [Hz] the crossover there (None for a
     controller given by its gains, all of whose poles and zeros the factor scales). At `quiet`, a factor just above,
     simulations settle from everywhere that was tried. The edge is `certain` where a closed orbit was followed to its
-    end there, and all simulations beyond it that had to decide were completed; else it lies between the two. It is
-    known up to a share of it, the `reserve`: with a limiter that chatters multipliers scatter.
+    end there, or was lost while it attracted well, and all simulations beyond it that had to decide were completed;
+    else it lies between the two. It is known up to a share of it, the `reserve`: where an orbit was lost up to the
+    next bandwidth that was tried, and with a limiter that chatters multipliers scatter.
     """
 
     factor: float

@@ -52,8 +52,9 @@ FOUND, LOST, UNCLEAR = "found", "lost", "unclear"
 """What is known of the end of an orbit."""
 
 FIRM = 0.95
-"""Size of the multiplier below which an orbit attracts well, when it is lost: it has met a corner of the friction or of
-a limiter there. Closer to 1 it may attract from too narrow a range for simulations to tell that it does no more."""
+"""Size of the multiplier below which an orbit attracts well, when it is lost: it has probably met a corner of the
+friction or of a limiter there. Closer to 1 it may attract from too narrow a range for simulations to tell that it does
+no more."""
 
 HOPS = 8
 """Orbits that are followed one after the other at most: beyond the end of one another may attract."""
@@ -277,7 +278,7 @@ class Outward:
             if last is not None and kind == "flip":
                 rough = _rough(tracer, last, first, second)
                 ended, reserve = bool(np.isfinite(rough)), float(np.fmax(PRECISE, rough))
-        elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):
+        elif tracer.reaches(points, reason):
             raise Beyond
         lost = LOST if reason.startswith(NO_FARTHER) and abs(farthest.multiplier) < FIRM else UNCLEAR
         end = FOUND if ended else lost

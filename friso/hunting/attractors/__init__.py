@@ -112,9 +112,9 @@ def attractors(
     relative tolerance. Motions begin from the `distances` [m], (count, n), too, where they are finite. Without
     `cycles` many stages are surveyed by simulations alone, and motions that have converged are taken for attracted.
     Starts are tried at once, and beside the cycles, by a thorough survey and where nothing is thought to attract, so
-    that the cycles are known already, `suggested`: one run alone takes as long as eight together. Where none could be
-    closed, these are as many as those of a thorough survey. A thorough survey whose allowance is used up tells what it
-    has found by then, which is decided where an orbit was closed; others raise Exhausted."""
+    that the cycles are known already, `suggested`: one run alone takes as long as eight together. Of a stage of which
+    none could be closed, these are as many as those of a thorough survey. A thorough survey whose allowance is used up
+    tells what it has found by then, which is decided where an orbit was closed; others raise Exhausted."""
     at_once = thorough or bool(suggested)
     survey = Survey(stages.count, thorough, rtol, prove=cycles, decides=at_once)
     numbers = np.arange(stages.count)
@@ -125,7 +125,7 @@ def attractors(
         starts = Starts(stages) if cycles else Starts(stages, COARSE_RTOL)
         if distances is not None:
             starts.stuck_at(distances)
-        starts.spread(thorough or (at_once and not any(cycles.closed.any() for cycles in suggested)))
+        starts.spread(thorough | (at_once & ~np.any([cycles.closed for cycles in suggested], axis=0)))
         _take_notice(starts, survey, numbers, suggested)
         for runs, owners in starts.waves(at_once):
             survey.follow(runs, owners)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 
@@ -50,13 +51,14 @@ class Starts:
         """Those of the stages with these numbers, none of them begun."""
         return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
-    def spread(self, thorough: bool) -> None:
-        """Stuck at distances on both sides (on one of symmetric stages), and pushed."""
-        spread = THOROUGH_DISTANCES if thorough else DISTANCES
+    def spread(self, thorough: np.ndarray | bool) -> None:
+        """Stuck at distances on both sides (on one of symmetric stages); those stages that are `thorough`, (count,) or
+        all, at twice as many, and pushed as well."""
         limited = (controller := self.stages.structure.controller) is not None and controller.anti_windup is not None
-        units = np.concatenate([*spread, *([LIMITED] if limited else [])])
-        for side in (1.0, -1.0):
-            which = np.arange(self.stages.count) if side > 0 else np.flatnonzero(~self.stages.symmetric)
+        for side, more in product((1.0, -1.0), (False, True)):
+            spread = THOROUGH_DISTANCES if more else DISTANCES
+            units = np.concatenate([*spread, *([LIMITED] if limited else [])])
+            which = np.flatnonzero(np.equal(thorough, more) & ((side > 0) | ~self.stages.symmetric))
             if which.size:
                 owners = np.repeat(which, len(units))
                 stages = self.stages.take(owners)
@@ -64,7 +66,7 @@ class Starts:
                 self._add(owners, stuck(stages, distances))
                 for wound in OUTER if stages.outer_integrals else ():
                     self._add(owners, stuck(stages, distances, wound / stages.number("rate")))
-                if thorough:
+                if more:
                     owners = np.repeat(which, len(PUSHES))
                     stages = self.stages.take(owners)
                     speeds = np.tile(PUSHES, which.size) * stages.length * stages.number("rate")

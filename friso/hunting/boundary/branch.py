@@ -6,8 +6,8 @@ chapter 10. The line is measured by a place (0 to 1) and the cycle by the distan
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -102,7 +102,17 @@ class Tracer:
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
     ) -> Point | None:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
-        near it, or from about its own states (1, states); None if none is found."""
+        near it, or from about its own states (1, states); None if none is found, with the Jacobian of the one near it
+        or with one of its own."""
+        point = self._solved(near, target, normal, states)
+        if point is None and near.jacobians is not None:
+            return self._solved(replace(near, jacobians=None), target, normal, states)
+        return point
+
+    def _solved(
+        self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
+    ) -> Point | None:
+        """The same, with the Jacobian of the cycle near it alone, if there is one."""
         border = Border(normal[None, :], np.array([normal @ target]))
         begin, times, place = near.cycle.states, near.cycle.orbits.times, np.array([near.place])
         if states is not None or near.jacobians is None:
@@ -117,7 +127,7 @@ class Tracer:
         cycle = described(stages, orbits, self.rtol)
         if not np.isfinite(cycle.multiplier[0]) or not np.isfinite(cycle.amplitude[0]):
             return None
-        return Point.of(stages, float(places[0]), cycle, jacobians)
+        return Point.of(stages, float(places[0]), cycle, jacobians if np.isfinite(jacobians).all() else None)
 
     def walk(
         self, start: Point, ahead: float, until: Callable[[Point, Point], bool] | None = None
@@ -138,6 +148,7 @@ class Tracer:
                 direction = moved / length
             if point is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
                 step /= 3  # and along the direction that the branch turned out to have
+                points[-1] = replace(last, jacobians=None)  # which may have led astray
                 if step < SHORTEST:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
@@ -156,6 +167,11 @@ class Tracer:
             if reason := self._stop(point):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
+
+    def reaches(self, points: Sequence[Point], reason: str) -> bool:
+        """Whether a walk with these points that ended for a reason came to the farthest place, and not back to the
+        first, on a branch that turns."""
+        return reason == END_OF_RANGE and bool(points) and points[-1].place > self.farthest * (1 - 1e-6)
 
     def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
         """The point at the end of the range that lies between two."""

@@ -34,6 +34,9 @@ TURN = 0.4
 ASIDE = 0.7
 """How far aside of its prediction, in steps, a point may lie."""
 
+GRAZING = 0.2
+"""Sine of the angle between a curve and a line below which this tells nothing of how the multiplier changes across."""
+
 DEEP = 0.5
 """How far a fold may lie from its prediction in the logarithms of distance and time."""
 
@@ -124,11 +127,14 @@ class CurveTracer:
 
     def _slope(self, near: Spot, across: np.ndarray, expected: Expected) -> float:
         """About how fast the multiplier changes along the line on which a point is expected: across the curve as at the
-        point near it, along a line at an angle to it less."""
+        point near it, along a line at an angle to it less. NaN if the line through that point grazes the curve."""
         if self.kind == "fold":
             return near.special.slope
         normal = expected.direction[::-1] * [-1.0, 1.0]
-        return near.special.slope * float(normal @ across / (normal @ near.across) / near.special.direction[0])
+        crossing = float(normal @ near.across)
+        if abs(crossing) < GRAZING:
+            return np.nan
+        return near.special.slope * float(normal @ across) / crossing / float(near.special.direction[0])
 
     def curve(self, first: Spot) -> Curve | None:
         """The whole curve through a point; None if no second point is found next to it."""

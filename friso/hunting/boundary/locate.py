@@ -18,6 +18,10 @@ PRECISE, TRIES = 1e-7, 30
 ASIDE = 1e-3
 """Step from a first guess from which the slope is taken."""
 
+MET = 1e-5
+"""How far the multiplier may be off at a first guess that is right, going by what it is expected to change along the
+way."""
+
 TIGHTER = 0.01
 """Share of the tolerance at which a point is computed again for its error."""
 
@@ -149,13 +153,14 @@ def corrected(
             return None
         if len(points) > 1:
             slope = (distance_to(kind, latest) - distance_to(kind, points[-2])) / (places[-1] - places[-2])  # type: ignore[arg-type]
-        step = -distance_to(kind, latest) / slope if slope else np.inf
-        if len(points) == 1 and not abs(step) <= reach:
+        off, first = distance_to(kind, latest), len(points) == 1
+        step = -off / slope if slope else np.inf
+        if abs(step) < PRECISE and (not first or abs(off) < MET):
+            return _special_point(tracer, kind, latest, direction, slope)
+        if first and not PRECISE <= abs(step) <= reach:
             step = ASIDE
         elif not abs(places[-1] + step) <= reach:
             return None
-        elif abs(step) < PRECISE:
-            return _special_point(tracer, kind, latest, direction, slope)
         places.append(places[-1] + step)
         points.append(tracer.solve(latest, origin + places[-1] * direction, direction))
     return None

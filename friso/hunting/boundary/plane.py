@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.engine.side_by_side import side_by_side
 from friso.hunting.attractors import attractors
-from friso.hunting.boundary.branch import END_OF_RANGE, Point, Tracer
+from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
@@ -90,8 +90,8 @@ def _sought(
         if any(_crossed(curve, points[a], points[b]) for curve in curves):
             continue
         cycle = cycles.take(np.flatnonzero(allowed == a))
-        spot, end = _first(space, points[a], points[b], cycle, rtol)
-        if spot is None and end == END_OF_RANGE:  # the neighbour has the cycle too, it was not found there
+        spot, reached = _first(space, points[a], points[b], cycle, rtol)
+        if reached:  # the neighbour has the cycle too, it was not found there
             continue
         curve = spot and CurveTracer(space, spot.special.kind, cycle.sign, rtol).curve(spot)
         if curve:
@@ -148,9 +148,9 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     return False
 
 
-def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, str]:
+def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, bool]:
     """The first point on the way from a stage with a cycle to a neighbour at which the cycle stops attracting or folds
-    back, if there is one, and how the branch that leads there ends."""
+    back, if there is one, and whether it reaches that neighbour without."""
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh
     tracer = Tracer(space.lines(start[None], across[None]), cycle.sign, rtol, farthest=mesh)
@@ -159,6 +159,6 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= PATIENCE)
     last, point = [first, first, *points][-2:]
     if not (kinds := changes(last, point)):
-        return None, reason
+        return None, tracer.reaches(points, reason)
     special = located(tracer, last, point, "fold" if "fold" in kinds else kinds[0])
-    return (Spot(start + special.point.place * across, special, across) if special else None), reason
+    return (Spot(start + special.point.place * across, special, across) if special else None), False

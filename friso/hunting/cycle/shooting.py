@@ -132,8 +132,8 @@ Family = Callable[[np.ndarray, np.ndarray], Ensemble]
 
 
 class Followed(NamedTuple):
-    """Orbits, the places of their stages, and the last Jacobians that they were closed with, shape (count, states + 2,
-    states + 2), with which orbits near them may begin."""
+    """Orbits, the places of their stages, and the Jacobians that they were closed with, shape (count, states + 2,
+    states + 2), with which orbits near them may begin (NaN: there is none)."""
 
     orbits: Orbits
     places: np.ndarray
@@ -154,14 +154,14 @@ def close_along(
     """Close orbits as `close` does, from states and times [s], their stages being free to change their places so that
     each comes to lie on its border. Goes round folds, at which there is no orbit at a place beyond. With `jacobians`
     of closed orbits at these states, times and places, or near them, the step to the border is made before anything is
-    run.
+    run; they may come from another line through the keys: steps tell what changes by the place along this one.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
     if jacobians is not None:
         following.begin_with(jacobians)
     orbits = _iterated(following).orbits
-    return Followed(replace(orbits, swings=swings or orbits.swings), following.best_places, following.jacobians)
+    return Followed(replace(orbits, swings=swings or orbits.swings), following.best_places, following.best_jacobians)
 
 
 _S = TypeVar("_S", bound="_Shooting")
@@ -274,6 +274,7 @@ class _Following(_Shooting):
         super().__init__(*arguments)
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
+        self.best_jacobians = self.jacobians.copy()
         # of each orbit its last step, and what that was to bring to zero
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
@@ -302,6 +303,11 @@ class _Following(_Shooting):
         step = super()._step(k, residual, sticking, scales)
         self.latest[k] = step, residual
         return step
+
+    def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
+        better = which[gaps < self.gaps[which]]
+        self.best_jacobians[better] = self.jacobians[better]
+        super()._keep_best(which, gaps)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
         """Derivatives of how far orbits are from their borders."""
