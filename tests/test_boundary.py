@@ -136,9 +136,9 @@ def test_a_flip_is_not_where_a_wrong_slope_says(over_crossover: Diagram) -> None
     tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), -1.0)
     near = Point.of(stages, place, symmetric_cycles(stages))
     along = np.array([1.0, 0.0, 0.0])
-    found = corrected(tracer, near, near.vector, along, "flip", 0.02, near.cycle.states, slope=1e9)
-    assert found is not None
-    assert found.point.place == pytest.approx(flip.point.place, abs=1e-6)
+    reached = corrected(tracer, near, near.vector, along, "flip", 0.02, near.cycle.states, slope=1e9)
+    assert reached is not None
+    assert reached.point.place == pytest.approx(flip.point.place, abs=1e-6)
 
 
 @pytest.fixture(scope="module")
