@@ -239,7 +239,7 @@ def test_report_opens_offline_and_holds_plotly_once(page):
     parsed = Page(page)
     assert all(address.startswith("data:image/svg+xml;base64,") for address in parsed.loads)
     assert page.count(plotly_renderer.script()) == 1
-    assert [set(figure) - {"narrow"} for figure in packed_values(page)] == 7 * [{"data", "layout", "config"}]
+    assert [{*figure} for figure in packed_values(page)] == 7 * [{"data", "layout", "narrow", "bars", "config"}]
     assert "default-src 'none'" in page
     own = page.replace(plotly_renderer.script(), "")
     assert not re.findall(r"https?://[^\"'<> ]*", own)

@@ -276,3 +276,16 @@ def test_legends_beside_each_other_stay_above_their_axes(columns: int, lines: in
     panel = Panel("model", Axis("x", ""), Axis("y", ""), series)
     layout = plotly_renderer.parts(Figure("f", "", "", (panel,) * columns, columns))["layout"]
     assert [layout[f"legend{name}"]["orientation"] for name in ("", "2")[:columns]] == [orientation] * columns
+
+
+def test_maps_stand_below_each_other_on_a_narrow_page() -> None:
+    """The places of their colour bars belong to what is drawn, not to the layout."""
+    field = Map(np.arange(3.0), np.arange(2.0), np.arange(6.0).reshape(2, 3), "peaks", "")
+    panels = tuple(Panel(name, Axis("x", ""), Axis(name, ""), maps=(field,)) for name in "AB")
+    second = replace(panels[1], maps=(replace(field, z=2 * field.z),))
+    (packed,) = packed_values(plotly_renderer.fragment(Figure("f", "", "", (panels[0], second), columns=2)))
+    bars = [bar for bar in packed["bars"] if bar]
+    domains = [packed["narrow"][axis]["domain"] for axis in ("yaxis", "yaxis2")]
+    assert [low < bar["y"] < high for bar, (low, high) in zip(bars, domains, strict=True)] == [True, True]
+    assert packed["narrow"]["xaxis"]["domain"] == packed["narrow"]["xaxis2"]["domain"]
+    assert packed["layout"]["xaxis"]["domain"] != packed["layout"]["xaxis2"]["domain"]

@@ -52,16 +52,21 @@ def script() -> str:
 
 
 def fragment(figure: Figure) -> str:
-    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it; but for maps also
-    the layout on a narrow screen."""
-    drawn = render(figure)
-    parts = {**_single(drawn.to_plotly_json()), "config": _CONFIG}
-    if not any(panel.coloured for panel in figure.panels):
-        parts["narrow"] = _single(_checked(narrow_parts(figure)).to_plotly_json())["layout"]
+    """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it, and the layout on
+    a narrow screen with the places of the colour bars there."""
+    drawn, narrow = render(figure), _checked(narrow_parts(figure)).to_plotly_json()
+    parts = {**_single(drawn.to_plotly_json()), "config": _CONFIG, "narrow": _single(narrow["layout"])}
+    parts["bars"] = [_bar(trace) for trace in narrow["data"]]
     return (
         f'<div id="figure-{figure.name}" style="height: {drawn.layout.height}px"></div>\n'
         f'<script type="application/gzip" class="figure">{packed_json(parts)}</script>'
     )
+
+
+def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
+    """Where the colour bar of a trace stands; None where it has none."""
+    bar = trace.get("colorbar") or trace.get("marker", {}).get("colorbar")
+    return {name: bar[name] for name in ("x", "y", "len")} if bar else None
 
 
 def _single(part: Any) -> Any:

@@ -42,7 +42,7 @@ MARKER = (
 """What stands below every map."""
 
 _HUNTING = ("edge of the attracting cycle", VERMILLION)
-_PAIR = ("edge of the asymmetric cycles that bound its basin", PINK)
+_PAIR = ("edge of asymmetric cycles at its basin", PINK)
 _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5 and 13
 
 

@@ -12,9 +12,11 @@ const plotly = (async () => {
 (async () => {
   await plotly;
   for (const packed of document.querySelectorAll("script.figure")) {
-    const { data, layout, narrow, config } = JSON.parse(await unpacked(packed));
+    const { data, layout, narrow, bars, config } = JSON.parse(await unpacked(packed));
     const place = packed.previousElementSibling;
-    const chosen = narrow && place.parentElement.clientWidth < 640 ? narrow : layout;
+    const isNarrow = place.parentElement.clientWidth < 640;
+    const chosen = isNarrow ? narrow : layout;
+    if (isNarrow) bars.forEach((bar, k) => bar && Object.assign(data[k].colorbar ?? data[k].marker.colorbar, bar));
     place.style.height = `${chosen.height}px`;
     await Plotly.newPlot(place, data, chosen, config);
   }
