@@ -80,7 +80,7 @@ def unprinted() -> Iterator[None]:
     own. Figures that are files are drawn, but for tests that ask for `undrawn`."""
     from friso.views import pages  # slow
 
-    with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda figure, form, headed=True: b"<svg/>")}}):
+    with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda *_, **__: b"<svg/>")}}):
         yield
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import socket
 import subprocess
@@ -22,6 +23,13 @@ pytestmark = needs_browser
 
 RIG = Path(friso.example("thesis_rig"))
 FIELD = '[data-path="controller.crossover"] input[type=text]'
+
+
+def written(folder: Path) -> Path:
+    """A log."""
+    moved = motion()
+    columns = [np.asarray(moved[name]) for name in ("time", "position", "force")]
+    return write_text(folder / "log.csv", ["time [s]", "position [m]", "force [N]"], columns)
 
 
 class Browsed:
@@ -318,11 +326,30 @@ def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, t
     browsed.answered("convertible to Hz")
     assert page.locator(".key, [data-part], .figure:visible, #pictures-bar button").count() == 0
     assert page.is_disabled("#out")
+    assert page.is_disabled("#pin")
+    page.set_input_files("#file", written(tmp_path))
+    page.wait_for_selector("#role-position", timeout=60_000)
+    assert page.locator("#pictures-bar button").count() == 0
     page.click("text=Edit the file")
     page.fill("#dialog textarea", RIG.read_text())
     page.click("text=Use this text")
     page.wait_for_selector(FIELD, timeout=30_000)
     assert page.input_value(FIELD) == "8 Hz"
+    page.click("#tab-run")
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+
+
+def test_where_the_server_fails_it_can_be_asked_again(browsed: Browsed, tmp_path: Path) -> None:
+    page = browsed.page
+    answer = json.dumps({"kind": "failed", "key": "", "text": "out of memory"}).encode()
+    body = len(answer).to_bytes(4, "little") + bytes(4) + answer
+    page.route("**/ask/machine", lambda route: route.fulfill(body=body))
+    (tmp_path / "other.toml").write_text(RIG.read_text() + "\n")
+    page.set_input_files("#file", tmp_path / "other.toml")
+    browsed.answered("out of memory")
+    page.unroute("**/ask/machine")
+    page.click("text=Ask again")
+    page.wait_for_selector(FIELD, timeout=30_000)
     page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
 
 
@@ -343,14 +370,9 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
 
 
 def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> None:
-    page, moved = browsed.page, motion()
-    log = write_text(
-        tmp_path / "log.csv",
-        ["time [s]", "position [m]", "force [N]"],
-        [np.asarray(moved[n]) for n in ("time", "position", "force")],
-    )
+    page = browsed.page
     page.click("#tab-logs")
-    page.set_input_files("#log-files", log)
+    page.set_input_files("#log-files", written(tmp_path))
     page.wait_for_selector("#role-position", timeout=60_000)
     assert "log.csv" in page.inner_text("#picture")
 

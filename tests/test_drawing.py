@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import matplotlib
@@ -202,6 +203,15 @@ def test_colour_bar_and_units_of_a_map():
 def test_drawing_twice_changes_nothing():
     once = drawable(small_figure())
     assert [p.x for p in drawable(once).panels] == [p.x for p in once.panels]
+
+
+def test_figures_drawn_in_threads_are_those_drawn_alone():
+    kinds = [("png", True), ("svg", False), ("svg", True), ("png", False)]
+    alone = [matplotlib_renderer.image(small_figure(), *kind) for kind in kinds]
+    figure = small_figure()
+    with ThreadPoolExecutor(4) as threads:
+        together = threads.map(lambda kind: matplotlib_renderer.image(figure, *kind), 2 * kinds)
+        assert [*together] == 2 * alone
 
 
 def test_unknown_format_is_refused(tmp_path):

@@ -69,6 +69,10 @@ def test_a_log_in_si_units(tmp_path: Path, wording: Wording) -> None:
         ("enc2", "position"), ("cart_position", "cart_position"), ("relative position", "relative_position"),
         ("iq", "force"), ("MotorCurrent", "force"), ("desired", "reference"), ("setpoint", "reference"), ("t", "time"),
         ("Time", "time"), ("PosDiff", None), ("SetVelo", None), ("following error", None), ("qm", None), ("vir", None),
+        *((name, "reference") for name in (
+            "position_sp", "SP_pos", "PosSP", "pos_d", "Pos_Traj", "profile_position", "position_nominal", "x_des"
+        )),
+        ("Force_d", "force"), ("speed", "velocity"), ("sp_velocity", None), ("d", None),
         ("position_ref", "reference"), ("stage_pos", "position"), ("total", None), ("composition", None),
     ],
 )  # fmt: skip
@@ -121,6 +125,38 @@ def test_everything_that_is_open_is_told_at_once(tmp_path: Path) -> None:
     log = read_log(path, from_options(maps, units), needed=("position", "force"))
     assert log["position"] == pytest.approx(M["position"])
     assert log["force"] == pytest.approx(M["force"])
+
+
+@pytest.mark.parametrize("turned", [False, True])
+@pytest.mark.parametrize(
+    ("wanted", "measured", "force", "scale"), [("qg", "qm", "vir", "N/V"), ("xd", "xm", "iq", "N/A")]
+)
+def test_of_two_channels_alike_the_noisier_is_the_position(
+    wanted: str, measured: str, force: str, scale: str, turned: bool, tmp_path: Path
+) -> None:
+    """Whichever comes first; and no motor current is in newtons."""
+    noisy = M["position"] + 1e-5 * np.random.default_rng(1).standard_normal(M["position"].size)
+    pair = [(wanted, M["position"]), (measured, noisy)]
+    names, values = zip(("t", M["time"]), *(pair[::-1] if turned else pair), (force, M["force"]), strict=True)
+    with pytest.raises(GapsError) as caught:
+        read_log(log_files.write_text(tmp_path / "a.csv", names, values), needed=("position", "force"))
+    assert f"--map position={measured}" in caught.value.options
+    assert f'"{measured}" is like "{wanted}" with more noise' in str(caught.value)
+    options = [option for option in caught.value.options if "force" in option or force in option]
+    told = [f'--scale force="NUMBER {scale}"']
+    assert options == ([f"--map force={force}", *told] if force == "vir" else told)
+
+
+def test_of_two_channels_that_are_the_same_none_is_the_position(tmp_path: Path) -> None:
+    values = [M["time"], M["position"], M["position"]]
+    for names in (["time [s]", "x", "y"], ["time [s]", "pos a", "pos b"]):
+        with pytest.raises(GapsError, match="are alike: one of them may be a reference") as caught:
+            read_log(log_files.write_text(tmp_path / "a.csv", names, values), needed=("position",))
+        assert caught.value.options == ()
+        assert [gap.key for gap in caught.value.gaps] == ["position"]
+    with pytest.raises(GapsError) as caught:
+        read_log(log_files.write_text(tmp_path / "a.csv", ["time [s]", "x_des", "x"], values), needed=("position",))
+    assert "--map position=x" in caught.value.options
 
 
 def test_time_is_never_proposed_for_another_role(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import math
 import re
 import subprocess
 import sys
+import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,7 @@ from friso.views.map.cells import axes_of, look, pick
 from friso.views.map.data import MOST, NONE
 from friso.views.map.figures import SLICES, map_figure, map_panel
 from friso.views.map.findings import headline, statement, verification
-from friso.views.map.page import map_html
+from friso.views.map.page import map_files, map_html
 from friso.views.map.words import CATEGORIES, FAILED, INFERRED, INVALID, NOT_RUN, QUIET, quantity
 
 CROSSOVER, STROKE, DAMPING, LOCKED = (
@@ -499,6 +500,23 @@ def test_a_browser_draws_the_map_and_its_controls(tmp_path: Path):
     assert re.search(r'<div id="plot"[^>]*class="js-plotly-plot"', elements)
     assert "<select>" in elements
     assert '<html lang="en">' in elements
+
+
+def test_a_map_is_laid_out_once_for_its_page_and_its_files(
+    printed: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """On the page its note is a text beside it, and is cut off the figure."""
+    drawn: list[Figure] = []
+    render = matplotlib_renderer.render
+    monkeypatch.setattr(matplotlib_renderer, "render", lambda figure: drawn.append(figure) or render(figure))
+    files = map_files(plain(), "peaks", RERUN, None)
+    for form in matplotlib_renderer.FORMATS:
+        files[form](tmp_path / f"map.{form}")
+    assert len(drawn) == 1
+    shown, bare = (render(figure) for figure in (drawn[0], replace(drawn[0], title="", subject="", note="")))
+    cut = ET.fromstring(matplotlib_renderer.image(drawn[0], "svg", headed=False, noted=False))
+    assert float(cut.attrib["height"].removesuffix("pt")) == pytest.approx(72 * bare.get_figheight(), abs=6)
+    assert shown.get_figheight() > bare.get_figheight() + 0.3
 
 
 def test_a_page_of_samples_names_their_numbers():

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import pickle
 import random
 import re
 import shutil
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+import zarr
 from filelock import FileLock
 from refusals import Refused
 from systems import posix
@@ -27,9 +29,10 @@ from friso.stage import Stage
 from friso.studies import refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
-from friso.studies.metadata import digest
+from friso.studies.metadata import checked_metadata, digest
 from friso.studies.request import Request
 from friso.studies.samples import Samples
+from friso.studies.sealed_store import SealedStore
 from friso.studies.store import Store, check_store, read_store
 from friso.studies.store_folder import LOCK, make
 from friso.studies.sweep import run_in_store, sweep
@@ -406,6 +409,17 @@ def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Re
     (stored / ".zmetadata").unlink()
     with refused(kind=StoreError):
         read_store(stored)
+
+
+def test_a_store_once_checked_pickles_and_its_metadata_are_not_read_again(stored: Path) -> None:
+    runs, files = read_store(stored), checked_metadata(stored).all_files
+    for name in files:
+        (stored / name).unlink()
+    other = pickle.loads(pickle.dumps(runs))
+    assert other.encoding["source"] == str(stored)
+    assert float(other["peaks"][0, 0]) == float(runs["peaks"][0, 0])
+    group = zarr.open_consolidated(SealedStore.at(stored, files).with_read_only(True), mode="r", zarr_format=2)
+    assert group["peaks"].shape == runs["peaks"].shape
 
 
 @posix

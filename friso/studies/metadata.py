@@ -54,6 +54,11 @@ class Metadata:
         return self.document["metadata"]
 
     @property
+    def all_files(self) -> dict[str, Any]:
+        """The same with the file that holds them all."""
+        return {**self.files, _FILE: self.document}
+
+    @property
     def attributes(self) -> dict[str, Any]:
         """The attributes of the study."""
         return dict(self.files[_ATTRIBUTES])

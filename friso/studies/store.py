@@ -25,7 +25,6 @@ from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
-from friso.studies.sealed_store import sealed_store
 from friso.studies.store_files import refuse_foreign
 from friso.studies.store_folder import exchange, lock_store, make, remove_leftovers, remove_partial_files
 from friso.studies.study import CellBlock, Study, study_of
@@ -196,14 +195,17 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
+    from friso.studies.sealed_store import SealedStore
+
     metadata = checked_metadata(Path(path))
     refuse_foreign(Path(path))
     try:
         if metadata.damaged_axes(Path(path)):
             raise ValueError("other axes than were written")
-        runs = xr.open_zarr(sealed_store(Path(path), metadata.files), chunks=None, zarr_format=_FORMAT)
+        runs = xr.open_zarr(SealedStore.at(Path(path), metadata.all_files), chunks=None, zarr_format=_FORMAT)
         runs.attrs = metadata.attributes
         runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
+        runs.encoding["source"] = os.path.abspath(path)
         study_of(runs)
         return runs
     except Exception:  # whatever a codec, or a study, makes of what it cannot read

@@ -101,7 +101,7 @@ def _escaped_text(value: Any) -> Any:
     return value if isinstance(value, Markup) or not isinstance(value, str) else escaped(value)
 
 
-def print_image(figure: Figure) -> str:
-    """The figure as an SVG data address: what is printed, and what is seen without scripts."""
-    svg = matplotlib_renderer.image(figure, "svg", headed=False)
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
+def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> str:
+    """The figure as a data address: what is printed, and what is seen without scripts."""
+    content = base64.b64encode(matplotlib_renderer.image(figure, form, headed=False, noted=noted)).decode("ascii")
+    return f"data:image/{'svg+xml' if form == 'svg' else form};base64,{content}"

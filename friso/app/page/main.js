@@ -81,7 +81,7 @@ function described(part) {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
     answers.progress(null);
-    if (!shown || held !== machines.current().text) return without(part.text);
+    if (!shown || held !== machines.current().text) return without(part);
     left();
     if (!$("keys").querySelector(".wrong")) answers.refused(part.text);
     return;
@@ -90,7 +90,7 @@ function described(part) {
   const another = wrong !== null || held !== machines.current().text;
   wrong = null;
   shown = part;
-  $("out").disabled = false;
+  usable();
   if (held !== machines.current().text) {
     held = machines.current().text;
     forgetRanges();
@@ -104,18 +104,24 @@ function described(part) {
   if (!machines.dragging()) timer = setTimeout(check, CHECKED_AFTER);
 }
 
-/** A file that holds no machine: nothing of another one stays beside it, and its text can be mended here. */
-function without(text) {
+/** What is of use with a machine alone. */
+const usable = () => ["out", "pin"].forEach((id) => ($(id).disabled = !shown));
+
+/** A file that holds no machine: nothing of another one stays beside it, and its text can be mended here, unless it was the server that failed. */
+function without(part) {
   const { name, text: toml } = machines.current();
   shown = null;
   held = "";
+  late = false;
   verdict.stop();
   pictures.none();
-  $("out").disabled = true;
+  usable();
   document.title = plain(`${name}: friso`);
   $("drawing").replaceChildren();
-  $("keys").replaceChildren(el("button", { type: "button", onclick: () => edit(toml, (mended) => machines.add(name, mended, true)) }, "Edit the file"));
-  answers.refused(text);
+  const again = part.kind === "failed";
+  const onclick = again ? () => changed(false) : () => edit(toml, (mended) => machines.add(name, mended, true));
+  $("keys").replaceChildren(el("button", { type: "button", onclick }, again ? "Ask again" : "Edit the file"));
+  answers.refused(part.text);
 }
 
 async function check() {
@@ -217,7 +223,7 @@ function wire() {
       event.preventDefault();
       if (event.shiftKey) redo();
       else undo();
-    } else if (event.key === "p" && !event.ctrlKey && !event.metaKey) machines.pin();
+    } else if (event.key === "p" && !event.ctrlKey && !event.metaKey) $("pin").click();
   });
   $("keys").addEventListener("focusout", caughtUp);
   document.addEventListener("dragover", (event) => event.preventDefault());

@@ -56,14 +56,15 @@ export class Pictures {
   }
 
   bar() {
-    const tabs = this.tabs.filter((tab) => !tab.when || tab.when());
-    if (!tabs.some((tab) => tab.id === this.shown)) this.show("run");
+    const tabs = this.machine ? this.tabs.filter((tab) => !tab.when || tab.when()) : [];
+    if (this.machine && !tabs.some((tab) => tab.id === this.shown)) this.show("run");
     $("pictures-bar").replaceChildren(
       ...tabs.map(({ id, label }) =>
         el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),
       ),
     );
-    $("picture").setAttribute("aria-labelledby", `tab-${this.shown}`);
+    if (this.machine) $("picture").setAttribute("aria-labelledby", `tab-${this.shown}`);
+    else $("picture").removeAttribute("aria-labelledby");
   }
 
   show(id) {
@@ -81,15 +82,14 @@ export class Pictures {
     this.ask();
   }
 
-  /** There is no machine. */
+  /** There is no machine, and no tabs. */
   none() {
     this.machine = null;
     this.show("run");
     this.live.stop();
     if (this.plots) clear(this.plots);
     this.below?.replaceChildren();
-    $("pictures-bar").replaceChildren();
-    $("picture").removeAttribute("aria-labelledby");
+    this.bar();
   }
 
   /** What stands above the plots of a tab. */

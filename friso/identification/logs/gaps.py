@@ -9,9 +9,10 @@ import numpy as np
 from friso.axis import FORCE, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.checks import samples_held
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import option
-from friso.identification.logs.roles import AssignedRole, Proposal, listing, role_of, words
+from friso.identification.logs.roles import AssignedRole, Proposal, is_wanted, listing, role_of, words
 from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
 from friso.identification.logs.units import OTHERS, in_si, unit_factor
 from friso.quantities import quoted
@@ -22,8 +23,9 @@ OPTIONAL = ("velocity", "acceleration")
 _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "fuivmk", "disturbance": "d"}
 """Letters with which channels of a role often begin, to choose the example of a message."""
 
-_WANTED = ("set", "ref", "soll", "cmd", "target")
-"""Parts of names that tell what was wanted from what was measured, for the same purpose."""
+_ALIKE, _LEAST = 0.99, 20
+"""Channels of one size that correlate by more, of so many samples at least, may be what was wanted and what was
+measured of it."""
 
 
 class GapsError(LogError):
@@ -62,14 +64,16 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
         if role in OPTIONAL and role not in needed:
             continue
         names = " and ".join(quoted(channel.name) for channel in channels)
-        example = option("--map", role, channels[0].name)
-        gaps.append(LogError(role, f"{len(channels)} candidates: {names}", "one channel", example, origin))
-        if role in needed:
-            chosen[role] = AssignedRole(role, channels[0], "", True)
-    for role in [role for role in needed if role not in chosen]:
-        likely = likeliest(role, table, [choice.channel for choice in (*proposal.chosen.values(), *chosen.values())])
+        likely, why = _of_alike(role, channels[0], channels)
         example = option("--map", role, likely.name) if likely else ""
-        gaps.append(LogError(role, "no channel whose name suggests it", listing(table), example, origin))
+        gaps.append(LogError(role, f"{len(channels)} candidates: {names}{why}", "one channel", example, origin))
+        if role in needed and likely:
+            chosen[role] = AssignedRole(role, likely, "", True)
+    for role in [role for role in needed if role not in chosen and role not in proposal.rivals]:
+        taken = [choice.channel for choice in (*proposal.chosen.values(), *chosen.values())]
+        likely, why = _likeliest(role, table, taken)
+        example = option("--map", role, likely.name) if likely else ""
+        gaps.append(LogError(role, f"no channel whose name suggests it{why}", listing(table), example, origin))
         if likely:
             chosen[role] = AssignedRole(role, likely, "", True)
     gaps += _of_time(reading, proposal, [chosen[role] for role in needed if role in chosen])
@@ -96,9 +100,9 @@ def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, Assigne
     return list(gaps.values())
 
 
-def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Channel | None:
-    """The channel that fits a role best by unit and first letter, of those that change and have no other role; None
-    without any."""
+def _likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> tuple[Channel | None, str]:
+    """The channel that fits a role best by unit and first letter, of those that change and have no other role, and why
+    where it is one of several alike; None without any."""
     used = {id(channel) for channel in taken}
     free = [
         channel
@@ -106,7 +110,44 @@ def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Chann
         if id(channel) not in used and (role_of(channel.name) or ("",))[0] in ("", role)
     ]
     fits = [(channel, _fit(role, channel)) for channel in free]
-    return max(fits, key=lambda pair: pair[1])[0] if fits else None
+    if not fits:
+        return None, ""
+    best, fit = max(fits, key=lambda pair: pair[1])
+    return _of_alike(role, best, [channel for channel, other in fits if other[:3] == fit[:3]])
+
+
+def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
+    """Of the channels that move as the best for a position does, the one with the most noise, as what is measured has,
+    and why; None where that cannot be told."""
+    alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
+    if role != "position" or len(alike) == 1:
+        return best, ""
+    (most, noisiest), (next_most, _) = sorted(((_noise(c), c) for c in alike), key=lambda pair: -pair[0])[:2]
+    others = " and ".join(quoted(channel.name) for channel in alike if channel is not noisiest)
+    if most < 2 * next_most or any(samples_held(channel.values) > 1 for channel in alike):
+        names = " and ".join(quoted(channel.name) for channel in alike)
+        return None, f"; {names} are alike: one of them may be a reference"
+    return noisiest, f"; {quoted(noisiest.name)} is like {others} with more noise, as what is measured has"
+
+
+def _are_alike(one: Channel, other: Channel) -> bool:
+    """Whether two channels correlate, as a position does with its reference."""
+    if one.values.size != other.values.size:
+        return False
+    both = np.isfinite(one.values) & np.isfinite(other.values)
+    if np.count_nonzero(both) < _LEAST:
+        return False
+    first, second = one.values[both], other.values[both]
+    with np.errstate(all="ignore"):
+        less, more = sorted((np.ptp(first), np.ptp(second)))
+        return bool(0 < more < 2 * less and np.corrcoef(first, second)[0, 1] > _ALIKE)
+
+
+def _noise(channel: Channel) -> float:
+    """The fourth differences of a channel, in which little of a motion is left, relative to its range."""
+    finite = channel.values[np.isfinite(channel.values)]
+    with np.errstate(all="ignore"):
+        return float(np.std(np.diff(finite, 4)) / np.ptp(finite))
 
 
 def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
@@ -117,8 +158,7 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
     kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))  # those of a rotary axis among them
     unit = 1 if not channel.unit else 2 if any(unit_factor(channel.unit, kind) is not None for kind in kinds) else 0
     first = next(iter(words(channel.name)), " ")[0]
-    wanted = any(word in channel.name.lower() for word in _WANTED)
-    return changes, unit, wanted == (role == "reference"), first in _INITIALS.get(role, "")
+    return changes, unit, is_wanted(channel.name) == (role == "reference"), first in _INITIALS.get(role, "")
 
 
 def _like_a_clock(values: np.ndarray) -> bool:

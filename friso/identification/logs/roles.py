@@ -14,8 +14,11 @@ from friso.identification.logs.units import split_heading, unit_factor, without_
 from friso.quantities import quoted
 
 _SET = frozenset(
-    ["ref", "reference", "set", "setpoint", "desired", "target", "cmd", "command", "commanded", "demand", "soll"]
-)
+    [
+        "ref", "reference", "set", "setpoint", "setpos", "sp", "des", "desired", "target", "cmd", "command",
+        "commanded", "demand", "demanded", "nominal", "traj", "trajectory", "profile", "soll", "consigne", "consigna",
+    ]
+)  # fmt: skip
 _NOT_MEASURED = frozenset(
     ["err", "error", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable"]
 )
@@ -107,14 +110,20 @@ def role_of(name: str) -> tuple[str, str] | None:
     key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
     if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
         return "time", key["time"]
-    if name_words & _SET or "setpos" in name_words:
+    wanted = next((part for part in parts if part in _SET), "d" if key["position"] and parts[-1] == "d" else "")
+    if wanted:
         others = key["velocity"] or key["acceleration"] or key["force"] or key["disturbance"]
-        return None if others else ("reference", next(part for part in parts if part in _SET or part == "setpos"))
+        return None if others else ("reference", wanted)
     if key["position"] or "actpos" in name_words:
         word = key["position"] or "actpos"
         kind = "relative_position" if name_words & _RELATIVE else "cart_position" if name_words & _CART else "position"
         return kind, word
     return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
+
+
+def is_wanted(name: str) -> bool:
+    """Whether a name tells, or hints within a word, that it is what was wanted, and was not measured."""
+    return any(word in (name.lower() if len(word) > 2 else words(name)) for word in _SET)
 
 
 def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel:

@@ -15,9 +15,9 @@ from friso.identification.logs.checks import unwrapped
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.preamble import RATES, STEPS
-from friso.identification.logs.roles import AssignedRole, find
+from friso.identification.logs.roles import AssignedRole, find, words
 from friso.identification.logs.text import with_times
-from friso.identification.logs.units import FOREIGN, in_si, is_unit, read_scale, unit_factor
+from friso.identification.logs.units import FOREIGN, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
 
 TURNS = f"--axis {ROTARY.name}"
@@ -130,8 +130,16 @@ def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
 
 
 def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
-    """Whether a channel without a unit counts as one in SI: the user assigned it, and the format holds no units."""
-    return not choice.channel.unit and reading.strict and choice.by_user and reading.bare
+    """Whether a channel without a unit counts as one in SI: the user assigned it, the format holds no units, and it is
+    no current for a force."""
+    bare = not choice.channel.unit and reading.strict and choice.by_user and reading.bare
+    return bare and not _electric_unit(choice)
+
+
+def _electric_unit(choice: AssignedRole) -> str:
+    """A or V, where the name of a channel for a force tells it; "" else."""
+    unit = likely_unit(words(choice.channel.name)) if choice.role == "force" else ""
+    return unit if unit in ("A", "V") else ""
 
 
 def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> LogError:
@@ -141,9 +149,13 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
         usual = _likely_length(choice.channel) if wanted == LENGTH else wanted
         actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
         expected = f"a unit convertible to {wanted}"
+        example = option("--unit", name, usual)
         if role == "force":
-            expected += f", or a scale such as {option('--scale', role, f'35 {wanted}/V')}"
-        return LogError(role, actual, expected, option("--unit", name, usual), reading.origin)
+            electric = _electric_unit(choice)
+            scale = f"{wanted}/{electric or 'V'}"
+            expected += f", or a scale such as {option('--scale', role, f'35 {scale}')}"
+            example = f'--scale {role}="NUMBER {scale}"' if electric else example
+        return LogError(role, actual, expected, example, reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "5e-7" if si == "count" else "1.5"
     scale = f"{wanted}/{si}"
     expected = f'a scale to {wanted}, such as --scale {role}="{number} {scale}"'

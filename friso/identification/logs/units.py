@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable
 from functools import lru_cache
 
 from friso.axis import LINEAR, AxisKind
@@ -67,9 +68,15 @@ _MEASURED_IN = {
     "m": {"pos", "position", "x", "ref", "reference", "displacement"},
     "N": {"force", "f", "kraft", "friction", "forza", "fuerza", "forca"},
     "A": {"current", "iq", "i", "strom"},
-    "V": {"voltage", "u", "command"},
+    "V": {"voltage", "u", "vir", "command"},
 }
 """Words in a name that tell what is measured in these letters."""
+
+
+def likely_unit(words: Iterable[str]) -> str:
+    """The unit in which what the words of a name tell is measured; "" for none. A single letter is no word."""
+    told = {word for word in words if len(word) > 1}
+    return next((unit for unit, names in _MEASURED_IN.items() if names & told), "")
 
 
 def without_accents(name: str) -> str:

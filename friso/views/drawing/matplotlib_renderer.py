@@ -11,6 +11,7 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from threading import RLock
 from typing import Any
 
 import matplotlib as mpl
@@ -32,7 +33,7 @@ from matplotlib.transforms import Bbox
 from friso.errors import InputError
 from friso.views.drawing.drawable import drawable, word_ticks
 from friso.views.drawing.figure import GREY, INK, Figure, Panel
-from friso.views.drawing.matplotlib_maps import add_colour_bars, add_footer, draw_coloured, footer_height
+from friso.views.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
 
 FORMATS = ("png", "svg", "pdf")
 WIDTH = 9.0  # [inch]
@@ -128,19 +129,22 @@ def draw_on(figure: Figure, axes: Axes | Sequence[Axes] | None) -> list[Axes]:
     return places
 
 
-def image(figure: Figure, form: str, headed: bool = True) -> bytes:
-    """The figure as the bytes of a file, with its heading or cut off below it; `form` is one of FORMATS (ValueError
-    otherwise)."""
+def image(figure: Figure, form: str, headed: bool = True, noted: bool = True) -> bytes:
+    """The figure as the bytes of a file, with its heading or cut off below it, with its note or cut off above it;
+    `form` is one of FORMATS (ValueError otherwise)."""
     if form not in FORMATS:
         raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
     stream = io.BytesIO()
     with _style():
         canvas = _laid_out(figure)
-        if heading := canvas._suptitle:  # type: ignore[attr-defined]
-            heading.set_visible(headed)
-        height = canvas.get_figheight() - (HEADER_HEIGHT if heading and not headed else 0)
-        area = Bbox([[0, 0], [WIDTH, height]])
-        canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=None if headed else area)
+        heading = canvas._suptitle  # type: ignore[attr-defined]
+        notes = [text for text in canvas.texts if text is not heading]
+        for text in canvas.texts:
+            text.set_visible(headed if text is heading else noted)
+        low = 0 if noted else LINE * len(notes)
+        high = canvas.get_figheight() - (HEADER_HEIGHT if heading and not headed else 0)
+        area = None if headed and noted else Bbox([[0, low], [WIDTH, high]])
+        canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area)
     return stream.getvalue()
 
 
@@ -160,6 +164,9 @@ def _laid_out(figure: Figure) -> Canvas:
 
 _last: deque[tuple[Figure, Canvas]] = deque(maxlen=6)
 
+_one_at_a_time = RLock()
+"""Matplotlib's parameters are those of the process, and a canvas may be kept, but friso app draws in threads."""
+
 
 def save(figure: Figure, path: Path) -> None:
     """Write the figure to `path`, in the format of its suffix (ValueError for others than FORMATS)."""
@@ -168,7 +175,7 @@ def save(figure: Figure, path: Path) -> None:
 
 @contextmanager
 def _style() -> Iterator[None]:
-    with mpl.rc_context():
+    with _one_at_a_time, mpl.rc_context():
         mpl.rcdefaults()
         mpl.rcParams.update(_STYLE)
         yield

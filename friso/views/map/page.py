@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -21,6 +20,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from friso.studies.traces import Traces
+    from friso.views.drawing.figure import Figure
 
 FORMS = (*matplotlib_renderer.FORMATS, "html")
 """Suffixes of the files of a map."""
@@ -31,11 +31,14 @@ def map_files(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None) -
     as in `map_html`."""
     figure = map_figure(runs, metric)
     files: dict[str, Content] = {form: partial(matplotlib_renderer.save, figure) for form in FORMS[:-1]}
-    return {**files, FORMS[-1]: map_html(runs, metric, rerun, drawn)}
+    return {**files, FORMS[-1]: map_html(runs, metric, rerun, drawn, figure)}
 
 
-def map_html(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None) -> str:
-    """The whole page of the runs of a sweep, which opens with the variable `metric`.
+def map_html(
+    runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = None, figure: Figure | None = None
+) -> str:
+    """The whole page of the runs of a sweep, which opens with the variable `metric`; `figure`: that of it, if there is
+    one already.
 
     `drawn`: the runs of all cells, in C order; the page draws that of a cell that is chosen. `rerun`: the command that
     repeats one run, with {indices} where the indices of its cell go, in the order of the axes: "friso simulate --cell
@@ -45,7 +48,7 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = N
         raise ValueError(
             f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"
         )
-    figure = map_figure(runs, metric)
+    figure = figure or map_figure(runs, metric)
     return Report(
         "map",
         runs.attrs.get("name") or "Unnamed stage",
@@ -60,7 +63,7 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None = N
             "undrawn": drawn is None,
             "data": packed_json(page_data(runs, metric, rerun, drawn)),
             "figure": figure,
-            "printed": print_image(replace(figure, note="")),
+            "printed": print_image(figure, noted=False),
             "script": script("map"),
             "rtol": f"{float(runs.attrs['rtol']):g}",
         },

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from friso.studies.thesis import CONVENTIONS, STUDIES, thesis_rig
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing import plotly_renderer
 from friso.views.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report, print_image
@@ -127,8 +126,7 @@ def _printed(figure: Figure) -> str:
     """The figure for paper as a data address; maps as pixels, since thousands of cells make megabytes of lines."""
     if not any(panel.maps for panel in figure.panels):
         return print_image(figure)
-    pixels = matplotlib_renderer.image(replace(figure, title="", note=""), "png")
-    return "data:image/png;base64," + base64.b64encode(pixels).decode("ascii")
+    return print_image(figure, "png", noted=False)
 
 
 def _counts(verdicts: Iterable[ClaimVerdict]) -> dict[str, int]:
