@@ -488,11 +488,11 @@ def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
     case = replace(fake_case(), judgement=settles())
     assert case.judgement.margin
     edge = factor * case.judgement.margin.crossover / case.judgement.margin.factor
-    told = edge_text(case, AttractionEnd(factor, 1.1 * factor, True, reserve))
-    value, unit, share = re.search(r"about ([\d.]+) (m?Hz) \(± ([\d.]+) %\)", told).groups()
-    centre, known = float(value) * (1e-3 if unit == "mHz" else 1.0), float(share) / 100
+    text = edge_text(case, AttractionEnd(factor, 1.1 * factor, True, reserve))
+    value, unit, share = re.search(r"about ([\d.]+) (m?Hz) \(± ([\d.]+) %\)", text).groups()
+    centre, bound = float(value) * (1e-3 if unit == "mHz" else 1.0), float(share) / 100
     for end in (1 - reserve, 1 + reserve):
-        assert abs(edge * end / centre - 1) <= known * (1 + 1e-6) + 2e-6
+        assert abs(edge * end / centre - 1) <= bound * (1 + 1e-6) + 2e-6
 
 
 def test_an_edge_is_told_with_what_is_known_of_it() -> None:

@@ -190,8 +190,8 @@ def edge_text(case: Case, end: AttractionEnd) -> str:
     if end.reserve < ROUGH:
         return _bandwidth(case, end.inside, up=None, digits=4)
     value = end.inside * (_present_bandwidth(case) or 1.0)
-    known = end.reserve + abs(float(f"{value:.4g}") / value - 1)
-    return f"about {_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(known, 1), 1)})"
+    bound = end.reserve + abs(float(f"{value:.4g}") / value - 1)
+    return f"about {_bandwidth(case, end.inside, up=None, digits=4)} (± {percent(rounded_up(bound, 1), 1)})"
 
 
 def _present_bandwidth(case: Case) -> float | None:
