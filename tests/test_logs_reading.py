@@ -143,8 +143,8 @@ def test_of_two_channels_alike_the_noisier_is_the_position(
     assert f"--map position={measured}" in caught.value.options
     assert f'"{measured}" is like "{wanted}" with more noise' in str(caught.value)
     options = [option for option in caught.value.options if "force" in option or force in option]
-    told = [f'--scale force="NUMBER {scale}"']
-    assert options == ([f"--map force={force}", *told] if force == "vir" else told)
+    scaled = [f'--scale force="NUMBER {scale}"']
+    assert options == ([f"--map force={force}", *scaled] if force == "vir" else scaled)
 
 
 def test_of_two_channels_that_are_the_same_none_is_the_position(tmp_path: Path) -> None:

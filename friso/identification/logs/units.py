@@ -75,8 +75,8 @@ _MEASURED_IN = {
 
 def likely_unit(words: Iterable[str]) -> str:
     """The unit in which what the words of a name tell is measured; "" for none. A single letter is no word."""
-    told = {word for word in words if len(word) > 1}
-    return next((unit for unit, names in _MEASURED_IN.items() if names & told), "")
+    long_words = {word for word in words if len(word) > 1}
+    return next((unit for unit, names in _MEASURED_IN.items() if names & long_words), "")
 
 
 def without_accents(name: str) -> str:
