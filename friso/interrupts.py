@@ -19,7 +19,7 @@ from typing import Any
 
 from friso.system import no_signal_later, signal_later
 
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 """The signals that end a command."""
 
 _AGAIN = 0.02

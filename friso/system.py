@@ -237,5 +237,15 @@ else:
 MOVES_OPEN_FOLDERS = sys.platform != "win32"
 """Whether a folder can be renamed, or deleted, in which a file is open: not on Windows."""
 
+MOST_PROCESSES = 61 if sys.platform == "win32" else 10_000
+"""How many processes one can wait for at a time."""
+
+LIBRARIES = (
+    "install the Microsoft Visual C++ runtime, https://aka.ms/vs/17/release/vc_redist.x64.exe"
+    if sys.platform == "win32"
+    else "install friso anew in a new environment"
+)
+"""What is to be done where a compiled library, such as llvmlite's, cannot be loaded."""
+
 LIMITS_MEMORY = sys.platform == "linux"
 """Whether a process can be held to an amount of memory: Windows has no such limit, and macOS does not keep it."""

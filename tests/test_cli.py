@@ -15,6 +15,7 @@ from refusals import Refused
 import friso
 from friso.cli.app import _failed
 from friso.hunting.cycle.find import NO_RETURN
+from friso.system import LIBRARIES
 
 ROOT = Path(__file__).parent.parent
 RIG, STICK_SLIP = ROOT / "examples" / "thesis_rig.toml", ROOT / "examples" / "lugre_stick_slip.toml"
@@ -158,3 +159,12 @@ def test_what_comes_next_can_be_copied(tmp_path: Path) -> None:
 def test_a_failed_rename_names_its_target(capsys: pytest.CaptureFixture[str]) -> None:
     assert _failed(PermissionError(13, "Permission denied", "draft", None, "page.html")) == 1
     assert capsys.readouterr().err.rstrip().endswith("Permission denied: page.html")
+
+
+@pytest.mark.parametrize(
+    "error",
+    [ImportError("DLL load failed while importing _multiarray"), OSError("Could not find/load 'libllvmlite.so'")],
+)
+def test_a_library_that_cannot_be_loaded_names_the_remedy(error: Exception, capsys: pytest.CaptureFixture[str]) -> None:
+    assert _failed(error) == 1
+    assert LIBRARIES in " ".join(capsys.readouterr().err.split())

@@ -233,7 +233,8 @@ def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
 @on_windows
 def test_two_processes_share_an_empty_cache(host: str, axis: Path, tmp_path: Path) -> None:
     arguments = ("simulate", "axis.toml", "--json")
-    folder = str(tmp_path / "kernels")
-    both = [started(host, axis, *arguments, FRISO_CACHE_DIR=folder) for _ in range(2)]
+    folder = tmp_path / "für Kernel"
+    both = [started(host, axis, *arguments, FRISO_CACHE_DIR=str(folder)) for _ in range(2)]
     documents = [json.loads(process.communicate()[0]) for process in both]
     assert documents[0] == documents[1]
+    assert any((folder / "kernels").iterdir())  # and not in a temporary folder

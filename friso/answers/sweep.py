@@ -37,7 +37,7 @@ from friso.studies.store import Store, check_store, in_memory
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
 from friso.studies.verify import WANTED, checked_share, loosest_rtol
-from friso.system import shell_word, usable_cores
+from friso.system import MOST_PROCESSES, shell_word, usable_cores
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -278,7 +278,7 @@ def _chosen_rtol(entry: str | float, study: Study, crew: Crew) -> float:
 def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
     if workers is not None and scheduler is not None:
         raise InputError("workers", "--workers and --scheduler", "one of the two", "workers=4")
-    most = usable_cores()
+    most = min(usable_cores(), MOST_PROCESSES)
     if workers is not None and not 1 <= workers <= most:
         expected = f"1 worker or more, up to the {most} cores that may be used"
         raise wrong("workers", str(workers), expected, "1")

@@ -21,7 +21,7 @@ from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import escaping
 from friso.errors import InputError, shortened
-from friso.system import cause_of, path_of
+from friso.system import LIBRARIES, cause_of, path_of
 from friso.version import VERSION
 
 
@@ -154,12 +154,22 @@ def _failed(error: BaseException) -> int:
         context = getattr(error, "ctx", None)
         say(f"{shortened(usage())}\n  try: {context.command_path if context else 'friso'} --help")
         return 2
+    if _is_of_loading(error):
+        say(f"a library could not be loaded ({error}): {LIBRARIES}")
+        return 1
     if isinstance(error, RuntimeError | OSError | MemoryError):
         cause = cause_of(error) if isinstance(error, OSError) else error
         path = path_of(error) if isinstance(error, OSError) else ""
         say(f"the computation could not be completed: {cause}{': ' if path else ''}{path}")
         return 1
     raise error
+
+
+def _is_of_loading(error: BaseException) -> bool:
+    """Whether a compiled library could not be loaded, as where the system lacks a runtime."""
+    if isinstance(error, ImportError):
+        return not isinstance(error, ModuleNotFoundError)
+    return isinstance(error, OSError) and "llvmlite" in str(error)
 
 
 def _plug_ins() -> str:

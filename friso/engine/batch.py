@@ -14,7 +14,7 @@ from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, ne
 from friso.engine.kernel import Kernel, empty_results
 from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
-from friso.engine.side_by_side import cores_to_use
+from friso.engine.side_by_side import cores_to_use, results_of
 from friso.equations import motion
 from friso.equations.roles import Steady
 
@@ -245,8 +245,7 @@ def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results
         return
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for job in [pool.submit(kernel.run, *arguments) for _ in range(workers)]:
-                job.result()
+            results_of([pool.submit(kernel.run, *arguments) for _ in range(workers)])
         except BaseException:
             settings.cancel[0] = 1
             raise

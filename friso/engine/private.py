@@ -24,8 +24,9 @@ def make_private(folder: Path) -> None:
     """
     folder = folder.absolute()
     for path in [*reversed(folder.parents), folder]:
-        with suppress(FileExistsError):
-            path.mkdir(mode=0o700)
+        if not os.path.lexists(path):  # of the root some systems say something else than that it exists
+            with suppress(FileExistsError):
+                path.mkdir(mode=0o700)
         status = path.lstat()
         if stat.S_ISLNK(status.st_mode) and path.parent == Path(path.anchor):
             status = path.stat()  # the system's own, as /var is on macOS

@@ -45,6 +45,16 @@ def cores_to_use() -> int:
     return beside.cores if beside else usable_cores()
 
 
+def results_of(jobs: Sequence[Future[_T]]) -> list[_T]:
+    """What jobs return, in their order; what ends one of them early is raised. Between waits it is looked whether
+    anybody waits for all of it still, and Ctrl-C is heard, which on Windows interrupts no wait."""
+    while any(not job.done() for job in jobs):
+        for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:
+            job.result()
+        go_on()
+    return [job.result() for job in jobs]
+
+
 def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
     """What the tasks return, in their order, as many of them at a time as there are cores. What ends one of them early
     ends the others, too, at their next batch of runs, and is raised."""
@@ -62,11 +72,7 @@ def side_by_side(tasks: Sequence[Callable[[], _T]]) -> list[_T]:
         with ended_by(flag):
             jobs += [pool.submit(copy_context().run, beside_others, task) for task in tasks]
         try:
-            while any(not job.done() for job in jobs):
-                for job in wait(jobs, _PATIENCE, FIRST_EXCEPTION).done:
-                    job.result()
-                go_on()
-            return [job.result() for job in jobs]
+            return results_of(jobs)
         except BaseException:
             flag[0] = 1
             pool.shutdown(wait=False, cancel_futures=True)

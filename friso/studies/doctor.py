@@ -17,7 +17,7 @@ from pathlib import Path
 
 from friso.stage import Stage
 from friso.stage.files import loads
-from friso.system import usable_cores
+from friso.system import LIBRARIES, usable_cores
 from friso.version import VERSION
 
 RUNS = 64
@@ -49,10 +49,10 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
     yield DoctorCheck("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
     yield from _packages()
     steps: tuple[tuple[str, Callable[[], str], str], ...] = (
-        ("processor", _processor, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
+        ("processor", _processor, LIBRARIES),
         ("cores", lambda: f"{usable_cores()} of {os.cpu_count()} may be used", ""),
         ("kept code", lambda: _kept_code(full_paths), "name another folder in FRISO_CACHE_DIR"),
-        ("compiling", _compiling, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
+        ("compiling", _compiling, LIBRARIES),
         ("running", _running, "empty the folder of kept code, then try again; if it stays, report it with this text"),
     )
     for subject, look, remedy in steps:

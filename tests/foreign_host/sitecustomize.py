@@ -156,6 +156,15 @@ def _in_short_path(real):
     return done
 
 
+def _making(real):
+    def make(path, *more, **others):
+        if os.path.abspath(os.fsdecode(path)) == os.sep:
+            raise PermissionError(13, "Access is denied", path) if HOST == "win32" else IsADirectoryError(21, "", path)
+        real(path, *more, **others)
+
+    return make
+
+
 def _windows_open(real):
     def opened(file, mode="r", buffering=-1, encoding=None, errors=None, newline=None, *more, **others):
         if mode == "wb" and isinstance(file, int) and stat.S_ISFIFO(os.fstat(file).st_mode):
@@ -168,6 +177,7 @@ def _windows_open(real):
     return opened
 
 
+os.mkdir = _making(os.mkdir)
 if HOST == "win32":
     _rename = os.rename
     os.rename, os.replace = _renaming(os.rename), _renaming(os.replace)
