@@ -234,6 +234,12 @@ else:
         return os.cpu_count() or 1
 
 
+IGNORES_CASE = sys.platform == "win32"
+"""Whether a folder is the same however its name is written in small and capital letters."""
+
+MODES_TELL = sys.platform != "win32"
+"""Whether the mode of a folder tells who may look into it: on Windows its access list does."""
+
 MOVES_OPEN_FOLDERS = sys.platform != "win32"
 """Whether a folder can be renamed, or deleted, in which a file is open: not on Windows."""
 

@@ -1,8 +1,10 @@
 """`friso bode` as a user runs it: what it computes, says, draws and refuses."""
 
 import json
+import os
 import re
 import subprocess
+import sys
 from collections.abc import Mapping
 from copy import copy
 from itertools import chain
@@ -96,6 +98,18 @@ def _strict(text: str) -> dict[str, Any]:
         raise AssertionError(f"{name} in the document")
 
     return json.loads(text, parse_constant=refuse)
+
+
+def test_minus_signs_reach_a_terminal_without_them(tmp_path: Path) -> None:
+    (tmp_path / "rigid.toml").write_text(RIGID)
+    command, environ = (
+        [sys.executable, "-m", "friso", "bode", "rigid.toml"],
+        {**os.environ, "PYTHONIOENCODING": "cp437"},
+    )
+    text = subprocess.run(command, cwd=tmp_path, env=environ, capture_output=True, check=True).stdout.decode("cp437")
+    assert "Closest to -1" in text
+    assert re.search(r"-\d+\.\d dB", text)
+    assert "?" not in text
 
 
 # ---------------------------------------------------------------- the document

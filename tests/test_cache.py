@@ -233,14 +233,15 @@ def aged(seconds: float, *files: Path) -> None:
         os.utime(file, (then, then))
 
 
-@pytest.mark.parametrize("crash", ["raise ValueError('no such stage')", "import os; os._exit(3)"])
+@pytest.mark.parametrize("crash", ["raise ValueError('no such stage: µ −')", "import os; os._exit(3)"])
 def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, crash: str) -> None:
-    (tmp_path / "failing_builder.py").write_text(f"def build(folder, task):\n    {crash}\n")
+    (tmp_path / "failing_builder.py").write_text(f"def build(folder, task):\n    {crash}\n", encoding="utf-8")
+    monkeypatch.setenv("PYTHONIOENCODING", "cp1252")  # as on Windows
     monkeypatch.syspath_prepend(tmp_path)
     request = cache.CodeRequest("failing", "what fails", "failing_builder")
     with pytest.raises(RuntimeError, match="could not be compiled") as raised:
         building.built_entries([request, request])
-    assert ("no such stage" in str(raised.value)) == ("no such stage" in crash)
+    assert ("no such stage: µ −" in str(raised.value)) == ("no such stage" in crash)
 
 
 def test_a_builder_builds_again_unless_it_has_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,6 +1,7 @@
 """`friso doctor`: whether friso works on this machine, in a text without names of folders."""
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,24 @@ def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.Mon
     texts = {full: " ".join(finding.text for finding in doctor.checks(full)) for full in (False, True)}
     assert str(cache_folder()) in texts[True]
     assert str(cache_folder().parent) not in texts[False]
+
+
+def test_the_home_is_left_out_of_errors_as_windows_words_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "home", lambda: Path(r"C:\Users\Ann"))
+    monkeypatch.setattr(doctor, "IGNORES_CASE", True)
+    error = PermissionError(13, "denied", r"c:\users\ann\friso")
+    assert doctor._without_home(str(error), False) == r"[Errno 13] denied: '~\\friso'"
+    assert doctor._without_home(r"C:\Users\Anna", False) == r"C:\Users\Anna"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="modes tell nothing there")
+def test_of_kept_code_it_is_said_what_is_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("friso.engine.cache.cache_folder", lambda: tmp_path)
+    for mode, words in ((0o700, "closed to other users"), (0o755, "open to other users")):
+        tmp_path.chmod(mode)
+        assert doctor._kept_code(False).endswith(f", {words}")
+    monkeypatch.setattr("friso.engine.cache.is_passing", lambda folder: True)
+    assert ", which is deleted at the end, " in doctor._kept_code(False)
 
 
 def test_a_user_without_a_home_is_answered(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from inside import friso_inside
 from pages import packed_values
 
-from friso.cli.terminal import Escaping, console
+from friso.cli.terminal import Escaping, console, spelled
 from friso.escapes import escaped, one_line, table_cell
 from friso.studies.export import export
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
@@ -44,6 +44,25 @@ def test_no_text_steers(text: str) -> None:
 @pytest.mark.parametrize("text", ["Ångström µm²", "שלום", "ruler −5 °C", "a\tb\nc", "日本"])
 def test_a_harmless_text_stays(text: str) -> None:
     assert escaped(text) == text
+
+
+@pytest.mark.parametrize(
+    ("encoding", "shown"),
+    [
+        ("cp1252", "-3.1 dB, zeta = 0.5, tau_z 1 ms, µm² s^-¹ m^4 × “Delta” … ±1° ??"),
+        ("cp437", "-3.1 dB, zeta = 0.5, τ_z 1 ms, µm² s^-^1 m^4 x 'Delta' ... ±1° ??"),
+        ("ascii", "-3.1 dB, zeta = 0.5, tau_z 1 ms, um^2 s^-^1 m^4 x 'Delta' ... +-1 deg ??"),
+    ],
+)
+def test_a_character_that_an_encoding_lacks_is_spelled(encoding: str, shown: str) -> None:
+    text = "−3.1 dB, ζ = 0.5, τ_z 1 ms, µm² s⁻¹ m⁴ × “Δ” … ±1° 漢\udc80"
+    assert spelled(text, encoding) == shown
+    assert spelled("▁▂▃▅▆▇", encoding) == "123567"
+
+
+@given(st.text(st.characters(exclude_categories=())))
+def test_every_character_can_be_spelled(text: str) -> None:
+    assert spelled(text, "ascii").isascii()
 
 
 def test_what_is_written_out_can_be_read() -> None:

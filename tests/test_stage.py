@@ -11,6 +11,7 @@ import pytest
 from refusals import Refused, Wording
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
+from friso import paths
 from friso.errors import InputError, StageError
 from friso.quantities import Quantity, Value, any_sign, positive
 from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
@@ -208,6 +209,13 @@ def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage, refused: Refuse
 def test_save_into_nowhere(tmp_path: Path, rig: Stage, refused: Refused) -> None:
     with refused():
         save(rig, tmp_path / "missing" / "rig.toml")
+
+
+def test_a_device_of_windows_is_no_file(tmp_path: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(paths, "device_in", lambda path: path.name)
+    with pytest.raises(InputError, match=r"con\.toml is a device"):
+        save(rig, tmp_path / "con.toml")
+    assert not [*tmp_path.iterdir()]
 
 
 def test_replace(rig: Stage) -> None:

@@ -17,7 +17,7 @@ from friso.interrupts import hold_interrupts
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
 from friso.stage.files import parsed, text_of
-from friso.system import cause_of, device_in, shell_word
+from friso.system import cause_of, shell_word
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -96,14 +96,9 @@ class OutputFolder:
 
 
 def refuse_place(option: str, path: Path) -> None:
-    """Raises InputError where nothing can be written to a path, whatever is there: it has no name, one that is too
-    long, or one that Windows takes for a device."""
-    example = f"{option} report" if option.startswith("--") else ""
-    if flaw := paths.flaw_of(path, paths.LONGEST_WRITTEN):
-        raise InputError(option, flaw, f"names of at most {paths.LONGEST_WRITTEN} bytes", example)
-    if device := device_in(path):
-        expected = f"another name: for Windows, {device} is a device whatever folder and suffix it has"
-        raise InputError(option, str(path), expected, example)
+    """Raises InputError where nothing can be written to a path, whatever is there (`paths.unwritable`)."""
+    if why := paths.unwritable(path):
+        raise InputError(option, *why, f"{option} report" if option.startswith("--") else "")
 
 
 def check_store_folder(folder: Path) -> None:

@@ -19,7 +19,7 @@ from friso import interrupts
 from friso.cli.arguments import refuse_empty, with_checked_paths
 from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
-from friso.cli.terminal import escaping
+from friso.cli.terminal import SPELLED, escaping
 from friso.errors import InputError, shortened
 from friso.system import LIBRARIES, cause_of, path_of
 from friso.version import VERSION
@@ -86,7 +86,7 @@ def main() -> NoReturn:
     sys.stdout, sys.stderr = sys.stdout or _nowhere(), sys.stderr or _nowhere()  # None where the caller closed them
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
+            stream.reconfigure(errors=SPELLED)  # a terminal that knows no minus sign still gets its answer
     with escaping():
         sys.exit(_status())
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.terminal import console
+from friso.cli.terminal import console, spelled
 from friso.escapes import one_line
 
 INTERRUPTED = 130
@@ -35,7 +35,8 @@ def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, li
 
     screen = console(sys.stdout, highlight=False, markup=False)
     lines = [["", *(label for label, _ in rows)], *zip(columns, *(row for _, row in rows), strict=True)]
-    texts, title = [[*map(one_line, column)] for column in lines], one_line(title)
+    texts = [[spelled(one_line(text), screen.encoding) for text in column] for column in lines]
+    title = spelled(one_line(title), screen.encoding)
     names, *others = map(_narrow, texts)
     room = screen.width - 1
     names = min(names, room // 2)

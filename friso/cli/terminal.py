@@ -1,8 +1,11 @@
-"""The terminal: what stands in files may not steer it (`friso.escapes`), friso's own tables and bars may."""
+"""The terminal: what stands in files may not steer it (`friso.escapes`), friso's own tables and bars may, and it need
+not know all letters."""
 
 from __future__ import annotations
 
+import codecs
 import sys
+import unicodedata
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from typing import TYPE_CHECKING, Any, TextIO, cast
@@ -57,3 +60,40 @@ def console(stream: TextIO, **options: Any) -> Console:
 
     plain = cast("TextIO", Piped(stream.stream)) if isinstance(stream, Escaping) else stream
     return Console(file=plain, **options)
+
+
+SPELLED = "friso.spelled"
+"""The error handler of streams: a character that the encoding lacks is spelled."""
+
+
+def spelled(text: str, encoding: str) -> str:
+    """The text as a stream with an encoding shows it."""
+    return text.encode(encoding, SPELLED).decode(encoding)
+
+
+def _spelled(error: UnicodeError) -> tuple[str, int]:
+    if not isinstance(error, UnicodeEncodeError):
+        raise error
+    return "".join(map(_spelling, error.object[error.start : error.end])), error.end
+
+
+def _spelling(character: str) -> str:
+    """A character in ASCII: as in `_SPELLINGS`, an exponent after "^", a Greek letter by its name, others "?"."""
+    if character.isascii() or character in _SPELLINGS:
+        return _SPELLINGS.get(character, character)
+    if unicodedata.decomposition(character).startswith("<super>"):
+        return "^" + "".join(map(_spelling, unicodedata.normalize("NFKC", character)))
+    match unicodedata.name(character, "").split():
+        case ["GREEK", "SMALL" | "CAPITAL" as size, "LETTER", name]:
+            return name.lower() if size == "SMALL" else name.capitalize()
+    return "?"
+
+
+_SPELLINGS = {
+    **dict.fromkeys("−–—", "-"),
+    **dict.fromkeys("“”", "'"),  # which no JSON text ends at
+    **{block: str(height) for height, block in enumerate("▁▂▃▄▅▆▇█", 1)},
+    **{"…": "...", "×": "x", "·": "*", "±": "+-", "≤": "<=", "√": "sqrt ", "°": " deg", "µ": "u", "μ": "u"},
+}
+
+codecs.register_error(SPELLED, _spelled)

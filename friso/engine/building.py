@@ -223,7 +223,7 @@ class _Builder:
     def __init__(self, surroundings: _Surroundings) -> None:
         self.surroundings = surroundings
         self._messages = tempfile.TemporaryFile()  # noqa: SIM115, open as long as the process lives
-        environ = {**os.environ, "PYTHONPATH": os.pathsep.join(surroundings.paths)}
+        environ = {**os.environ, "PYTHONPATH": os.pathsep.join(surroundings.paths), "PYTHONIOENCODING": "utf-8"}
         command = [sys.executable, "-P", "-m", "friso.engine.builder", str(surroundings.folder)]
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)

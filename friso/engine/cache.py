@@ -76,9 +76,14 @@ _PASSING = "friso-kernels-"
 """How the name of a temporary folder begins in which there is a cache."""
 
 
+def is_passing(folder: Path) -> bool:
+    """Whether a cache is in a temporary folder."""
+    return folder.parent.name.startswith(_PASSING)
+
+
 def remove_if_passing(folder: Path) -> None:
     """Remove a cache that is in a temporary folder."""
-    if folder.parent.name.startswith(_PASSING):
+    if is_passing(folder):
         shutil.rmtree(folder.parent, ignore_errors=True)
 
 

@@ -102,8 +102,8 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     >>> friso.save(stage, "heavier.toml")  # doctest: +SKIP
     """
     place = Path(path)
-    if flaw := paths.flaw_of(place, paths.LONGEST_WRITTEN):
-        raise InputError("path", flaw, f"names of at most {paths.LONGEST_WRITTEN} bytes", 'path="stage.toml"')
+    if why := paths.unwritable(place):
+        raise InputError("path", *why, 'path="stage.toml"')
     if os.path.lexists(place) and not (overwrite and place.is_file()):
         raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))
     try:

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from friso.stage import Stage
 from friso.stage.files import loads
-from friso.system import LIBRARIES, usable_cores
+from friso.system import IGNORES_CASE, LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.version import VERSION
 
 RUNS = 64
@@ -101,13 +101,17 @@ def _processor() -> str:
 
 
 def _kept_code(full_paths: bool) -> str:
-    """The folder of compiled code: how much is in it."""
-    from friso.engine.cache import ENTRY, cache_folder
+    """The folder of compiled code: how much is in it, whether it stays, and where modes tell it, who may look in."""
+    from friso.engine.cache import ENTRY, cache_folder, is_passing
 
     folder = cache_folder()
     sizes = [file.stat().st_size for file in folder.glob(f"*{ENTRY}")]
-    place = _without_home(str(folder), full_paths)
-    return f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {place}, closed to other users"
+    text = f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {_without_home(str(folder), full_paths)}"
+    if is_passing(folder):
+        text += ", which is deleted at the end"
+    if MODES_TELL:
+        text += f", {'open' if is_open_to_others(folder.stat()) else 'closed'} to other users"
+    return text
 
 
 def _compiling() -> str:
@@ -149,6 +153,8 @@ def _stage() -> Stage:
 
 def _without_home(text: str, full_paths: bool) -> str:
     try:
-        return text if full_paths else text.replace(str(Path.home()), "~")
+        home = str(Path.home())
     except RuntimeError:  # a user without a home has none to be left out
         return text
+    written = "|".join(map(re.escape, (home, repr(home)[1:-1])))  # errors quote paths, with backslashes doubled
+    return text if full_paths else re.sub(rf"({written})(?!\w)", "~", text, flags=re.IGNORECASE * IGNORES_CASE)
