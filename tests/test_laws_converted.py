@@ -17,6 +17,7 @@ import friso
 from friso.equations.component import Switch, state
 from friso.equations.friction.common import direction
 from friso.equations.friction.gms import STIFFNESS
+from friso.equations.friction.measured import power_law
 from friso.errors import InputError
 from friso.frequency.friction import steady_force
 from friso.identification.readings.common import stribeck_curve
@@ -140,6 +141,60 @@ def test_passive_laws_are_not_warned_of() -> None:
 def test_refused_conversions(stage: Stage, law: str, message: str) -> None:
     with pytest.raises(InputError, match=message):
         convert(stage, law)
+
+
+def curve_file(folder: Path, displacement: Any, force: Any, heading: str = "displacement [um],force [N]") -> Path:
+    rows = "\n".join(f"{x!r},{f!r}" for x, f in zip(map(float, displacement), map(float, force), strict=True))
+    path = folder / "virgin.csv"
+    path.write_text(f"{heading}\n{rows}\n", encoding="utf-8")
+    return path
+
+
+POINTS_UM, POINTS_N = np.array([0.0, 5, 10, 20, 40, 80, 160, 300]), np.array([0.0, 0.5, 0.9, 1.5, 2.2, 2.7, 2.95, 3.0])
+
+
+def test_measured_points_are_the_corners_of_maxwell_slip(tmp_path: Path) -> None:
+    """Elements side by side go through as many points as there are elements; a tenth of the force that scatters is
+    smoothed to a concave curve; a curve that ends early goes on to static friction."""
+    conversion = convert(LUGRE, "gms", 7, virgin=curve_file(tmp_path, POINTS_UM, POINTS_N))
+    stiffness, share = (
+        np.array([v for k, v in conversion.stage.flat().items() if k.startswith(f"friction.element_{name}.")])
+        for name in ("stiffness", "share")
+    )
+    held = np.minimum(stiffness * POINTS_UM[:, None] * 1e-6, share * 3.0).sum(axis=1)
+    assert held == pytest.approx(POINTS_N, abs=1e-9)
+    assert not conversion.lost
+    assert "friction.attraction" in conversion.open
+    noisy = POINTS_N * (1 + 0.1 * np.sin(7.0 * np.arange(8)))
+    assert convert(LUGRE, "gms", 7, virgin=curve_file(tmp_path, POINTS_UM, noisy)).after.force[-1] == pytest.approx(3.0)
+    early = convert(LUGRE, "gms", 7, virgin=curve_file(tmp_path, POINTS_UM[:6], POINTS_N[:6]))
+    at = np.array([100e-6, 104e-6, 120e-6])  # it goes on at 12.5 N/mm from 2.7 N
+    assert np.interp(at, early.before.displacement, early.before.force) == pytest.approx([2.95, 3.0, 3.0], abs=1e-6)
+
+
+def test_points_of_a_power_law_give_its_exponent(tmp_path: Path) -> None:
+    """Whatever the law of the stage, the same law included."""
+    way = np.geomspace(1e-7, 40e-3, 200)
+    force = power_law(3.0, 1e5, 1.5, way)
+    for law in (lugre(2), rolling(3.0)):
+        made = convert(under(law), "rolling", virgin=curve_file(tmp_path, 1e6 * way, force)).stage.flat()
+        assert made["friction.rolling_exponent"] == pytest.approx(1.5, abs=0.03)
+        assert made["friction.bristle_stiffness"] == pytest.approx(1e5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("heading", "force", "message"),
+    [
+        ("displacement [um],load [kg]", POINTS_N, "one channel in N"),
+        ("displacement [um],force [N]", POINTS_N / 2, "break-away"),
+        ("displacement [um],force [N]", -POINTS_N, "does not rise"),
+        ("displacement [um],force [N]", POINTS_N, "do not increase"),
+    ],
+)
+def test_refused_points(tmp_path: Path, heading: str, force: np.ndarray, message: str) -> None:
+    points = curve_file(tmp_path, POINTS_UM[::-1] if "do not" in message else POINTS_UM, force, heading)
+    with pytest.raises(InputError, match=message):
+        convert(LUGRE, "gms", virgin=points)
 
 
 def test_every_law_but_none_can_be_converted_to() -> None:

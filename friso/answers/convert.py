@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -63,6 +64,7 @@ def convert(
     friction: str,
     *,
     elements: Whole = 6,
+    virgin: str | os.PathLike[str] | None = None,
     set: Changes = None,
     progress: Progress = silent,
 ) -> ConvertAnswer:
@@ -76,6 +78,9 @@ def convert(
         The friction law to convert to; a wrong one is answered with all of them.
     elements : int
         Elements of a law that has several, side by side, 1 to 12.
+    virgin : path, optional
+        A file of any log format with measured force over displacement from rest up to break-away, one channel of each,
+        with its unit; in place of what the stage's own law says of it.
     set : dict, optional
         Keys to override.
     progress : Progress
@@ -89,7 +94,7 @@ def convert(
     Raises
     ------
     InputError
-        For a stage, a law or a number that is not usable.
+        For a stage, a law, a number or a file that is not usable.
 
     Examples
     --------
@@ -100,4 +105,4 @@ def convert(
     whole_number(elements, "elements", 1, MOST, "6")
     from friso.studies.laws.conversion import convert as converted
 
-    return ConvertAnswer(converted(chosen, friction, elements), chosen.name, f"{stem_of(stage)}_{friction}")
+    return ConvertAnswer(converted(chosen, friction, elements, virgin), chosen.name, f"{stem_of(stage)}_{friction}")

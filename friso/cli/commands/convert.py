@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -15,12 +16,17 @@ Law = Annotated[str, typer.Option("--friction", metavar="LAW", help="The frictio
 ElementsOption = Annotated[
     int, typer.Option("--elements", metavar="N", help="Elements of a law that has several, side by side, 1 to 12.")
 ]
+VirginOption = Annotated[
+    Path | None,
+    typer.Option("--virgin", metavar="FILE", help="Measured force over displacement from rest, in place of the law's."),
+]
 
 
 def convert(
     stage_file: StageFile,
     law: Law,
     elements: ElementsOption = 6,
+    virgin: VirginOption = None,
     overrides: Overrides = None,
     out: OutFolder = None,
     overwrite: Overwrite = False,
@@ -32,7 +38,7 @@ def convert(
     """
     from friso.answers.convert import convert as question
 
-    options = {"friction": law, "elements": elements, "set": overrides}
+    options = {"friction": law, "elements": elements, "virgin": virgin, "set": overrides}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json}
     ask("convert", question, stage_file, **options, **shown)
 

@@ -220,13 +220,21 @@ def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
 FITTED, EVEN = 4, 1.5
 """Elements that are fitted to a record, and how closely their tangents lie towards the end of the virgin curve."""
 
+SAME = 1e-6
+"""Difference of slopes, as a share of the first, below which a virgin curve is straight there."""
+
 POWERS = np.linspace(0.6, 4.0, 69)
 """How closely the tangents may lie towards the end of the virgin curve."""
 
 
 def polygon(measured: MeasuredFriction, elements: int) -> tuple[np.ndarray, np.ndarray]:
     """Stiffness [N/m] and deflection at which it slips [m] of elements that together have the virgin curve, both of
-    shape (elements,): the polygon of tangents at slopes spaced so that it is off the least."""
+    shape (at most `elements`,): the curve itself if it is straight between so many points, else the polygon of tangents
+    at slopes spaced so that it is off the least."""
+    slopes = np.append(np.diff(measured.force) / np.diff(measured.displacement), 0.0)
+    corners = np.flatnonzero(-np.diff(slopes) > SAME * measured.stiffness)
+    if len(corners) <= elements:
+        return -np.diff(slopes[[0, *corners + 1]]), measured.displacement[corners + 1]
     tried = [_tangents(measured, (1 - np.arange(elements + 1) / elements) ** power) for power in POWERS]
     curves = [np.minimum(k * measured.displacement[:, None], k * x).sum(axis=1) for k, x in tried]
     return tried[int(np.argmin([measured.misfit(curve) for curve in curves]))]

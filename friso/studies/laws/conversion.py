@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -15,6 +16,7 @@ from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
+from friso.studies.laws.virgin import read_virgin_curve, with_virgin_curve
 
 ELEMENTS = 6
 """Elements of a law that has several, unless told otherwise."""
@@ -52,7 +54,8 @@ class MeasuredChange:
 @dataclass(frozen=True)
 class LawConversion:
     """A stage with another friction law: what it was made from, what was compared, the keys that the measurements leave
-    open, with their ranges [SI], and the condition of passivity that the law does not meet ("" where it is passive)."""
+    open, with their ranges [SI], the condition of passivity that the law does not meet ("" where it is passive), and
+    whether the virgin curve `before` is that of `points` that were measured, not of the law of the source."""
 
     stage: Stage
     source: Stage
@@ -61,6 +64,7 @@ class LawConversion:
     compared: tuple[MeasuredChange, ...]
     open: Mapping[str, tuple[float, float]]
     active: str
+    points: bool = False
 
     @property
     def law(self) -> str:
@@ -91,10 +95,13 @@ def measure_friction(flat: Mapping[str, Any]) -> MeasuredFriction:
     return law.shown(flat)
 
 
-def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
+def convert(
+    stage: Stage, law: str, elements: int = ELEMENTS, virgin: str | os.PathLike[str] | None = None
+) -> LawConversion:
     """The stage with the named law in the place of its own, which shows the same in measurements as nearly as the law
-    can; `elements` side by side, of a law that has several. Raises InputError for a law that cannot be made from
-    measurements, and for a stage whose own does not stick."""
+    can; `elements` side by side, of a law that has several. Before sliding, what was measured is that of the stage's
+    law, or the points in the file `virgin`. Raises InputError for a law that cannot be made from measurements, for a
+    stage whose own does not stick, and for a file that holds no virgin curve of it."""
     if law not in convertible():
         near = nearest_name(law, convertible()) or "gms"
         raise InputError("--friction", f'"{law}"', f"one of {', '.join(convertible())}", f"--friction {near}")
@@ -102,12 +109,14 @@ def convert(stage: Stage, law: str, elements: int = ELEMENTS) -> LawConversion:
     if not before.stiffness and law != stage.flat()["friction.model"]:
         actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
+    if virgin is not None:
+        before = with_virgin_curve(before, *read_virgin_curve(virgin, stage.axis_kind))
     flat, keys = stage.flat(), friction_law(law).keeping(before, elements)
-    if law == flat["friction.model"]:  # nothing is left open
+    if law == flat["friction.model"] and virgin is None:  # nothing is left open
         if _elements_of(law, flat) <= keys.keys() <= flat.keys():
             return compared(stage, stage, before)
         keys |= {key: flat[key] for key in friction_law(law).left_open(before)}
-    return compared(stage, with_friction(stage, law, keys), before)
+    return compared(stage, with_friction(stage, law, keys), before, virgin is not None)
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
@@ -115,11 +124,11 @@ def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
     return stage.replace({"friction": _table(stage, law, keys)})
 
 
-def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConversion:
-    """A stage `made` from another, whose friction was measured `before`."""
+def compared(source: Stage, made: Stage, before: MeasuredFriction, points: bool = False) -> LawConversion:
+    """A stage `made` from another, whose friction was measured `before`; whether that is by `points`."""
     flat = made.flat()
     after, law = measure_friction(flat), friction_law(flat["friction.model"])
-    left_open = {} if flat["friction.model"] == source.flat()["friction.model"] else law.left_open(before)
+    left_open = law.left_open(before) if points or law is not friction_law(source.flat()["friction.model"]) else {}
     items = (
         _curve(source, made, before),
         _number("static", "N", before.levels.static, after.levels.static),
@@ -128,7 +137,7 @@ def compared(source: Stage, made: Stage, before: MeasuredFriction) -> LawConvers
         _number("damping", "N*s/m", before.damping, after.damping),
         _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
-    return LawConversion(made, source, before, after, items, left_open, passive_where(flat))
+    return LawConversion(made, source, before, after, items, left_open, passive_where(flat), points)
 
 
 def _table(stage: Stage, law: str, keys: Mapping[str, Any]) -> dict[str, Any]:
