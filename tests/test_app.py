@@ -360,6 +360,23 @@ def test_a_log_that_is_too_large_is_refused_and_not_kept(served: Served, monkeyp
     assert "friso identify" in json.loads(content)["text"]
 
 
+@pytest.mark.parametrize("path", ["/logs/x.csv", "/ask/machine"])
+def test_a_browser_that_leaves_in_the_middle_of_a_request_is_no_error(path: str) -> None:
+    access = Access.at("127.0.0.1", 80)
+    headers = {b"host": b"127.0.0.1", b"cookie": f"{access.cookie}={access.session}".encode()}
+    headers |= {b"content-type": b"application/json"}
+    scope = {"type": "http", "method": "POST", "path": path, "headers": [*headers.items()], "query_string": b""}
+    messages = [{"type": "http.request", "body": b"{", "more_body": True}, {"type": "http.disconnect"}]
+
+    async def receive() -> Any:
+        return messages.pop(0)
+
+    async def send(message: Any) -> None: ...
+
+    asyncio.run(application(access, {}, Workshop())(scope, receive, send))  # raises nothing
+    assert not messages
+
+
 # ---------------------------------------------------------------- what is answered
 
 

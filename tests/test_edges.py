@@ -162,19 +162,37 @@ def test_a_sample_time_beyond_all_measure_is_refused(time: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "meant"),
+    ("stage", "key", "value", "meant"),
     [
-        ("masses.cart", "3000 kg", "g"),
-        ("friction.static", "52 kN", "N"),
-        ("joint.stroke", "1000 m", "mm"),
-        ("friction.stribeck_velocity", "1600 m/s", "mm/s"),
+        ("thesis_rig", "masses.cart", "3000 kg", "g"),
+        ("thesis_rig", "friction.static", "52 kN", "N"),
+        ("thesis_rig", "joint.stroke", "1000 m", "mm"),
+        ("thesis_rig", "friction.stribeck_velocity", "1600 m/s", "mm/s"),
+        ("thesis_rig", "friction.bristle_stiffness", "100 N/m", "N/um"),
+        ("ball_screw_axis", "transmission.inertia", "6.1 kg*m^2", "kg*cm^2"),
+        ("ball_screw_axis", "transmission.lead", "10 m", "mm"),
+        ("ball_screw_axis", "transmission.stiffness", "35 N/m", "N/um"),
+        ("ball_screw_axis", "transmission.backlash", "5 mm", "um"),
+        ("ball_screw_axis", "motor_friction.static", "16 kN", "N"),
+        ("twincat_cascade", "controller.kp", "90 kN*s/mm", "N*s/m"),
+        ("twincat_cascade", "controller.velocity_integral_time", "4000 s", "ms"),
+        ("twincat_cascade", "controller.filters.1.frequency", "300 kHz", "Hz"),
+        ("twincat_cascade", "drive.delay", "125 s", "us"),
+        ("thesis_drive", "drive.encoder_resolution", "1 mm", "nm"),
     ],
 )
-def test_a_value_that_is_hardly_meant_is_questioned(key: str, value: str, meant: str) -> None:
-    (doubt,) = implausible_values(loads(RIG).replace({key: value}))
+def test_a_value_that_is_hardly_meant_is_questioned(stage: str, key: str, value: str, meant: str) -> None:
+    (doubt,) = implausible_values(friso.load(EXAMPLES / f"{stage}.toml").replace({key: value}))
     assert key in doubt
     assert value in doubt
     assert doubt.endswith(f"was {meant} meant?")
+
+
+def test_an_element_of_an_array_is_questioned() -> None:
+    stage = friso.load(EXAMPLES / "thesis_rig_gms.toml")
+    stiffness = ["40.4 N/mm", "30.9 N/mm", "20.5 N/m", "8.2 N/mm"]
+    (doubt,) = implausible_values(stage.replace({"friction.element_stiffness": stiffness}))
+    assert doubt.startswith("friction.element_stiffness.3 = 20.5 N/m ")
 
 
 def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:

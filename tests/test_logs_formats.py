@@ -203,6 +203,22 @@ def test_time_stamps(tmp_path: Path, stamps: list[str]) -> None:
     assert time == pytest.approx([0, 1e-3, 2e-3, 3e-3], abs=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("lines", "where"),
+    [
+        (["t [s],x [mm]", *(f"{i},{i}" for i in range(50)), '50,"50', "51,51"], "line 52"),
+        (["t [s],x [mm]", *(f"2026-02-30T00:00:{i},{i}" for i in range(10, 20))], "2026-02-30"),
+        ([",".join(["1"] * 10_001)] * 3, "10001"),
+    ],
+)
+def test_what_is_no_table_of_numbers_is_told(tmp_path: Path, lines: list[str], where: str) -> None:
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(LogError) as raised:
+        read_table(tmp_path / "a.csv")
+    assert where in raised.value.actual
+    assert "\n" not in raised.value.actual
+
+
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     rows=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=3, max_size=30),
@@ -484,7 +500,7 @@ def test_a_matrix_is_a_channel_per_column(tmp_path: Path, wording: Wording) -> N
     wording("\n".join(read_table(tmp_path / "old.mat").read))
 
 
-@pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group", "reference"])
+@pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group", "link to a link", "reference"])
 def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: Refused) -> None:
     """A file may name any other one of the system as the place of its values."""
     import h5py
@@ -506,7 +522,9 @@ def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: 
             file.create_virtual_dataset("x", layout)
         else:
             place = file.create_group("g") if "group" in way else file
-            place["x"] = h5py.ExternalLink(str(other), "secret")
+            place["#x" if "link to" in way else "x"] = h5py.ExternalLink(str(other), "secret")
+            if "link to" in way:
+                file["x"] = h5py.SoftLink("/#x")
     with refused("log"):
         read_table(path)
 

@@ -28,8 +28,14 @@ AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:
 pytestmark = pytest.mark.xdist_group("rig")
 
 
-def test_processes_of_its_own_verify_too_and_open_no_port(rig: Stage) -> None:
+def test_processes_of_its_own_verify_too_and_open_no_port(
+    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor do they run what lies in the current folder under the name of a module that they import."""
     seen: list[psutil.Process] = []
+    hostile = "open('run', 'w').close()\nraise SystemExit\n"
+    (tmp_path / "multiprocessing.py").write_text(hostile)
+    monkeypatch.chdir(tmp_path)
 
     def look(done: int, total: int, what: str) -> None:
         seen[:] = psutil.Process().children(recursive=True)
@@ -42,6 +48,7 @@ def test_processes_of_its_own_verify_too_and_open_no_port(rig: Stage) -> None:
     assert seen
     alive = [process for process in seen if process.is_running() and process.status() != psutil.STATUS_ZOMBIE]
     assert not [process for process in alive if "spawn_main" in str(process.cmdline())]
+    assert not (tmp_path / "run").exists()
 
 
 def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_path: Path) -> None:

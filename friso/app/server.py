@@ -10,7 +10,7 @@ from importlib.resources import files
 from typing import Any
 
 from starlette.applications import Starlette
-from starlette.requests import Request
+from starlette.requests import ClientDisconnect, Request
 from starlette.responses import JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 from starlette.types import ASGIApp
@@ -76,7 +76,13 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         Route("/", _page),
         Route("/{file}", _page),
     ]
-    return Gate(Starlette(routes=routes, lifespan=lifespan), access)
+    gone = {ClientDisconnect: _gone}
+    return Gate(Starlette(routes=routes, lifespan=lifespan, exception_handlers=gone), access)
+
+
+async def _gone(request: Request, error: Exception) -> Response:
+    """For a browser that has left in the middle of its request: nobody reads it."""
+    return Response(status_code=400)
 
 
 async def _page(request: Request) -> Response:

@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from friso.axis import ROTARY
 from friso.quantities import Quantity, any_sign
+from friso.stage.lists import element_keys
 from friso.stage.stage import Stage
+from friso.stage.transmission import BACKLASH, INERTIA, LEAD, MOTOR_FRICTION, MOTOR_MASS, TRANSMISSION, moving_mass
 
 GRAVITY = 9.81
 """In m/s^2."""
 
 STRONGEST = 30.0
 """Friction of a contact bearing, in weights of what it carries: preload may exceed the weight, not by so much."""
+
+
+PRESLIDING = (1e-10, 1e-2)
+"""How far [m] a contact gives way before it slides."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +39,9 @@ _MASS = _Usual(1e-3, 2000.0, "kg", ("g", "kg", "mg", "t"))
 _FREQUENCY = _Usual(0.05, 20_000.0, "Hz", ("Hz", "kHz", "mHz", "rad/s", "rpm"))
 _LENGTH = _Usual(1e-7, 10.0, "m", ("mm", "um", "nm", "m"))
 _TIME = _Usual(1e-7, 1e5, "s", ("ms", "us", "ns", "s"))
+_CYCLE = _Usual(1e-7, 0.1, "s", ("us", "ms", "ns", "s"))
+_SLOWLY = _Usual(1e-7, 2.0, "m/s", ("mm/s", "um/s", "m/s"))
+_STIFFNESSES = ("N/um", "N/mm", "N/m")
 
 _USUAL: Mapping[str, _Usual] = {
     "masses.cart": _MASS,
@@ -40,8 +51,20 @@ _USUAL: Mapping[str, _Usual] = {
     "motion.size": _LENGTH,
     "motion.displacement": _LENGTH,
     "motion.duration": _TIME,
-    "drive.sample_time": _Usual(1e-7, 0.1, "s", ("us", "ms", "ns", "s")),
-    "friction.stribeck_velocity": _Usual(1e-7, 2.0, "m/s", ("mm/s", "um/s", "m/s")),
+    "drive.sample_time": _CYCLE,
+    "drive.delay": _CYCLE,
+    "drive.current_bandwidth": _Usual(5.0, 1e5, "Hz", ("kHz", "Hz")),
+    "drive.encoder_resolution": _Usual(1e-12, 1e-4, "m", ("nm", "um", "pm")),
+    "controller.kv": _Usual(0.05, 1e4, "1/s", ("1/s", "1/min")),
+    "controller.velocity_integral_time": _Usual(1e-4, 1e2, "s", ("ms", "us", "s")),
+    "controller.velocity_filter": _Usual(1e-7, 1.0, "s", ("ms", "us", "s")),
+    "friction.stribeck_velocity": _SLOWLY,
+    f"{MOTOR_FRICTION}.stribeck_velocity": _SLOWLY,
+    MOTOR_MASS: _MASS,
+    INERTIA: _Usual(1e-9, 1.0, "kg*m^2", ("kg*cm^2", "g*cm^2", "kg*mm^2")),
+    LEAD: _Usual(1e-5, 2.0, "m", ("mm", "um", "m")),
+    f"{TRANSMISSION}.stiffness": _Usual(1e3, 1e11, "N/m", _STIFFNESSES),
+    BACKLASH: _Usual(1e-8, 2e-3, "m", ("um", "mm", "nm")),
 }
 
 
@@ -50,7 +73,8 @@ _TORQUE = _Usual(1e-7, 1e5, "N*m", ("N*m", "mN*m", "uN*m", "kN*m"))
 _ANGLE = _Usual(1e-8, 1e3, "rad", ("rad", "mrad", "urad", "deg"))
 
 _ROTARY: Mapping[str, _Usual] = {
-    **{key: usual for key, usual in _USUAL.items() if usual.unit in ("Hz", "s")},
+    **{key: usual for key, usual in _USUAL.items() if usual.unit in ("Hz", "s", "1/s")},
+    INERTIA: _USUAL[INERTIA],
     **dict.fromkeys(("masses.cart", "masses.stage"), _INERTIA),
     **dict.fromkeys(("joint.stroke", "motion.size", "motion.displacement"), _ANGLE),
     **dict.fromkeys(("friction.static", "friction.coulomb"), _TORQUE),
@@ -63,26 +87,56 @@ def implausible_values(stage: Stage) -> Iterator[str]:
     """A sentence on each implausible value: key, value, and the unit that probably was."""
     flat = stage.flat()
     usual_values = dict(_ROTARY) if stage.axis_kind == ROTARY else _usual(flat)
+    usual_values |= {key: _FREQUENCY for key in flat if _OF_FILTER.fullmatch(key)}
     if (bandwidth := stage.controller and stage.controller.bandwidth_key) is not None:
         usual_values[bandwidth] = _FREQUENCY
     for key, usual in usual_values.items():
         value = flat.get(key)
         if value and not usual.low <= value <= usual.high:
-            written = _written(stage, key) or f"{value:.6g} {usual.unit}"
+            if not (written := _written(stage, key)) and key == MOTOR_MASS:
+                continue  # its inertia is judged
+            written = written or f"{value:.6g} {usual.unit}"
             yield f"{key} = {written} is unusual for a positioning stage{_question(written, usual)}"
 
 
+_OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
+
+
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """What is usual for the stage: friction follows its weight."""
-    carried = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage"))
-    force = _Usual(1e-6, STRONGEST * GRAVITY * carried, "N", ("N", "mN", "uN", "kN"))
-    return {**_USUAL, "friction.static": force, "friction.coulomb": force}
+    """What is usual for the stage: friction follows its weight, and what gives way before it slides follows friction;
+    the gain of a velocity loop follows the mass."""
+    carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
+    usual = dict(_USUAL)
+    for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
+        most = STRONGEST * GRAVITY * mass
+        usual |= dict.fromkeys(
+            (f"{table}.static", f"{table}.coulomb"), _Usual(1e-6, most, "N", ("N", "mN", "uN", "kN"))
+        )
+        force = flat.get(f"{table}.static", 0.0)
+        force = force if force <= most else 0.0  # which is questioned alone
+        usual[f"{table}.bristle_stiffness"] = _presliding(force)
+        for key in element_keys(flat, f"{table}.element_stiffness"):
+            share = flat.get(key.replace("element_stiffness", "element_share"), 1.0)
+            usual[key] = _presliding(share * force)
+    if "controller.kv" in flat:
+        usual["controller.kp"] = _Usual(0.3 * moving, 3e4 * moving, "N*s/m", ("N*s/m", "N*s/mm", "kN*s/m"))
+    return usual
+
+
+def _presliding(force: float) -> _Usual:
+    """What is usual for the stiffness with which a contact takes a force before it slides."""
+    low, high = (force / way for way in reversed(PRESLIDING))
+    return _Usual(low, high or inf, "N/m", _STIFFNESSES)
 
 
 def _written(stage: Stage, key: str) -> str:
     """What the user wrote; "" for what follows from other keys."""
-    table, name = key.split(".")
-    return str(getattr(getattr(getattr(stage, table), name, None), "text", ""))
+    here: Any = stage.as_written()
+    for name in key.split("."):
+        here = here[int(name) - 1] if isinstance(here, list) else here.get(name, "")
+        if here == "":
+            break
+    return here if isinstance(here, str) else ""
 
 
 def _question(written: str, usual: _Usual) -> str:

@@ -31,14 +31,31 @@ def processes(workers: int) -> Iterator[Crew]:
     """A crew of so many processes on this machine, each of which computes one block at a time, in one thread. They end
     with this process, however it ends."""
     context = get_context("spawn")
-    shared: Any = context.RawArray("q", 1)
-    pool = ProcessPoolExecutor(workers, context, _prepare, (shared, cache_folder()))
-    with interrupts_held():
+    with interrupts_held(), _modules_of_this_folder_ignored():
+        shared: Any = context.RawArray("q", 1)
+        pool = ProcessPoolExecutor(workers, context, _prepare, (shared, cache_folder()))
         for _ in range(workers):  # each starts one
             pool.submit(os.getpid)
     cancel = np.frombuffer(shared, np.int64)
     with Crew(pool, workers, 4 * workers, run_block, cancel=cancel, failures=(BrokenProcessPool,)) as crew:
         yield crew
+
+
+@contextmanager
+def _modules_of_this_folder_ignored() -> Iterator[None]:
+    """Processes of Python that are started within import nothing from the current folder, which may be someone else's,
+    with a file in it that has the name of a module."""
+    before = os.environ.get(_SAFE_PATH)
+    os.environ[_SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        del os.environ[_SAFE_PATH]
+        if before is not None:
+            os.environ[_SAFE_PATH] = before
+
+
+_SAFE_PATH = "PYTHONSAFEPATH"
 
 
 def run_block(*arguments: Any) -> Columns:

@@ -82,12 +82,12 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
 
 
 def _own(group: Any, name: Any) -> Any:
-    """An item of a group. Raises ValueError for one that lies in another file, which the log would show as its own: a
-    link may name any file of the system."""
+    """An item of a group. Raises ValueError for one that is a link: it may lead into any file of the system, by another
+    link too, and the log would show that as its own."""
     import h5py
 
-    if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
-        raise ValueError(f"{name} is a link to another file")
+    if not isinstance(group.get(name, getlink=True), h5py.HardLink):
+        raise ValueError(f"{name} is a link, which may lead to another file")
     return group[name]
 
 

@@ -16,6 +16,8 @@ HEAD_BYTES = 1 << 18
 """How much of a file is looked at to find how it is written."""
 HEAD_LINES = 1000
 """How many lines of it are tried with each delimiter."""
+MOST_COLUMNS = 10_000
+"""Columns of a table at most: reading that many takes seconds."""
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
 """Delimiter and decimal sign; of two that fit equally well the first is taken."""
@@ -127,7 +129,11 @@ def layout(path: Path) -> TextLayout:
         layouts = [_fit(lines, encoding, *candidate, words) for candidate in _CANDIDATES]
         fits = [fit for fit in layouts if fit is not None]
         if fits:
-            return max(fits, key=lambda fit: fit[0])[1]
+            best = max(fits, key=lambda fit: fit[0])[1]
+            if best.columns > MOST_COLUMNS:
+                expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
+                raise LogError("log", f"{best.columns} columns", expected, "", str(path))
+            return best
     actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
     raise LogError("log", actual, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import mmap
+import re
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace
@@ -97,13 +98,16 @@ class _WithoutDosEnd:
 
 
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
-    """The error for the first line with more cells than columns; the parser's own words where there is none."""
+    """The error for the first line with more cells than columns, or for a quotation mark that nothing closes; the
+    parser's own words where there is neither."""
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
             cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
             if len(cells) > form.columns and any(cells[form.columns :]):
                 actual = f"{len(cells)} cells in line {number}"
                 return LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
+    if quote := re.search(r"EOF inside string starting at row (\d+)", why):
+        why = f"a quotation mark in line {form.first + 1 + int(quote[1])} that is not closed"
     return LogError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
 
 
@@ -185,9 +189,8 @@ def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarr
             seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
     except ValueError as error:
-        raise LogError(
-            "log", str(error), "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)
-        ) from None
+        why = re.split(r"\.? You might|\n", str(error))[0]  # then follows what a programmer may do
+        raise LogError("log", why, "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)) from None
     return seconds - seconds[int(np.flatnonzero(present)[0])]
 
 
