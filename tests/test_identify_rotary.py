@@ -71,6 +71,9 @@ def test_a_rotary_log_is_told_once_and_answered_in_its_units(break_away: Path) -
     assert result["written"].count("N*m") == 2
     assert [result[end] for end in ("low", "value", "high")] == pytest.approx([static.low, static.value, static.high])
     assert not LENGTHS.search(answer.stderr + " ".join(texts(json.loads(answer.stdout))))
+    asked = friso.identify(break_away / "turned.csv")
+    assert "N·m" in asked.sentences()[0]
+    assert not LENGTHS.search(" ".join([*asked.sentences(), *asked.details(), *texts(asked.document())]))
 
 
 @pytest.mark.parametrize(("options", "unit"), [((), "A"), (("--scale", "force=0.08 N/A"), "N")])

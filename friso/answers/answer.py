@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import wraps
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Concatenate, ParamSpec, TypeVar
 
 from friso.axis import LINEAR, AxisKind, speaking_of
 from friso.errors import InputError
@@ -48,6 +48,21 @@ class AnswerTable:
     rows: Sequence[tuple[str, Sequence[str]]]
 
 
+_SHOWN = {"sentences", "blocks", "tables", "details", "next_steps", "figures", "document", "files"}
+"""Methods of an answer that show it."""
+
+
+def _in_its_units(method: Callable[Concatenate[Answer, Arguments], Returned]) -> Callable[..., Returned]:
+    """The method of an answer, in the units of the answer's axis."""
+
+    @wraps(method)
+    def shown(answer: Answer, *arguments: Arguments.args, **options: Arguments.kwargs) -> Returned:
+        with speaking_of(answer.axis_kind):
+            return method(answer, *arguments, **options)
+
+    return shown
+
+
 class Answer(ABC):
     """What friso answers to a question.
 
@@ -72,6 +87,11 @@ class Answer(ABC):
 
     status: ClassVar[int] = 1
     """The exit status of the command where the answer is a failure."""
+
+    def __init_subclass__(cls) -> None:
+        """Whatever an answer shows is in the units of its axis, whoever asks."""
+        for name in _SHOWN & vars(cls).keys():
+            setattr(cls, name, _in_its_units(getattr(cls, name)))
 
     @property
     def failure(self) -> str:
@@ -125,8 +145,7 @@ class Answer(ABC):
         dict
             Plain numbers, texts, lists and dictionaries; SI units, named at the end of the keys (`_m`, `_s`, `_hz`).
         """
-        with speaking_of(self.axis_kind):
-            return self.document()
+        return self.document()
 
     def plot(self, axes: Axes | Sequence[Axes] | None = None, figure: int = 0) -> list[Axes]:
         """Draw one of the figures.
@@ -150,11 +169,11 @@ class Answer(ABC):
         """
         from friso.views.drawing.matplotlib_renderer import draw_on
 
+        drawn = self.figures()
+        if not 0 <= figure < len(drawn):
+            expected = f"0 to {len(drawn) - 1}" if drawn else "no figure: this answer has none"
+            raise InputError("figure", str(figure), expected, "plot(figure=0)")
         with speaking_of(self.axis_kind):
-            drawn = self.figures()
-            if not 0 <= figure < len(drawn):
-                expected = f"0 to {len(drawn) - 1}" if drawn else "no figure: this answer has none"
-                raise InputError("figure", str(figure), expected, "plot(figure=0)")
             return draw_on(drawn[figure], axes)
 
     def report(self, path: str | Path, overwrite: bool = False) -> list[Path]:
@@ -198,19 +217,16 @@ class Answer(ABC):
         return page
 
     def __repr__(self) -> str:
-        with speaking_of(self.axis_kind):
-            return f"<friso {self.command}: {escaped(next(iter(self.sentences()), 'no answer'))}>"
+        return f"<friso {self.command}: {escaped(next(iter(self.sentences()), 'no answer'))}>"
 
     def __str__(self) -> str:
-        with speaking_of(self.axis_kind):
-            return escaped("\n".join(self.sentences()))
+        return escaped("\n".join(self.sentences()))
 
     def _repr_html_(self) -> str:
         """What a notebook shows: the answer and the small tables, no arrays."""
-        with speaking_of(self.axis_kind):
-            first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
-            blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
-            tables = blocks + "".join(map(_html_table, self.tables()))
+        first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
+        blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
+        tables = blocks + "".join(map(_html_table, self.tables()))
         return f"<div><p><b>{first}</b></p>{''.join(f'<p>{sentence}</p>' for sentence in rest)}{tables}</div>"
 
     def __getattr__(self, name: str) -> Any:

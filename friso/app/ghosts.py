@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.axis import speaking_of
 from friso.stage import Stage
 from friso.views.drawing.figure import GREY, INK, Figure, Markers, Panel
 
@@ -23,8 +22,7 @@ def ghosts_of(pinned: Answer | None) -> Callable[[Figure], Figure]:
     """What puts the lines of a pinned machine's answer behind those of a figure of the same name."""
     if pinned is None:
         return lambda figure: figure
-    with speaking_of(pinned.axis_kind):
-        others = {figure.name: figure for figure in pinned.figures()}
+    others = {figure.name: figure for figure in pinned.figures()}
     return lambda figure: _ghosted(figure, others[figure.name]) if figure.name in others else figure
 
 

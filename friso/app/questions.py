@@ -79,14 +79,13 @@ def figures_of(asked: PageRequest, answer: Answer, beside: Callable[[Figure], Fi
 
 def words_of(answer: Answer) -> AnswerPart:
     """The words of an answer, without figures: those that are shown stay."""
-    with speaking_of(answer.axis_kind):
-        return {
-            "kind": "answer",
-            "sentences": [*answer.sentences()],
-            "tables": [{"title": item.title, "columns": item.columns, "rows": item.rows} for item in answer.tables()],
-            "details": [*answer.details()],
-            "failure": answer.failure,
-        }
+    return {
+        "kind": "answer",
+        "sentences": [*answer.sentences()],
+        "tables": [{"title": item.title, "columns": item.columns, "rows": item.rows} for item in answer.tables()],
+        "details": [*answer.details()],
+        "failure": answer.failure,
+    }
 
 
 def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
