@@ -113,7 +113,7 @@ def test_slow_hunting_does_not_hide_the_bandwidth(slow: float) -> None:
     time = np.arange(20_000) * DT
     force = 3 * np.sin(2 * np.pi * 5 * time) + slow * np.sin(2 * np.pi * 0.05 * time)
     force += 0.01 * np.random.default_rng(0).standard_normal(len(time))
-    assert bandwidth_of(force, DT) == pytest.approx(5, rel=0.1)
+    assert bandwidth_of(record("slow", DT, position=force)) == pytest.approx(5, rel=0.1)
 
 
 @pytest.mark.parametrize(("share", "expected"), [(0.045, 2.0), (0.055, 10.0)])
@@ -124,7 +124,13 @@ def test_the_bandwidth_holds_95_percent_of_the_accelerations_power(share: float,
     amplitudes = np.sqrt(powers) / (2 * np.pi * np.array([slow, fast])) ** 2
     position = amplitudes[0] * np.sin(2 * np.pi * slow * time) + amplitudes[1] * np.sin(2 * np.pi * fast * time)
     position += 1e-9 * np.random.default_rng(1).standard_normal(len(time))
-    assert bandwidth_of(position, DT) == pytest.approx(expected, rel=0.15)
+    log = record("sines", DT, position=position)
+    assert bandwidth_of(log) == pytest.approx(expected, rel=0.15)
+    jump = np.where(np.arange(len(time)) < 9000, 0.0, 10 * amplitudes[0])
+    parts = (slice(0, 9000), slice(9000, len(time)))
+    assert bandwidth_of(replace(log, signals={"position": position + jump}, segments=parts)) == pytest.approx(
+        expected, rel=0.15
+    )
 
 
 def test_intervals_hold_the_truth() -> None:

@@ -1,5 +1,6 @@
 """From a file to a log: roles, units, scales, one time base, and what is refused or told."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import log_files
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from refusals import Refused, Wording
 from scipy.io import savemat
 
+import friso
 from friso.errors import InputError
 from friso.identification.logs import mapping as mappings
 from friso.identification.logs.assemble import read_log
@@ -21,6 +23,7 @@ from friso.identification.logs.mapping import Mapping, from_options
 from friso.identification.logs.roles import role_of
 from friso.identification.logs.time_base import resample_tracks, track
 from friso.identification.logs.units import in_si, read_scale, spelled, split_heading
+from friso.identification.output_error.problem import loop_problem
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 M = log_files.motion(2000)
@@ -328,13 +331,39 @@ def test_gaps_split_and_are_not_bridged(tmp_path: Path) -> None:
 def test_nan_splits_and_is_counted(tmp_path: Path, wording: Wording) -> None:
     values = columns()
     values[3] = values[3].copy()
-    values[3][500:503] = np.nan
+    values[3][500:504] = np.nan
     log = log_of(tmp_path, NAMES, values)
-    assert log.segments == (slice(0, 500), slice(500, 1997))
+    assert log.segments == (slice(0, 500), slice(500, 1996))
     wording("\n".join(log.read))
     assert all(np.isfinite(signal).all() for signal in log.signals.values())
     values[3][100:1400] = np.nan
     assert "1300 of 2000" in message(tmp_path, NAMES, values)
+
+
+def test_a_few_lost_samples_are_bridged_and_do_not_count(tmp_path: Path) -> None:
+    """Rows that are missing, and numbers that are missing in one channel, up to three in a row."""
+    rows, numbers = [100, 101, 102, 700, 1500], [300, 1998]
+    values = columns()
+    values[3] = values[3].copy()
+    values[3][numbers] = np.nan
+    log = log_of(tmp_path, NAMES, [np.delete(column, rows) for column in values])
+    assert log.segments == (slice(0, 2000),)
+    assert log.bridged is not None
+    assert np.flatnonzero(log.bridged).tolist() == sorted(rows + numbers)
+    assert log.time == pytest.approx(M["time"])
+    assert log["position"] == pytest.approx(M["position"], abs=1e-4 * np.ptp(M["position"]))
+    assert any("7 of 2000 samples lost, in 5 places" in line for line in log.warnings)
+    part = log.excerpt(150)
+    assert part.bridged is not None
+    assert part.measured(part.longest).sum() == 150 - np.count_nonzero(part.bridged)
+    moved = replace(log, signals={**log.signals, "reference": log["position"]})
+    problem = loop_problem(friso.load("examples/thesis_rig.toml").flat(), moved, log.longest, [])
+    assert np.array_equal(problem.counted == 0, log.bridged)
+
+
+def test_a_clock_that_begins_anew_is_not_bridged() -> None:
+    time = np.r_[0:500, 501.6:1000] * 1e-3
+    assert track("position", time, time).segments == [slice(0, 500), slice(500, time.size)]
 
 
 def test_decreasing_time(tmp_path: Path, wording: Wording) -> None:

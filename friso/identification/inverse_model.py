@@ -110,11 +110,15 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredM
     return FilteredMotion(smooth, velocity, acceleration)
 
 
-def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
-    """The bandwidth [Hz] of a motion, shape (n,) [m]: that below which its acceleration has 95 % of its power, as far
-    as the position stands out of its noise. Raises InputError where it does nowhere."""
-    pieces = min(len(position), max(256, len(position) // PIECES))
-    frequency, power = welch(position, 1 / sample_time, nperseg=pieces, detrend="linear")
+def bandwidth_of(log: Log) -> float:
+    """The bandwidth [Hz] of the motion of a log, none of it across gaps: that below which its acceleration has 95 % of
+    its power, as far as the position stands out of its noise. Raises InputError where it does nowhere."""
+    lengths = [part.stop - part.start for part in log.segments]
+    pieces = min(max(lengths), max(256, sum(lengths) // PIECES))
+    whole = [log["position"][part] for part, length in zip(log.segments, lengths, strict=True) if length >= pieces]
+    spectra = [welch(part, 1 / log.sample_time, nperseg=pieces, detrend="linear") for part in whole]
+    frequency = spectra[0][0]
+    power = np.average([spectrum for _, spectrum in spectra], axis=0, weights=[part.size for part in whole])
     noise = np.median(power[3 * len(power) // 4 :])
     below = np.flatnonzero(power < ABOVE_NOISE * noise)
     passband = slice(0, below[0] if below.size else len(power))
@@ -148,7 +152,7 @@ def inverse_model(
     friction. `averaged`: samples over which the log's force is averaged, as then are the columns. `extra` columns by
     name, shape (n,), are fitted besides, and what they explain is taken out of the measured force. Raises InputError
     for a log too short."""
-    band = bandwidth or bandwidth_of(log["position"], log.sample_time)
+    band = bandwidth or bandwidth_of(log)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
         actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"

@@ -63,11 +63,12 @@ def read_log(
                 notes.units["position"] = notes.units["velocity"].removesuffix("/s")
     except InputError as error:
         raise error.found_in(str(path)) from None
-    notes.warnings += _doubts(base, signals, notes)
+    notes.warnings += [*_lost(base), *_doubts(base, signals, notes)]
     notes.read.append(_spans(base))
     return Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
         tuple(notes.read), tuple(notes.warnings), dict(mapping.setup), mapping.axis_kind,
+        base.bridged if base.bridged.any() else None,
     )  # fmt: skip
 
 
@@ -182,6 +183,18 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
     if position is not None and force is not None:
         lines.append(delays.force_line(position, force, period, parts))
     return [line for line in lines if line]
+
+
+def _lost(base: Track) -> list[str]:
+    """A line on samples that were lost."""
+    if not base.bridged.any():
+        return []
+    places = np.count_nonzero(np.diff(np.r_[False, base.bridged].astype(np.int8)) > 0)
+    where = "1 place" if places == 1 else f"{places} places"
+    return [
+        f"{np.count_nonzero(base.bridged)} of {base.bridged.size} samples lost, in {where}, interpolated by a cubic "
+        "spline; the fit of a whole model does not count them"
+    ]
 
 
 def _spans(base: Track) -> str:

@@ -40,6 +40,7 @@ def join_logs(logs: Sequence[Log]) -> Log:
         tuple(dict.fromkeys(line for log in logs for line in log.warnings)),
         first.setup,
         first.axis,
+        np.concatenate([log.measured(slice(0, log.time.size)) == 0 for log in logs]),
     )
 
 

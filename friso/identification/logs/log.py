@@ -36,6 +36,7 @@ class Log:
     instead of a length), the unit in which it stands. `scalars` are single numbers that stood in the file, by name.
     `read` lists line by line what was read and how, `warnings` what the engineer should know before believing it.
     `setup` are keys of the stage file that were otherwise while this log was taken ({"joint.stroke": "8 mm"}).
+    `bridged`, shape (n,), is true at samples that were lost and are interpolated; None where none was.
     """
 
     name: str
@@ -49,6 +50,7 @@ class Log:
     warnings: tuple[str, ...] = ()
     setup: Mapping[str, str] = field(default_factory=dict)
     axis: AxisKind = LINEAR
+    bridged: np.ndarray | None = None
 
     def __contains__(self, role: str) -> bool:
         return role in self.signals
@@ -61,6 +63,10 @@ class Log:
         """The longest stretch without gaps."""
         return max(self.segments, key=lambda part: part.stop - part.start)
 
+    def measured(self, part: slice) -> np.ndarray:
+        """1 at the samples of a stretch, shape (k,), that were measured, and 0 at those that were lost."""
+        return np.ones(part.stop - part.start) if self.bridged is None else 1.0 - self.bridged[part]
+
     def excerpt(self, count: int) -> Log:
         """At most so many samples of the longest stretch without gaps: those in which the position goes the longest
         way. The whole log where that stretch is no longer."""
@@ -71,7 +77,8 @@ class Log:
         first = part.start + int(np.argmax(travel[count - 1 :] - travel[: len(travel) - count + 1]))
         chosen = slice(first, first + count)
         signals = {role: values[chosen] for role, values in self.signals.items()}
-        return replace(self, time=self.time[chosen], signals=signals, segments=(slice(0, count),))
+        bridged = None if self.bridged is None else self.bridged[chosen]
+        return replace(self, time=self.time[chosen], signals=signals, segments=(slice(0, count),), bridged=bridged)
 
     def unit(self, role: str) -> str:
         """The unit in which a role stands, that of a linear axis where it is the role's."""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from friso.errors import LogError
 from friso.identification.logs.checks import repeated_stamps
@@ -14,29 +15,36 @@ from friso.quantities import percent
 
 GAP = 1.5
 """A step of time above this many sample times is a gap: at least one sample is missing (one missing makes 2)."""
+BRIDGED = 3
+"""Samples lost in a row at most that are bridged: longer gaps split a record."""
 MOST_GAPS = 0.1
 """More gaps than this share of the samples is no even sampling."""
 EVEN = 0.01
 """Time stamps that scatter (rms) by less than this share of a sample time are taken as even: interpolation would change
 a signal by less than 1 % of what it changes per sample."""
+SCATTER = 4.0
+"""Standard deviations of the other steps by which one over a gap may differ from a whole number of sample times."""
 SHORTEST = 10
 """Segments of fewer samples are left out: no filter of ours settles within."""
 
 
 @dataclass
 class Track:
-    """A channel with even instants within each segment: `time` [s] and `values` of shape (n,); what was done to it."""
+    """A channel with even instants within each segment: `time` [s] and `values` of shape (n,), those that were lost and
+    `bridged` true in an array of that shape; what was done to it."""
 
     time: np.ndarray
     values: np.ndarray
     period: float
     segments: list[slice]
+    bridged: np.ndarray
     read: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
 
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
-    """A channel cleaned of what is no number and of repeated stamps [s], split at gaps, on even instants.
+    """A channel cleaned of what is no number and of repeated stamps [s], bridged where a few samples are lost, split at
+    longer gaps, on even instants.
 
     Raises LogError for too little, for time that decreases, for stamps that are repeated with other values, and for
     sampling that is not even.
@@ -44,7 +52,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     read: list[str] = []
     time, values, missing = _numbers_only(name, time, values)
     if missing:
-        read.append(f"{name}: {missing} samples that are not numbers left out; the record is split there")
+        read.append(f"{name}: {missing} samples that are not numbers left out")
     time, values, repeated = repeated_stamps(name, time, values)
     if repeated:
         read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
@@ -56,9 +64,29 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
         )
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = float(steps[~gaps].mean())
-    edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
-    segments = [slice(a, b) for a, b in pairwise(edges)]
-    return _evened(name, Track(time, values, period, segments, read))
+    lost = np.round(steps / period) - 1
+    scatter = max(EVEN, SCATTER * float(np.std(steps[~gaps])) / period)
+    whole = np.abs(steps / period - 1 - lost) <= scatter  # else the clock began anew
+    bridged = gaps & whole & (lost >= 1) & (lost <= BRIDGED)
+    edges = [0, *(np.flatnonzero(gaps & ~bridged) + 1).tolist(), time.size]
+    inserted = np.where(bridged, lost, 0).astype(int)
+    parts = [_bridged(time[a:b], values[a:b], inserted[a : b - 1]) for a, b in pairwise(edges)]
+    ends = np.cumsum([0, *(part[0].size for part in parts)]).tolist()
+    time, values, filled = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+    return _evened(name, Track(time, values, period, [slice(a, b) for a, b in pairwise(ends)], filled, read))
+
+
+def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Instants and values of shape (n,) with those that are lost behind each of them but the last, shape (n - 1,), and
+    which these are: evenly in between, on a cubic spline through the others."""
+    if not lost.any():
+        return time, values, np.zeros(time.size, bool)
+    places = np.repeat(np.arange(lost.size), lost)
+    number = np.arange(places.size) - np.repeat(np.cumsum(lost) - lost, lost) + 1
+    instants = time[places] + (time[places + 1] - time[places]) * number / (lost[places] + 1)
+    made_up = CubicSpline(time, values)(instants)
+    filled = np.insert(np.zeros(time.size, bool), places + 1, True)
+    return np.insert(time, places + 1, instants), np.insert(values, places + 1, made_up), filled
 
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
@@ -91,15 +119,17 @@ def _evened(name: str, raw: Track) -> Track:
         f"{name}: time stamps scatter by {jitter:.2g} of a sample time: interpolated onto uniform time stamps; if the "
         f'sampling was uniform and only the time stamps were not, use --dt "{raw.period * 1e3:.6g} ms"'
     )
-    times, values, segments, start = [], [], [], 0
+    times, values, filled, segments, start = [], [], [], [], 0
     for part in raw.segments:
         count = int((raw.time[part.stop - 1] - raw.time[part.start]) / raw.period + 1e-6) + 1
         grid = raw.time[part.start] + raw.period * np.arange(count)
         times.append(grid)
         values.append(np.interp(grid, raw.time[part], raw.values[part]))
+        filled.append(np.interp(grid, raw.time[part], raw.bridged[part]) > 0)
         segments.append(slice(start, start + count))
         start += count
-    raw.time, raw.values, raw.segments = np.concatenate(times), np.concatenate(values), segments
+    raw.time, raw.values, raw.bridged = (np.concatenate(arrays) for arrays in (times, values, filled))
+    raw.segments = segments
     return raw
 
 
@@ -110,11 +140,14 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
     base = tracks[base_name]
     read, warnings, values = [], [], {}
+    bridged = np.zeros(base.time.size, bool)
     for name, single in tracks.items():
         if _same_instants(single, base):
             values[name] = single.values
+            bridged |= single.bridged
             continue
-        values[name] = _at(base, single)
+        values[name] = _at(base, single, single.values)
+        bridged |= _at(base, single, single.bridged) > 0
         if not _coincident(base, single):
             read.append(
                 f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
@@ -141,7 +174,7 @@ def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.nd
         parts.append(slice(start, start + run.stop - run.start))
         start = parts[-1].stop
     pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
-    track = Track(base.time[pick], base.values[pick], base.period, parts, read, warnings)
+    track = Track(base.time[pick], base.values[pick], base.period, parts, bridged[pick], read, warnings)
     return track, {name: value[pick] for name, value in values.items()}
 
 
@@ -159,15 +192,15 @@ def _coincident(base: Track, other: Track) -> bool:
     return bool(np.all(np.abs(steps - np.round(steps)) <= EVEN))
 
 
-def _at(base: Track, other: Track) -> np.ndarray:
-    """Values of a track at the instants of the base, NaN outside of its segments."""
-    values = np.full(base.time.size, np.nan)
+def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
+    """Values of a track, shape (n,), at the instants of the base, NaN outside of its segments."""
+    found = np.full(base.time.size, np.nan)
     slack = EVEN * other.period
     for part in other.segments:
         time = other.time[part]
         a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))
-        values[a:b] = np.interp(base.time[a:b], time, other.values[part])
-    return values
+        found[a:b] = np.interp(base.time[a:b], time, values[part])
+    return found
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:

@@ -202,7 +202,7 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
         tuple(parameters),
         True,
         _start(log, part),
-        np.ones(count),
+        log.measured(part),
     )
 
 
@@ -246,7 +246,7 @@ def tracking(
         tuple(parameters),
         False,
         _start(log, part),
-        counted,
+        counted * log.measured(part),
         (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper)),
     )
 
