@@ -6,6 +6,8 @@ import os
 import stat
 from pathlib import Path
 
+from friso.system import open_file
+
 _READING = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
@@ -23,7 +25,7 @@ def content_of(path: Path, most: int, follow: bool = True) -> bytes:
     Raises LargeFileError, or another OSError where it cannot be read or is a device, a pipe or a socket.
     """
     flags = _READING if follow else _READING | getattr(os, "O_NOFOLLOW", 0)
-    with open(os.open(path, flags), "rb") as file:
+    with open(open_file(path, flags), "rb") as file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise OSError("a device or a pipe")

@@ -6,14 +6,14 @@ from __future__ import annotations
 import errno
 import shutil
 import stat
-import tempfile
+import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from friso.system import MOVES_OPEN_FOLDERS, foreign_writers
+from friso.system import MOVES_OPEN_FOLDERS, foreign_writers, remove_folder
 
 _TRIES = 3
 
@@ -27,13 +27,14 @@ def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
         yield folder
     finally:
         held.release()
-        shutil.rmtree(folder, ignore_errors=True)
+        remove_folder(folder)
 
 
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
     """The folder and its lock. Before that is held another process may remove the folder, and filelock makes it again,
     for others to read: then it is another folder that is tried."""
-    folder = Path(tempfile.mkdtemp(prefix=prefix, dir=root))
+    folder = root / f"{prefix}{uuid.uuid4().hex}"
+    folder.mkdir(mode=0o700)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
     held = FileLock(folder / lock)
     try:
         made = folder.lstat()
@@ -44,7 +45,7 @@ def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Pa
         return folder, held
     except BaseException as error:
         held.release()
-        shutil.rmtree(folder, ignore_errors=True)
+        remove_folder(folder)
         if isinstance(error, FileNotFoundError) and tries > 1:
             return _made_and_locked(root, prefix, lock, tries - 1)
         raise

@@ -4,6 +4,7 @@ import math
 import os
 import re
 import shlex
+import shutil
 import signal
 import stat
 import sys
@@ -11,9 +12,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import FrameType
+from typing import TypeVar
+
+_T = TypeVar("_T")
 
 
 def _quoted(word: str) -> str:
@@ -23,8 +27,12 @@ def _quoted(word: str) -> str:
 
 def path_of(error: OSError) -> str:
     """The path at which an error arose, of two the one to be written; "" where there is none."""
-    path = error.filename2 or error.filename
-    return os.fsdecode(path) if isinstance(path, str | bytes | os.PathLike) else ""
+    return next(iter(_paths_of(error)), "")
+
+
+def _paths_of(error: OSError) -> list[str]:
+    paths = (error.filename2, error.filename)
+    return [os.fsdecode(path) for path in paths if path and isinstance(path, str | bytes | os.PathLike)]
 
 
 if sys.platform == "win32":
@@ -63,28 +71,33 @@ if sys.platform == "win32":
     def no_signal_later() -> None:
         """Nothing: the timer ends with the process."""
 
-    def replace_file(draft: Path, path: Path) -> None:
-        """Give a file another's name and place. Raises OSError; one that another program holds open for longer than
-        `PATIENCE` is a PermissionError that says so."""
-        _once_closed(draft.replace, path)
-
-    def rename_folder(folder: Path, path: Path) -> None:
-        """Give a folder another's name and place, in which no file is open. Raises OSError, where there is something
-        but an empty folder too; as for `replace_file`."""
-        with suppress(OSError):
-            path.rmdir()  # which elsewhere a renamed folder replaces
-        _once_closed(folder.rename, path)
-
-    def _once_closed(rename: Callable[[Path], object], path: Path) -> None:
+    def once_free(use: Callable[[], _T]) -> _T:
+        """What `use` returns: where another program holds the file open, it is tried again for as long as `PATIENCE`.
+        Raises what `use` raises."""
         end = time.monotonic() + PATIENCE
         while True:
             try:
-                rename(path)
-                return
+                return use()
             except PermissionError as error:
-                if time.monotonic() > end:
-                    raise PermissionError(error.errno, "it may be open in another program", str(path)) from error
+                if time.monotonic() > end or not _may_be_held(error):
+                    raise
                 time.sleep(0.05)
+
+    def _may_be_held(error: PermissionError) -> bool:
+        """Whether what is refused is there: Windows gives the same reason where another program holds it open."""
+        return any(os.path.exists(path) for path in _paths_of(error))
+
+    def check_free(path: Path) -> None:
+        """Raises PermissionError where a file cannot be replaced, since another program holds it open."""
+        with suppress(FileExistsError):
+            once_free(partial(path.rename, path))  # which changes nothing, but takes the same rights
+
+    def rename_folder(folder: Path, path: Path) -> None:
+        """Give a folder another's name and place, in which no file is open. Raises OSError, where there is something
+        but an empty folder too."""
+        with suppress(OSError):
+            path.rmdir()  # which elsewhere a renamed folder replaces
+        once_free(partial(folder.rename, path))
 
     def device_in(path: Path) -> str:
         """The part of a path that Windows takes for a device; "" where there is none."""
@@ -111,6 +124,8 @@ if sys.platform == "win32":
     def cause_of(error: OSError) -> str:
         """Why a file or a folder could not be used. Of a path that is too long Windows says that it is not there."""
         cause, path = error.strerror or str(error), path_of(error)
+        if isinstance(error, PermissionError) and _may_be_held(error):
+            return f"{cause}; it may be open in another program"
         length = len(os.path.abspath(path)) if path else 0
         if length <= _LONGEST or not isinstance(error, FileNotFoundError):
             return cause
@@ -148,9 +163,12 @@ else:
         """Have it not called after all: Python's end takes its handlers away, and SIGALRM would kill the process."""
         signal.setitimer(signal.ITIMER_REAL, 0)
 
-    def replace_file(draft: Path, path: Path) -> None:
-        """Give a file another's name and place. Raises OSError."""
-        draft.replace(path)
+    def once_free(use: Callable[[], _T]) -> _T:
+        """What `use` returns: no program keeps others from a file. Raises what `use` raises."""
+        return use()
+
+    def check_free(path: Path) -> None:
+        """Nothing: see `once_free`."""
 
     def rename_folder(folder: Path, path: Path) -> None:
         """Give a folder another's name and place. Raises OSError, where there is something but an empty folder too."""
@@ -197,6 +215,28 @@ else:
             folder.chmod(0o700)
             return folder.lstat()
         return status
+
+
+def open_file(path: Path, flags: int) -> int:
+    """The descriptor of a file that is opened, once no other program holds it. Raises OSError."""
+    return once_free(partial(os.open, path, flags))
+
+
+def replace_file(draft: Path, path: Path) -> None:
+    """Give a file another's name and place, once no other program holds it. Raises OSError."""
+    once_free(partial(draft.replace, path))
+
+
+def delete_file(path: Path) -> None:
+    """Delete a file, if it is there, once no other program holds it. Raises OSError."""
+    once_free(partial(path.unlink, missing_ok=True))
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder with all that is in it, as far as this user may, once no other program holds anything of it."""
+    with suppress(OSError):
+        once_free(partial(shutil.rmtree, folder))
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 if sys.platform == "linux":

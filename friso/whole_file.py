@@ -6,11 +6,11 @@ import os
 import re
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from friso.system import replace_file
+from friso.system import delete_file, replace_file
 
 PARTIAL = ".partial"
 """How the names of files end that are being written, these and Zarr's, after 32 digits."""
@@ -32,7 +32,8 @@ def whole_file(path: Path, mode: int = FOR_ALL) -> Iterator[BinaryIO]:
             os.fsync(stream.fileno())
         replace_file(draft, path)
     except BaseException:
-        draft.unlink(missing_ok=True)
+        with suppress(OSError):  # what was raised is told
+            delete_file(draft)
         raise
 
 

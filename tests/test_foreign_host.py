@@ -102,10 +102,29 @@ def test_check_writes_its_page(host: str, axis: Path) -> None:
 
 
 @on_windows
-def test_files_are_replaced(host: str, axis: Path) -> None:
+def test_files_are_replaced_unless_another_program_holds_them(host: str, axis: Path) -> None:
+    export = ("export", "gains", "axis.toml", "--out", "run")
     for _ in range(2):
-        friso(host, axis, "export", "gains", "axis.toml", "--out", "run")
+        friso(host, axis, *export)
     assert not list(axis.rglob(f"{DRAFTS}*"))
+    there = {path: path.read_bytes() for path in (axis / "run").iterdir()}
+    if host == "win32":
+        with next(path for path in there if path.suffix == ".html").open("rb") as held:
+            message = " ".join(friso(host, axis, *export, status=2).split())
+            assert f"{Path(held.name).name} cannot be replaced" in message and "open in another program" in message
+        assert there == {path: path.read_bytes() for path in (axis / "run").iterdir()}
+
+
+def test_folders_in_which_windows_lets_nothing_be_made_are_refused_at_once(axis: Path) -> None:
+    """Neither the mode of such a folder tells, nor os.access. Nothing is computed: that would compile."""
+    (axis / "read-only").mkdir()
+    kernels = axis / "kernels"
+    for out in (("--out", "read-only/run"), ("--out", "read-only")):
+        message = friso("win32", axis, "check", "axis.toml", *out, status=2, FRISO_CACHE_DIR=str(kernels))
+        assert "can be written (Permission denied)" in " ".join(message.split())
+    export = (*SPAN, "--out", "map.zarr", "--export", "read-only/map.csv")
+    assert "can be written" in friso("win32", axis, "map", "axis.toml", *export, status=2, FRISO_CACHE_DIR=str(kernels))
+    assert {path.name for path in axis.iterdir()} == {"axis.toml", "read-only"}
 
 
 @on_windows
@@ -189,9 +208,13 @@ def test_what_windows_alone_calls_otherwise(axis: Path) -> None:
 
 
 WORDS = r"""
+from pathlib import Path
+
 from friso.app.names import plain_name
+from friso.bounded_file import content_of
 from friso.engine import building
-from friso.system import cause_of, path_of, shell_word
+from friso.engine.private import read_private
+from friso.system import cause_of, check_free, delete_file, path_of, replace_file, shell_word
 
 assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
 assert shell_word("position=Act Pos") == 'position="Act Pos"'
@@ -207,6 +230,22 @@ assert cause_of(moved).endswith("only if long paths are enabled") and path_of(mo
 
 class Request:
     builder, task = "none", b"0" * 100_000
+
+for name in ("busy-1", "busy-2", "busy-3", "busy-4", "draft"):
+    Path(name).write_bytes(name.encode())
+assert (content_of(Path("busy-1"), 100), read_private(Path("busy-2"))) == (b"busy-1", b"busy-2")
+replace_file(Path("draft"), Path("busy-3"))
+assert Path("busy-3").read_bytes() == b"draft"
+delete_file(Path("busy-4"))
+with open("busy-1") as held:
+    for refused in (delete_file, check_free):
+        try:
+            refused(Path("busy-1"))
+        except PermissionError as error:
+            assert cause_of(error).endswith("it may be open in another program"), error
+        else:
+            raise AssertionError(refused)
+assert not Path("busy-4").exists()
 
 builder = building._Builder(building._Surroundings(0, ".", (), ""))
 builder.kill()  # as one does that has waited long enough

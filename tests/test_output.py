@@ -1,6 +1,7 @@
 """Files of a command: all of them or none, in a folder that is the command's to write into."""
 
 import errno
+import json
 import os
 import shutil
 import signal
@@ -87,6 +88,25 @@ def test_a_folder_of_another_command_is_refused(command: str, tmp_path: Path) ->
     assert done.returncode == 2
     assert "friso another" in done.stderr
     assert tree(tmp_path) == before
+
+
+@posix
+@pytest.mark.parametrize("command", NEEDS)
+def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(command: str, tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, command, *NEEDS[command], "--out", "/proc/nowhere")  # not by root either
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "can be written (" in " ".join(done.stderr.split())
+
+
+def test_an_answer_whose_files_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(drafts: Drafts) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "gains.html")
+
+    monkeypatch.setattr(Drafts, "put_in_place", full)
+    done = friso_inside(tmp_path, *("export", "gains", RIG, "--json", "--out", "out"))
+    assert (done.returncode, json.loads(done.stdout)["files"]) == (1, [])
+    assert "no file was written: No space left on device: gains.html" in done.stderr
+    assert tree(tmp_path) == {}
 
 
 @pytest.mark.parametrize("command", OF_ONE_FILE)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from friso.interrupts import hold_interrupts
 from friso.leftovers import locked_folder, remove_leftovers
-from friso.system import replace_file
+from friso.system import delete_file, replace_file
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -73,11 +73,11 @@ class Drafts:
                     _duplicate(path, spare)
                     undo.append(partial(replace_file, spare, path))
                 elif draft is not None:
-                    undo.append(path.unlink)
+                    undo.append(partial(delete_file, path))
                 if draft is not None:
                     replace_file(draft, path)
                 elif os.path.lexists(path):
-                    path.unlink()
+                    delete_file(path)
         except BaseException:
             for step in reversed(undo):
                 with suppress(OSError):  # the rest is undone all the same

@@ -17,7 +17,7 @@ from friso.interrupts import hold_interrupts
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
 from friso.stage.files import parsed, text_of
-from friso.system import cause_of, shell_word
+from friso.system import cause_of, check_free, shell_word
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -54,7 +54,10 @@ class OutputFolder:
         self.is_own = maker == command or not _entries(folder)
         if not (self.is_own or overwrite):
             raise _of_others(folder, maker, f"one that friso {command} made, or {OVERWRITE}, {REPLACES}")
-        self.check(name for name in self.files if self.is_own)
+        own = [name for name in self.files if self.is_own]
+        self.check(own)
+        for name in own:
+            self._check_free(name)
 
     @property
     def unfinished(self) -> Path:
@@ -72,6 +75,15 @@ class OutputFolder:
         if others and not self.overwrite:
             actual = f"{self.folder}, with {_first_names(others)}, which friso {self.command} has not written"
             raise InputError("--out", actual, f"another folder, or {OVERWRITE}", _beside(self.folder))
+
+    def _check_free(self, name: str) -> None:
+        """Raises InputError where a file cannot be replaced, since another program holds it open."""
+        try:
+            if (self.folder / name).exists():
+                check_free(self.folder / name)
+        except OSError as error:
+            actual = f"{self.folder}, where {name} cannot be replaced ({cause_of(error)})"
+            raise InputError("--out", actual, "that file closed, or another folder", _beside(self.folder)) from None
 
     def write(
         self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
@@ -122,6 +134,10 @@ def check_file(
     if os.path.lexists(path) and not ((is_own or overwrite) and path.is_file()):
         expected = f"a new file, or {OVERWRITE}; nothing was overwritten"
         raise InputError(option, f"{path}, which already exists", expected, example)
+    try:
+        _try_draft(path)
+    except OSError as error:
+        raise _unwritable(option, path, error) from None
 
 
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
@@ -131,8 +147,12 @@ def write_file(option: str, path: Path, content: Content, overwrite: bool) -> No
         path.parent.stat()  # a folder that is missing is a mistake, not one to make
         write({path: content})
     except OSError as error:
-        expected = f"a new file in a folder that can be written ({cause_of(error)}); nothing was overwritten"
-        raise InputError(option, str(path), expected, path.name) from None
+        raise _unwritable(option, path, error) from None
+
+
+def _unwritable(option: str, path: Path, error: OSError) -> InputError:
+    expected = f"a new file in a folder that can be written ({cause_of(error)}); nothing was overwritten"
+    return InputError(option, str(path), expected, path.name)
 
 
 def output_folder(
@@ -204,8 +224,13 @@ def _check_writable(folder: Path) -> None:
         with hold_interrupts():
             for path in reversed(made(folder)):
                 path.rmdir()  # for now: it appears with what is written
+        _try_draft(folder / MARKER)
     except OSError as error:
         expected = f"a folder that can be written ({cause_of(error)})"
         raise InputError("--out", str(folder), expected, "--out report") from None
-    if folder.exists() and not os.access(folder, os.W_OK):
-        raise InputError("--out", str(folder), "a folder that can be written", _beside(folder))
+
+
+def _try_draft(path: Path) -> None:
+    """Raises OSError where no draft of a file can be made: on Windows and on network shares nothing else tells."""
+    with Drafts() as drafts:
+        drafts.add(path, "")

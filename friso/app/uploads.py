@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import shutil
 import tempfile
 from collections.abc import AsyncIterable
 from contextlib import ExitStack
@@ -12,6 +11,7 @@ from pathlib import Path
 from friso.app.names import plain_name
 from friso.errors import InputError
 from friso.leftovers import locked_folder, remove_leftovers
+from friso.system import remove_folder
 
 MOST_BYTES = 64_000_000
 """Size of a log at most."""
@@ -53,7 +53,7 @@ class Uploads:
                         raise InputError(plain, f"more than {MOST_BYTES / 1e6:g} MB", most)
                     file.write(chunk)
         except BaseException:
-            shutil.rmtree(place, ignore_errors=True)
+            remove_folder(place)
             raise
         label = f"{place.name}/{plain}"
         self.files[label] = place / plain

@@ -17,6 +17,7 @@ from friso.cli.output import print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.interrupts import hold_interrupts
+from friso.system import cause_of, path_of
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
@@ -48,18 +49,30 @@ def ask(
 
         target = OutputFolder(command, out, overwrite, [*_paths(about)])
         target.check(writes)
-    files: list[Path] = []
+    files, unwritten = [], ""
     with ProgressBar(what, lines) as progress:
         with named_as_options(options):
             answer = question(*about, **options, progress=progress)
         speak_of(answer.axis_kind)
         if target is not None:
-            files = target.write(answer.files(), progress)
-    show(answer, files, as_json, details)
+            files, unwritten = tried(lambda: target.write(answer.files(), progress))
+    show(answer, files, as_json, details, unwritten)
 
 
-def show(answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False) -> None:
-    """Print the answer with the `files` written. Raises typer.Exit with the status of a failure."""
+def tried(write: Callable[[], list[Path]]) -> tuple[list[Path], str]:
+    """The files that `write` writes, and why it could not, "" where it could: what was computed is shown all the
+    same."""
+    try:
+        return write(), ""
+    except OSError as error:
+        return [], f"no file was written: {cause_of(error)}: {path_of(error)}".removesuffix(": ")
+
+
+def show(
+    answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False, unwritten: str = ""
+) -> None:
+    """Print the answer with the `files` written, or why they are `unwritten`. Raises typer.Exit with the status of a
+    failure."""
     written = [*files]
     if as_json:
         print_document(answer.document(), written)
@@ -78,9 +91,11 @@ def show(answer: Answer, files: Iterable[Path], as_json: bool = False, details: 
             print(f"next: {command}")
         if more and not details:
             print("more: --details")
-    if answer.failure:
-        say(answer.failure)
-        raise typer.Exit(answer.status)
+    failures = [failure for failure in (answer.failure, unwritten) if failure]
+    for failure in failures:
+        say(failure)
+    if failures:
+        raise typer.Exit(answer.status if answer.failure else 1)
 
 
 @contextmanager

@@ -18,7 +18,6 @@ import logging
 import marshal
 import os
 import re
-import shutil
 import sys
 import tempfile
 import time
@@ -39,6 +38,8 @@ from platformdirs import user_cache_dir
 from friso.engine.private import make_private
 from friso.engine.processor import processor
 from friso.engine.seal import read_sealed, write_sealed
+from friso.leftovers import locked_folder
+from friso.system import remove_folder
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")
@@ -58,7 +59,7 @@ def cache_folder() -> Path:
     try:
         folder = (Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels").absolute()
         make_private(folder)
-        with tempfile.TemporaryFile(dir=folder):
+        with locked_folder(folder, "trial-", "lock"):
             return folder
     except (OSError, RuntimeError) as error:  # the latter of a user without a home
         logger.warning(
@@ -84,7 +85,7 @@ def is_passing(folder: Path) -> bool:
 def remove_if_passing(folder: Path) -> None:
     """Remove a cache that is in a temporary folder."""
     if is_passing(folder):
-        shutil.rmtree(folder.parent, ignore_errors=True)
+        remove_folder(folder.parent)
 
 
 @cache

@@ -11,7 +11,7 @@ import stat
 from contextlib import suppress
 from pathlib import Path
 
-from friso.system import closed_to_others, foreign_writers
+from friso.system import closed_to_others, foreign_writers, open_file
 from friso.whole_file import FOR_USER, whole_file
 
 
@@ -44,7 +44,7 @@ def read_private(path: Path) -> bytes:
     """What is in a file. Raises PermissionError where another user can have written it, OSError where it cannot be
     read."""
     flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
-    with open(os.open(path, flags), "rb") as file:
+    with open(open_file(path, flags), "rb") as file:
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode):
             raise PermissionError(f"{path} is no file")

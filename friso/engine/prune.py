@@ -43,5 +43,5 @@ def _delete(file: Path) -> None:
     try:
         with entry_lock(file).acquire(blocking=False):
             file.unlink()
-    except Timeout:
+    except (Timeout, PermissionError):  # it is in use
         return

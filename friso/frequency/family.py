@@ -8,13 +8,13 @@ large numbers from each other: a few operations for each member and frequency.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from friso.engine.side_by_side import side_by_side
 from friso.equations.structure import shared_structure
 from friso.frequency.drive import LIGHT, DriveTiming
 from friso.frequency.friction import law_of
@@ -25,7 +25,6 @@ from friso.frequency.operating_point import operating_point
 from friso.frequency.parts import FORCE, RATED, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.rates import controller_over_period, samples_controller
 from friso.frequency.system import Complex, System
-from friso.system import usable_cores
 
 CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
@@ -66,9 +65,13 @@ class Scan:
         """Least distance of the loop from -1: on frequencies that all share and about a member's own closed-loop
         resonances, and exactly for those that come closest to -1 there."""
         omega = frequency_grid(self.flat, DENSITY)
-        parts = (self.members[part] for part in _split(np.arange(len(self.members))))
-        shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(self.flat, part, omega)), parts))
-        distance = np.minimum(shared, self.by_poles.resonant)
+
+        def shared(which: np.ndarray) -> np.ndarray:
+            return distance_to_lines(loops(self.flat, self.members[which], omega))
+
+        parts = _split(np.arange(len(self.members)))
+        distance = np.concatenate(side_by_side([partial(shared, part) for part in parts]))
+        distance = np.minimum(distance, self.by_poles.resonant)
         for k in np.argsort(np.where(self.stable, distance, np.inf))[:CLOSEST]:
             exact = margins(self.flat, self.members[k]).modulus_margin
             distance[k] = distance[k] if np.isnan(exact) else exact
@@ -106,7 +109,7 @@ def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStabili
         by_poles.abscissa[which], by_poles.resonant[which] = part_poles.abscissa, _about_resonances(part_poles)
 
     numbers = (np.flatnonzero(mask) for mask in (members.stuck, ~members.stuck))
-    _side_by_side(look, [part for numbers_of_kind in numbers for part in _split(numbers_of_kind)])
+    side_by_side([partial(look, part) for numbers_of_kind in numbers for part in _split(numbers_of_kind)])
     return by_poles
 
 
@@ -243,9 +246,3 @@ def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Compl
 
 def _split(numbers: np.ndarray) -> list[np.ndarray]:
     return np.array_split(numbers, -(-len(numbers) // CHUNK)) if len(numbers) else []
-
-
-def _side_by_side(work: Callable[[Any], Any], parts: Any) -> list[Any]:
-    """The work on every part, in threads: NumPy releases the interpreter's lock in its loops."""
-    with ThreadPoolExecutor(usable_cores()) as pool:
-        return list(pool.map(work, parts))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ import numpy as np
 from friso.studies.cells import WORDS, Columns
 from friso.studies.refine import Ask
 from friso.studies.store_files import stored_arrays
+from friso.system import remove_folder
 from friso.whole_file import whole_file
 
 
@@ -40,7 +40,7 @@ class KeptCells:
 
     def forget(self) -> None:
         """Remove what was kept: the blocks of the study hold it by now."""
-        shutil.rmtree(self.folder, ignore_errors=True)
+        remove_folder(self.folder)
 
 
 def _kept(file: Path, cells: np.ndarray) -> Columns | None:

@@ -31,9 +31,11 @@ class Ledger:
         put(self._file(number), self._entry(number))
 
     def is_whole(self, number: str) -> bool:
-        """Whether all chunks of a block are what was written."""
+        """Whether all chunks of a block are what was written. Raises PermissionError where they cannot be read."""
         try:
             return stored(self._file(number)) == self._entry(number)
+        except PermissionError:
+            raise
         except OSError:
             return False
 

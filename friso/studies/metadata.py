@@ -20,6 +20,7 @@ from typing import Any
 from friso.errors import StoreError
 from friso.studies.cells import METRICS
 from friso.studies.store_files import digest_of, put, stored
+from friso.system import cause_of
 
 FORMAT = 2
 """Version of what friso writes into a store."""
@@ -126,7 +127,9 @@ def checked_metadata(path: Path) -> Metadata:
             raise _damaged(path, "is missing") from None
         actual = "a folder with other things in it; nothing was overwritten"
         raise StoreError("", actual, expected, "--out study.zarr", str(path)) from None
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
+    except OSError as error:
+        raise _damaged(path, f"cannot be read ({cause_of(error)})") from None
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
     if number is not None and number > FORMAT:
         actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"

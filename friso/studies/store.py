@@ -13,6 +13,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +29,7 @@ from friso.studies.metadata import annotate_metadata, checked_metadata, is_store
 from friso.studies.store_files import refuse_foreign
 from friso.studies.store_folder import exchange, lock_store, make, remove_leftovers, remove_partial_files
 from friso.studies.study import CellBlock, Study, study_of
-from friso.system import cause_of
+from friso.system import cause_of, once_free
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -155,7 +156,8 @@ class Store:
         with zarr.config.set({"array.write_empty_chunks": True}):
             group: Any = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT, use_consolidated=True)
             for name in self.study.metrics:
-                group[name][block] = columns[name].astype(WORDS.get(name, "f8")).reshape(shape)
+                values = columns[name].astype(WORDS.get(name, "f8")).reshape(shape)
+                once_free(partial(group[name].__setitem__, block, values))
         self.ledger.enter(self._number(block))
 
     @property

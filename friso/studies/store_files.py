@@ -29,9 +29,12 @@ def stored(file: Path) -> bytes:
 
 
 def digest_of(file: Path) -> str | None:
-    """The SHA-256 of a file of a store; None where `stored` raises."""
+    """The SHA-256 of a file of a store; None where there is none, or no file. Raises PermissionError where it cannot
+    be read, which does not tell of damage."""
     try:
         return hashlib.sha256(stored(file)).hexdigest()
+    except PermissionError:
+        raise
     except OSError:
         return None
 

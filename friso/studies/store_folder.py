@@ -7,7 +7,6 @@ Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a f
 
 from __future__ import annotations
 
-import shutil
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -19,7 +18,7 @@ from filelock import FileLock, Timeout
 from friso.errors import StoreError
 from friso.interrupts import hold_interrupts
 from friso.leftovers import is_leftover, remove_leftover
-from friso.system import MOVES_OPEN_FOLDERS, cause_of, rename_folder
+from friso.system import MOVES_OPEN_FOLDERS, cause_of, delete_file, remove_folder, rename_folder
 from friso.whole_file import PARTIAL, is_partial
 
 LOCK = ".friso.lock"
@@ -55,7 +54,7 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
         except BaseException:
             rename_folder(old, path)
             raise
-    shutil.rmtree(old, ignore_errors=True)
+    remove_folder(old)
 
 
 def remove_leftovers(path: Path) -> None:
@@ -76,7 +75,7 @@ def remove_partial_files(path: Path) -> None:
     into it holds the lock."""
     for file in path.rglob(f"*{PARTIAL}"):
         if is_partial(file):
-            file.unlink(missing_ok=True)
+            delete_file(file)
 
 
 @contextmanager
@@ -110,7 +109,7 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
                 fill(new)
             yield new
     finally:
-        shutil.rmtree(draft, ignore_errors=True)
+        remove_folder(draft)
 
 
 def _free_name(path: Path, suffix: str = "") -> Path:

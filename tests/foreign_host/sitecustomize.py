@@ -2,7 +2,8 @@
 
 Python imports it at its start, in children too, where its folder is in PYTHONPATH. friso's modules get `os`, `signal`,
 `sys` and `ctypes` without the names that the other system lacks; other packages have versions of their own for it, and
-are left alone. For Windows, also: what is open cannot be renamed, replaced or deleted; paths are not longer than 259
+are left alone. For Windows, also: what is open cannot be renamed, replaced or deleted; in a folder called read-only
+nothing can be made; what is called busy is used by another program the first times; paths are not longer than 259
 characters; a pipe that nobody reads is an invalid argument; text files are cp1252 with CRLF unless they are opened
 otherwise.
 """
@@ -113,14 +114,26 @@ def _refuse_open(path, folder=None, below=False):
     real = os.path.join(os.path.realpath(os.path.dirname(path)), os.path.basename(path))
     if real.startswith("/dev/shm/"):  # multiprocessing's own, which on Windows has no name in a folder
         return
+    _refuse_busy(real)
     for file in _opened_by():
         if (file == real and not os.path.isdir(real)) or (below and file.startswith(real + os.sep)):
             raise PermissionError(13, "The process cannot access the file: it is open", path)
 
 
+_TIMES = {}
+
+
+def _refuse_busy(path):
+    path = os.path.abspath(path)
+    busy = os.path.basename(path).startswith("busy") and os.path.lexists(path)
+    if busy and _TIMES.setdefault(path, 0) < 3:
+        _TIMES[path] += 1
+        raise PermissionError(13, "Permission denied", path)
+
+
 def _renaming(real):
     def rename(source, target, *, src_dir_fd=None, dst_dir_fd=None):
-        if real is _rename and os.path.lexists(target):
+        if real is _rename and os.path.lexists(target) and not os.path.samefile(source, target):
             raise FileExistsError(17, "Cannot create a file when that file already exists", os.fsdecode(target))
         _refuse_open(source, src_dir_fd, below=True)
         _refuse_open(target, dst_dir_fd)
@@ -147,10 +160,14 @@ class Pipe(io.FileIO):
             raise OSError(22, "Invalid argument") from None
 
 
-def _in_short_path(real):
+def _within_reach(real):
     def done(path, *more, **others):
-        if isinstance(path, str | os.PathLike) and len(os.path.abspath(path)) > 259:
-            raise FileNotFoundError(2, "No such file or directory", os.fsdecode(path))
+        if isinstance(path, str | os.PathLike):
+            if len(os.path.abspath(path)) > 259:
+                raise FileNotFoundError(2, "No such file or directory", os.fsdecode(path))
+            if os.path.basename(os.path.dirname(path)) == "read-only" and not os.path.lexists(path):
+                raise PermissionError(13, "Permission denied", os.fsdecode(path))
+            _refuse_busy(os.fsdecode(path))
         return real(path, *more, **others)
 
     return done
@@ -182,8 +199,8 @@ if HOST == "win32":
     _rename = os.rename
     os.rename, os.replace = _renaming(os.rename), _renaming(os.replace)
     os.unlink = os.remove = _deleting(os.unlink)
-    os.open, os.mkdir = _in_short_path(os.open), _in_short_path(os.mkdir)
-    builtins.open = io.open = _windows_open(_in_short_path(io.open))
+    os.open, os.mkdir = _within_reach(os.open), _within_reach(os.mkdir)
+    builtins.open = io.open = _windows_open(_within_reach(io.open))
     if stat.S_ISFIFO(os.fstat(1).st_mode):
         sys.stdout = io.TextIOWrapper(io.BufferedWriter(Pipe(1, "wb", closefd=False)), sys.stdout.encoding)
     locale.getpreferredencoding = lambda do_setlocale=True: "cp1252"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.axis import speak_of
-from friso.cli.asking import Details, named_as_options, show
+from friso.cli.asking import Details, named_as_options, show, tried
 from friso.cli.command import MACHINE, Choices, Command
 from friso.cli.common import AsJson, Overrides
 from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Units
@@ -94,8 +94,8 @@ def identify(
             _keep(error.mappings, target)
             raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
         speak_of(answer.axis_kind)
-        files = target.write(answer.files(), progress)
-    show(answer, files, as_json, details)
+        files, unwritten = tried(lambda: target.write(answer.files(), progress))
+    show(answer, files, as_json, details, unwritten)
 
 
 def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-from friso.cli.asking import named_as_options, show
+from friso.cli.asking import named_as_options, show, tried
 from friso.cli.command import MACHINE, Choices, Command
 from friso.cli.common import AsJson
 from friso.cli.log_options import AxisOption, Logs, Maps, SampleTime, Scales, Units
@@ -33,12 +31,12 @@ def logs(
 
     target = output_folder("logs", out, overwrite, logs)
     options = {"map": maps, "unit": units, "scale": scales, "dt": dt, "axis": axis}
-    files: list[Path] = []
+    files, unwritten = [], ""
     with ProgressBar("reading") as progress, named_as_options(options):
         answer = question(logs, **options, folder=out, partly=True, progress=progress)
         if target is not None and answer.result:
-            files = target.write(answer.files(), progress)
-    show(answer, files, as_json and not answer.errors)
+            files, unwritten = tried(lambda: target.write(answer.files(), progress))
+    show(answer, files, as_json and not answer.errors, unwritten=unwritten)
     if answer.errors:
         raise unreadable(answer.errors)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import typer
 
-from friso.cli.asking import named_as_options, show
+from friso.cli.asking import named_as_options, show, tried
 from friso.cli.command import WHERE, Command
 from friso.cli.common import AsJson, Overrides
 from friso.cli.map_options import (
@@ -85,8 +85,8 @@ def map_cells(
         # The exports are written together with the figure and the page, all of them or none.
         answer = sweep(source, **options, keep=lambda exports: None, progress=progress)
         speak_of(answer.axis_kind)
-        files = write(answer.files_beside(progress), progress)
-    show(answer, files, as_json)
+        files, unwritten = tried(lambda: write(answer.files_beside(progress), progress))
+    show(answer, files, as_json, unwritten=unwritten)
 
 
 def _check(store: Path, as_json: bool) -> None:

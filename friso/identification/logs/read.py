@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 from friso.errors import LogError
 from friso.identification.logs.channel import ChannelTable
 from friso.identification.logs.format import FORMATS, FileHead
 from friso.identification.logs.measured_response import MeasuredResponse
+from friso.system import cause_of, once_free
 
 MOST_BYTES = 2 << 30
 """Largest file that is read, 2 GiB: all its channels are held in memory at once, about as large again."""
@@ -24,12 +26,12 @@ def file_format(path: Path) -> str:
         if path.exists() and not path.is_file():  # a device or a pipe may never end, or never begin
             raise LogError("log", "a device, pipe or socket", "a file", "friso identify log.csv", str(path))
         size = path.stat().st_size
-        with path.open("rb") as file:
+        with once_free(partial(path.open, "rb")) as file:
             head = FileHead(path, file.read(520))
     except LogError:
         raise
     except (OSError, ValueError) as error:  # a name that no file has
-        reason = getattr(error, "strerror", None) or "no name of a file"
+        reason = cause_of(error) if isinstance(error, OSError) else "no name of a file"
         raise LogError("log", f"a file that cannot be opened ({reason})", "a log", "", str(path)) from None
     if size == 0:
         raise LogError("log", "an empty file (0 bytes)", "a heading and rows of numbers", "", str(path))

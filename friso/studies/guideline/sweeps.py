@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
@@ -21,6 +20,7 @@ from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
 from friso.studies.store_files import keep_arrays, kept_arrays
+from friso.system import remove_folder
 from friso.version import VERSION
 
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
@@ -113,7 +113,7 @@ class Keep:
     def clear(self) -> None:
         """Forget them."""
         if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            remove_folder(self.folder)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
         """The part with this name: as it was kept, or made now and kept."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass
@@ -24,6 +23,7 @@ from friso.studies.sweep import dataset
 from friso.studies.thesis.claims import Finding, Part
 from friso.studies.thesis.studies import thesis_rig
 from friso.studies.thesis.taken_apart import put_together, taken_apart
+from friso.system import remove_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -57,7 +57,7 @@ class Kept:
     def clear(self) -> None:
         """Forget them."""
         if self.folder is not None:
-            shutil.rmtree(self.folder, ignore_errors=True)
+            remove_folder(self.folder)
 
     def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
         """The runs of a study, as they were kept or made now."""
