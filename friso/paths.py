@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from friso.system import device_in
+from friso.system import name_refused
 
 LONGEST_NAME = 255
 """Bytes of a name at most, on Linux, macOS and Windows alike."""
@@ -39,9 +39,9 @@ def flaw_of(path: str | os.PathLike[str], longest_name: int = LONGEST_NAME) -> s
 
 def unwritable(path: Path) -> tuple[str, str] | None:
     """Why nothing can be written to a path, whatever is there, and what can, in words; None where it may be: it has no
-    name, one that is too long, or one that Windows takes for a device."""
+    name, one that is too long, or one that Windows does not take."""
     if flaw := flaw_of(path, LONGEST_WRITTEN):
         return flaw, f"names of at most {LONGEST_WRITTEN} bytes"
-    if device := device_in(path):
-        return str(path), f"another name: for Windows, {device} is a device whatever folder and suffix it has"
+    if why := name_refused(path):
+        return str(path), f"another name: {why}"
     return None

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache, partial
-from pathlib import Path
+from pathlib import Path, PureWindowsPath
 from types import FrameType
 from typing import TypeVar
 
@@ -48,6 +48,9 @@ if sys.platform == "win32":
         *("CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"),
         *(f"{port}{number}" for port in ("COM", "LPT") for number in "123456789¹²³"),
     }
+
+    _REFUSED = {*'<>:"|?*', *map(chr, range(32))}
+    """Characters of no name: a colon would make a hidden stream of a file, or an error."""
 
     _LONGEST = 247
     """Characters of a path of a folder that every Windows takes; of a file it takes twelve more."""
@@ -99,9 +102,15 @@ if sys.platform == "win32":
             path.rmdir()  # which elsewhere a renamed folder replaces
         once_free(partial(folder.rename, path))
 
-    def device_in(path: Path) -> str:
-        """The part of a path that Windows takes for a device; "" where there is none."""
-        return next((part for part in path.parts if part.split(".")[0].rstrip().upper() in _DEVICES), "")
+    def name_refused(path: Path) -> str:
+        """Why Windows makes no file, or none of this name, at a path, in words; "" where it does."""
+        pure = PureWindowsPath(path)
+        for name in pure.relative_to(pure.anchor).parts:
+            if name.split(".")[0].rstrip().upper() in _DEVICES:
+                return f"for Windows, {name} is a device whatever folder and suffix it has"
+            if name != ".." and (set(name) & _REFUSED or name[-1] in ". "):
+                return f'Windows takes no {name}: no name has one of <>:"|?* in it, or ends with a dot or a space'
+        return ""
 
     def shell_word(word: str) -> str:
         """A word of a command as cmd and PowerShell take it: cmd knows no quotes but "...". Within these cmd still
@@ -174,8 +183,8 @@ else:
         """Give a folder another's name and place. Raises OSError, where there is something but an empty folder too."""
         folder.rename(path)
 
-    def device_in(path: Path) -> str:
-        """ "": a device is a file like others."""
+    def name_refused(path: Path) -> str:
+        """ "": names are as one likes."""
         return ""
 
     def shell_word(word: str) -> str:
@@ -273,9 +282,6 @@ else:
         """Number of processor cores; neither macOS nor Windows confines a process to some of them by default."""
         return os.cpu_count() or 1
 
-
-IGNORES_CASE = sys.platform == "win32"
-"""Whether a folder is the same however its name is written in small and capital letters."""
 
 MODES_TELL = sys.platform != "win32"
 """Whether the mode of a folder tells who may look into it: on Windows its access list does."""

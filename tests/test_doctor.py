@@ -50,12 +50,22 @@ def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.Mon
     assert str(cache_folder().parent) not in texts[False]
 
 
-def test_the_home_is_left_out_of_errors_as_windows_words_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Path, "home", lambda: Path(r"C:\Users\Ann"))
-    monkeypatch.setattr(doctor, "IGNORES_CASE", True)
-    error = PermissionError(13, "denied", r"c:\users\ann\friso")
-    assert doctor._without_home(str(error), False) == r"[Errno 13] denied: '~\\friso'"
-    assert doctor._without_home(r"C:\Users\Anna", False) == r"C:\Users\Anna"
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        (str(PermissionError(13, "denied", r"D:\profiles\ann\friso")), r"[Errno 13] denied: '~\\friso'"),
+        (r"C:\Users\ANNMIL~1\AppData\Local\Temp", r"~\AppData\Local\Temp"),
+        ("/home/bea/friso", "~/friso"),
+        (r"D:\Profiles\Anna", r"D:\Profiles\Anna"),
+        ("/scratch/ann/friso", "/scratch/USER/friso"),
+        ("/scratch/annual/friso", "/scratch/annual/friso"),
+    ],
+)
+def test_no_user_is_named(text: str, shown: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Path, "home", lambda: Path(r"D:\Profiles\Ann"))
+    monkeypatch.setattr(doctor.getpass, "getuser", lambda: "ann")
+    assert doctor._without_names(text, False) == shown
+    assert doctor._without_names(text, True) == text
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="modes tell nothing there")

@@ -111,7 +111,8 @@ def test_files_are_replaced_unless_another_program_holds_them(host: str, axis: P
     if host == "win32":
         with next(path for path in there if path.suffix == ".html").open("rb") as held:
             message = " ".join(friso(host, axis, *export, status=2).split())
-            assert f"{Path(held.name).name} cannot be replaced" in message and "open in another program" in message
+            assert f"{Path(held.name).name} cannot be replaced" in message
+            assert "open in another program" in message
         assert there == {path: path.read_bytes() for path in (axis / "run").iterdir()}
 
 

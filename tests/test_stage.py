@@ -212,7 +212,7 @@ def test_save_into_nowhere(tmp_path: Path, rig: Stage, refused: Refused) -> None
 
 
 def test_a_device_of_windows_is_no_file(tmp_path: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(paths, "device_in", lambda path: path.name)
+    monkeypatch.setattr(paths, "name_refused", lambda path: f"{path.name} is a device")
     with pytest.raises(InputError, match=r"con\.toml is a device"):
         save(rig, tmp_path / "con.toml")
     assert not [*tmp_path.iterdir()]

@@ -93,7 +93,8 @@ class Drafts:
 
     def _spare(self, path: Path) -> Path:
         """A path that is free, on the disk of `path`, with its suffix."""
-        root = next(folder for folder in path.absolute().parents if folder.exists())
+        parents = path.absolute().parents
+        root = next((folder for folder in parents if folder.exists()), parents[-1])  # a drive that is not there
         if root not in self.folders:
             with hold_interrupts():
                 self.folders[root] = self.made.enter_context(locked_folder(root, DRAFTS, _LOCK))

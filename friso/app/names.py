@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from friso.system import device_in
+from friso.system import name_refused
 
 _OUTSIDE = re.compile(r"[^\w.+ -]")
 
@@ -17,4 +17,4 @@ def plain_name(name: str, otherwise: str) -> str:
     """The last part of a name without what leads elsewhere, hides a file, or reads as an option of a command."""
     last = _OUTSIDE.sub("_", name.replace("\\", "/").rpartition("/")[2])
     plain = last.encode()[-LONGEST:].decode(errors="ignore").lstrip(".- ").rstrip(". ") or otherwise
-    return f"_{plain}" if device_in(Path(plain)) else plain
+    return f"_{plain}" if name_refused(Path(plain)) else plain

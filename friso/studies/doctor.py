@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import getpass
 import os
 import pickle
 import platform
@@ -10,6 +11,7 @@ import struct
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
@@ -17,7 +19,7 @@ from pathlib import Path
 
 from friso.stage import Stage
 from friso.stage.files import loads
-from friso.system import IGNORES_CASE, LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
+from friso.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
 from friso.version import VERSION
 
 RUNS = 64
@@ -59,7 +61,7 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
         try:
             yield DoctorCheck(subject, look())
         except Exception as error:  # whatever is wrong is what was asked for
-            yield DoctorCheck(subject, _without_home(f"{type(error).__name__}: {error}", full_paths), False, remedy)
+            yield DoctorCheck(subject, _without_names(f"{type(error).__name__}: {error}", full_paths), False, remedy)
 
 
 def _packages() -> Iterator[DoctorCheck]:
@@ -106,7 +108,7 @@ def _kept_code(full_paths: bool) -> str:
 
     folder = cache_folder()
     sizes = [file.stat().st_size for file in folder.glob(f"*{ENTRY}")]
-    text = f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {_without_home(str(folder), full_paths)}"
+    text = f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {_without_names(str(folder), full_paths)}"
     if is_passing(folder):
         text += ", which is deleted at the end"
     if MODES_TELL:
@@ -151,10 +153,18 @@ def _stage() -> Stage:
     return loads(template, "the template").replace({"joint.locked": True})
 
 
-def _without_home(text: str, full_paths: bool) -> str:
-    try:
-        home = str(Path.home())
-    except RuntimeError:  # a user without a home has none to be left out
+def _without_names(text: str, full_paths: bool) -> str:
+    """The text with homes as ~, and the name of the user elsewhere in paths as USER."""
+    if full_paths:
         return text
-    written = "|".join(map(re.escape, (home, repr(home)[1:-1])))  # errors quote paths, with backslashes doubled
-    return text if full_paths else re.sub(rf"({written})(?!\w)", "~", text, flags=re.IGNORECASE * IGNORES_CASE)
+    home = user = ""
+    with suppress(RuntimeError):  # of a user without a home
+        home = str(Path.home())
+    with suppress(OSError, KeyError, ImportError):  # without a name
+        user = getpass.getuser()
+    homes = [
+        re.escape(written) for written in (home, repr(home)[1:-1]) if len(home) > 3
+    ]  # not roots; errors double backslashes
+    homes.append(r"""(?<!\w)([a-z]:)?[\\/]+(home|users)[\\/]+[^\\/'"]+""")  # of others, or short, such as ANNMIL~1
+    text = re.sub(rf"({'|'.join(homes)})(?!\w)", "~", text, flags=re.IGNORECASE)
+    return re.sub(rf"(?<=[\\/]){re.escape(user)}(?=[\\/'\"]|$)", "USER", text) if user else text
