@@ -410,7 +410,7 @@ def test_parasitic_mode_needs_a_joint(wording: Wording) -> None:
         (b"\xef\xbb\xbf", "an empty file"),
         (b"# nothing but a comment", "masses\n  given:    nothing"),
         (b'name = "caf\xe9"', "byte 12 is not UTF-8"),
-        (RIG.encode("utf-16"), "byte 1 is not UTF-8"),
+        (RIG.encode("utf-16"), "given:    UTF-16\n"),
         (b"\x89PNG\r\n\x1a\n", "byte 1 is not UTF-8"),
         (
             b"[masses]\ncart = 1.2 kg\n",

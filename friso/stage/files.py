@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import os
 import re
 import tomllib
@@ -148,7 +149,8 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
         most = f"of at most {MOST_BYTES / 1e6:g} MB"
         raise InputError("", str(error), f"{expected}, {most}", example, str(path)) from None
     except UnicodeDecodeError as error:
-        text = f"byte {error.start + 1} is not UTF-8"
+        is_wide = error.object[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)  # as PowerShell 5 writes with >
+        text = "UTF-16" if is_wide else f"byte {error.start + 1} is not UTF-8"
         raise InputError("", text, "a text file saved as UTF-8", example, str(path)) from None
     except (OSError, ValueError) as error:
         text = "a folder" if os.path.isdir(path) else _reason(error)

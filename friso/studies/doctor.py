@@ -162,9 +162,7 @@ def _without_names(text: str, full_paths: bool) -> str:
         home = str(Path.home())
     with suppress(OSError, KeyError, ImportError):  # without a name
         user = getpass.getuser()
-    homes = [
-        re.escape(written) for written in (home, repr(home)[1:-1]) if len(home) > 3
-    ]  # not roots; errors double backslashes
-    homes.append(r"""(?<!\w)([a-z]:)?[\\/]+(home|users)[\\/]+[^\\/'"]+""")  # of others, or short, such as ANNMIL~1
+    written = (home, repr(home)[1:-1]) if len(home) > 3 else ()  # not a root; errors double backslashes
+    homes = [*map(re.escape, written), r"""(?<!\w)([a-z]:)?[\\/]+(home|users)[\\/]+[^\\/'"]+"""]  # such as ANNMIL~1
     text = re.sub(rf"({'|'.join(homes)})(?!\w)", "~", text, flags=re.IGNORECASE)
     return re.sub(rf"(?<=[\\/]){re.escape(user)}(?=[\\/'\"]|$)", "USER", text) if user else text
