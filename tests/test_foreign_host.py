@@ -215,7 +215,7 @@ from friso.app.names import plain_name
 from friso.bounded_file import content_of
 from friso.engine import building
 from friso.engine.private import read_private
-from friso.system import cause_of, check_free, delete_file, path_of, replace_file, shell_word
+from friso.system import cause_of, check_free, delete_file, name_refused, path_of, replace_file, shell_word
 
 assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
 assert shell_word("position=Act Pos") == 'position="Act Pos"'
@@ -224,6 +224,9 @@ assert shell_word(r"C:\logs\x.csv") == r"C:\logs\x.csv"
 assert shell_word("a,b\\") == r'"a,b\\"'
 assert shell_word('a\\"b') == r'"a\\\"b"'
 assert shell_word("") == '""'
+
+assert all(map(name_refused, map(Path, ("a?b", "x/end./y", "run ", "rig.toml:hidden", "x/nul.txt"))))
+assert not any(map(name_refused, map(Path, ("C:/Users/x", r"\\server\share\run", r"C:\x", "../out", ".", "a.b c"))))
 
 assert cause_of(OSError(22, "Invalid argument", 3)) == "Invalid argument"
 moved = FileNotFoundError(2, "none", "a", 3, "b" * 300)
