@@ -22,6 +22,7 @@ from systems import posix
 
 import friso
 from friso.cli.app import main
+from friso.errors import InputError
 from friso.identification import method
 from friso.identification.logs.log import Log
 from friso.identification.output_error import fit as fitting
@@ -101,6 +102,29 @@ def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
                 main()
     assert not left.value.code
     return out, json.loads(answer.read_text(), parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
+
+
+def test_a_stage_file_may_leave_out_what_the_log_tells(
+    inputs: tuple[Path, Path], machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Masses, friction and motion; which is handed on, so that these are not said to be given."""
+    taken: list[Any] = []
+
+    def instead(sources: object, base: friso.Stage, settings: object, progress: object, made_up: list[str]) -> None:
+        taken.extend((base, made_up))
+        raise InputError("", "enough", "", "")
+
+    monkeypatch.setattr(method, "identify", instead)
+    controller = {"controller": friso.load(inputs[1]).as_written()["controller"]}
+    with pytest.raises(InputError, match="enough"):
+        friso.identify(inputs[0], stage=controller, map={"force": "Force"})
+    base, made_up = taken
+    assert made_up == ["masses", "friction", "motion"]
+    assert base.as_written()["controller"] == controller["controller"]
+    assert base.flat()["masses.cart"] == pytest.approx(machine.flat["masses.cart"], rel=0.2)
+    with pytest.raises(InputError) as open_tables:
+        friso.identify(inputs[0], stage={"name": "axis"}, map={"force": "Force"})
+    assert all(name in str(open_tables.value) for name in ("masses", "controller", "motion"))
 
 
 def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapshots: Snapshots) -> None:

@@ -485,10 +485,12 @@ def test_every_key_says_where_it_comes_from(wording: Wording) -> None:
         Estimate.unknown("friction.static", "N", "output error", "no slow motion", COULOMB, 4 * COULOMB),
     ]
     whole = identified_stage(stage, estimates, ["axis"])
-    text = with_origins(whole.to_toml(), origins(whole, estimates, {}, False))
+    text = with_origins(whole.to_toml(), origins(whole, estimates, {}, None))
     assert tomllib.loads(text) == tomllib.loads(whole.to_toml())
     lines = {line.partition(" = ")[0]: line.partition("  # ")[2] for line in text.splitlines() if " = " in line}
     assert lines["coulomb"] == "identified: output error"
     assert lines["static"] == NOT_IDENTIFIED
     wording(lines["bristle_stiffness"])
     assert all(comment for key, comment in lines.items() if key not in ("name", "source"))
+    beside = origins(whole, estimates, {}, ["friction"])
+    assert beside["friction.bristle_stiffness"] != beside["masses.cart"] == beside["controller.crossover"]

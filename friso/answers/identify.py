@@ -9,18 +9,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, stage_of, text_of
+from friso.answers.inputs import Changes, StageLike, changes_of, stage_of, tables_of, text_of
 from friso.answers.logs import LogFiles, options_of, paths_of
 from friso.axis import LINEAR, AxisKind, speak_of
 from friso.errors import InputError
 from friso.identification.kind import AnalysisSettings
 from friso.identification.logs.log import Log
 from friso.identification.logs.mapping import Mapping
-from friso.identification.method import Identification, Prediction, axis_of_all, check_predictions
+from friso.identification.method import Identification, Prediction, around, axis_of_all, check_predictions
 from friso.identification.sources import LogFile, per_unit_of_force, read_all
+from friso.identification.stage_file import TOLD_BY_LOGS, completed
 from friso.intervals import Span
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
+from friso.stage import Stage
+from friso.stage.stage import axis_written, changed
 from friso.system import shell_word
 
 if TYPE_CHECKING:
@@ -127,7 +130,8 @@ def identify(
     logs : path or list of paths
         Files, in a format that `friso logs --help` lists.
     stage : Stage, path or dict, optional
-        What is known beforehand: structure, controller, drive.
+        What is known beforehand: structure, controller, drive. Masses, friction and motion may be left out: where it
+        has no such tables, a log of moves tells them.
     set : dict, optional
         Keys of that stage to override.
     as_ : str, optional
@@ -173,30 +177,52 @@ def identify(
     if stage is None and set:
         first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
         raise InputError("set", str(first), "a stage whose keys to override", "stage=stage.toml")
-    assumed = None if stage is None else stage_of(stage, set)
-    if axis is None and assumed is not None and assumed.axis_kind != LINEAR:
-        axis = assumed.axis_kind.name
+    tables = {} if stage is None else tables_of(stage)
+    lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
+    assumed = None if stage is None or lacking else stage_of(stage, set)
+    beside = None if stage is None else axis_written(tables)
+    if axis is None and beside is not None and beside != LINEAR:
+        axis = beside.name
     settings, options = _settings(bandwidth, band, period), options_of(map, unit, scale, dt, as_, axis)
     paths, other_paths = paths_of(logs), paths_of(predict)
     inputs = read_all([*paths, *other_paths], options, folder)
     keep({file.path: file.mapping for file in inputs})
-    inputs = [per_unit_of_force(file, assumed) for file in inputs]
+    inputs = [per_unit_of_force(file, beside) for file in inputs]
+    sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
+    if stage is not None and lacking:
+        made = around(sources)
+        assumed, lacking = (stage_of(stage, set), []) if made is None else (_whole(stage, tables, made, set), lacking)
     axis_kind = axis_of_all([file.source for file in inputs], assumed)
     speak_of(axis_kind)
-    sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
     others = _logs_to_predict(inputs[len(paths) :])
     check_predictions(sources, others, assumed)
     from friso.identification.method import identify as identification
     from friso.identification.method import predict as predicted
     from friso.identification.method import with_laws
 
-    result = identification(sources, assumed, settings, progress)
+    result = identification(sources, assumed, settings, progress, lacking)
     if laws:
         result = with_laws(result, [source for source, _ in sources], assumed, progress)
     reused = tuple(file.reused for file in inputs if file.reused)
-    result = replace(result, warnings=(*reused, *result.warnings))
+    result = replace(result, warnings=(*reused, *_taken_from_logs(lacking), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
     return IdentifyAnswer(result, inputs, predictions, axis_kind)
+
+
+def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Changes) -> Stage:
+    """The stage of a file that lacks tables which a stage `made` up around a log has. Raises InputError."""
+    try:
+        return changed(completed(tables, made), changes_of(changes))
+    except InputError as error:
+        raise error if isinstance(source, Stage | Keyed) else error.found_in(str(source)) from None
+
+
+def _taken_from_logs(tables: Sequence[str]) -> list[str]:
+    """A sentence on the tables that a stage file lacks."""
+    if not tables:
+        return []
+    listed = ", ".join(f"[{name}]" for name in tables)
+    return [f"the stage file has no {listed}: begun from the log, and our choice where that does not tell"]
 
 
 def _settings(bandwidth: str | float | None, band: str | None, period: str | float | None) -> AnalysisSettings:

@@ -14,7 +14,7 @@ from friso.errors import InputError, StageError
 from friso.quantities import Quantity, exactly, positive, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
-from friso.stage.files import load_changed
+from friso.stage.files import load_changed, load_tables
 from friso.stage.plausible import implausible_values
 from friso.stage.rig import AS_BUILT
 
@@ -46,6 +46,13 @@ def stage_of(source: StageLike, changes: Changes = None) -> Stage:
             raise
         return load_changed(Path(source), wanted)
     return stage.replace(wanted) if wanted else stage
+
+
+def tables_of(source: StageLike) -> dict[str, Any]:
+    """The tables of a stage as they are written, whether they make a whole one or not. Raises InputError."""
+    if isinstance(source, Stage):
+        return source.as_written()
+    return dict(source) if isinstance(source, Mapping) else load_tables(source)
 
 
 def changes_of(changes: Changes) -> dict[str, Any]:

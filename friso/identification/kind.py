@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic, TypeVar
 
@@ -45,15 +45,21 @@ NOTHING_CHOSEN = AnalysisSettings()
 @dataclass(frozen=True)
 class Prior:
     """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether it
-    is the user's, so that its controller is the machine's, and the estimates of experiments analysed before, by key."""
+    is the user's, so that its controller is the machine's, the estimates of experiments analysed before, by key, and
+    the tables of the user's stage that were `made_up` around a log."""
 
     stage: Stage | None = None
     from_user: bool = False
     estimates: Mapping[str, Estimate] = field(default_factory=dict)
+    made_up: Collection[str] = ()
 
     def flat(self, log: Log) -> dict[str, Any]:
         """The flat keys of the stage as it was set up for a log; none without a stage. Raises InputError."""
         return {} if self.stage is None else as_set_up(self.stage, log)
+
+    def given(self, key: str, log: Log) -> bool:
+        """Whether the user told a key of the stage as it was set up for a log. Raises InputError."""
+        return self.from_user and key.partition(".")[0] not in self.made_up and key in self.flat(log)
 
     def believed(self, log: Log) -> dict[str, Any]:
         """The same, with the values that other experiments show. Raises InputError."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -67,8 +67,10 @@ def identify(
     base: Stage | None = None,
     settings: AnalysisSettings = NOTHING_CHOSEN,
     progress: Progress = silent,
+    made_up: Collection[str] = (),
 ) -> Identification:
-    """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`.
+    """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`, of which
+    some tables may be `made_up` around a log.
 
     With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
     InputError for logs that cannot be used.
@@ -77,13 +79,14 @@ def identify(
         expected = "none: what a log shows of friction holds for the conditions under which it was recorded"
         raise InputError("conditions", "a stage with [conditions]", expected, "the stage file without [conditions]")
     groups = _groups(logs)
-    stage = base or _around(logs)
+    stage = base or around(logs)
     experiments: list[Experiment] = []
     for number, (kind, group) in enumerate(groups):
         part = share_of(progress, number, len(groups))
         part(0, 0, f"{kind}: {', '.join(log.name for log in group)}")
         best = combined(_every_estimate(experiments))[0]
-        prior = Prior(stage, base is not None, {estimate.name: estimate for estimate in best if estimate.determined})
+        shown = {estimate.name: estimate for estimate in best if estimate.determined}
+        prior = Prior(stage, base is not None, shown, made_up)
         result = KINDS[kind].analyse(group, prior, replace(settings, progress=part))
         experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
     estimates, warnings = combined(_every_estimate(experiments))
@@ -105,7 +108,7 @@ def identify(
         (*warnings, *fits.notes),
         doubts,
         failed,
-        origins(fitted, fits.estimates, fits.follows, base is not None),
+        origins(fitted, fits.estimates, fits.follows, None if base is None else made_up),
     )
 
 
@@ -214,11 +217,11 @@ def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source,
     ]
 
 
-def _around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
+def around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
     """A stage around the first log that shows enough of a machine; None without one."""
     for log, kind in logs:
-        around = KINDS[kind].around
-        if around is not None and isinstance(log, Log) and (stage := around(log)) is not None:
+        make = KINDS[kind].around
+        if make is not None and isinstance(log, Log) and (stage := make(log)) is not None:
             return stage
     return None
 

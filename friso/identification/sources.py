@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from friso.axis import AxisKind
 from friso.errors import InputError, LogError
 from friso.identification.kind import Source
 from friso.identification.kinds import KINDS
@@ -16,7 +17,6 @@ from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, pla
 from friso.identification.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
-from friso.stage import Stage
 
 MOVED = ("position", "force")
 """Roles by which the kind of an experiment is recognised."""
@@ -90,14 +90,14 @@ def _recognised_together(files: list[LogFile]) -> list[LogFile]:
     return files
 
 
-def per_unit_of_force(file: LogFile, base: Stage | None) -> LogFile:
+def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
     """A file whose force is not in newtons, of a kind that is analysed per unit of it: as a log on an axis with forces
-    in that unit. Raises InputError beside a stage, whose numbers are in newtons."""
+    in that unit. Raises InputError beside a stage, of such an axis, whose numbers are in newtons."""
     unit = file.source.units.get("force") if isinstance(file.source, Log) else None
     if unit is None or not KINDS[file.kind].per_unit or not isinstance(file.source, Log):
         return file
-    if base is not None:
-        newtons = base.axis_kind.force
+    if beside is not None:
+        newtons = beside.force
         example = f'--scale force="NUMBER {newtons}/{unit}"'
         raise InputError(
             "force", f"a channel in {unit}, beside a stage", f"its factor to {newtons}", example, str(file.path)

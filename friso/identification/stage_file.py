@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -80,17 +80,33 @@ def identified_stage(stage: Stage, estimates: Iterable[Estimate], logs: Iterable
     return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
 
 
-def origins(stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], from_user: bool) -> dict[str, str]:
+TOLD_BY_LOGS = ("masses", "friction", "motion")
+"""Tables of a stage file that a log of moves can stand in for."""
+
+
+def completed(tables: Mapping[str, Any], around: Stage) -> dict[str, Any]:
+    """The tables of a stage file, with those `TOLD_BY_LOGS` that it lacks of a stage made up around a log."""
+    made = around.as_written()
+    return {**{name: made[name] for name in TOLD_BY_LOGS}, **tables}
+
+
+def origins(
+    stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], chosen: Collection[str] | None
+) -> dict[str, str]:
     """Where each key of an identified stage comes from: the estimates that it took, keys that follow another one, and
-    the stage file, or our choice where nothing was given."""
+    the stage file, or our choice in the `chosen` tables (None: all)."""
     sources: dict[str, str] = {}
     for estimate in estimates:
         sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
     sources |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
-    rest = "as given" if from_user else "our choice, not identified"
     tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
-    keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
-    return {key: sources.get(key, rest) for key in keys}
+    ours = tables.keys() if chosen is None else chosen
+    rest = {name: "our choice, not identified" if name in ours else "as given" for name in tables}
+    return {
+        key: sources.get(key, rest[name])
+        for name, table in tables.items()
+        for key in (f"{name}.{key}" for key in table)
+    }
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:

@@ -6,9 +6,9 @@ import codecs
 import os
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from friso import paths
 from friso.bounded_file import LargeFileError, content_of
@@ -22,6 +22,8 @@ from friso.whole_file import whole_file
 
 MOST_BYTES = 4_000_000
 """Size of a text file at most."""
+
+Read = TypeVar("Read")
 
 _HINTS = {
     ".ini": "friso init stage.toml --from {}",
@@ -47,9 +49,20 @@ def load(path: str | os.PathLike[str]) -> Stage:
     >>> friso.load(friso.example("thesis_rig")).joint.stiffness.text
     '2.4 N/mm'
     """
+    return _hinted(path, lambda text: loads(text, origin=str(path)))
+
+
+def load_tables(path: str | os.PathLike[str]) -> dict[str, Any]:
+    """The tables of a stage file, which need not make a whole stage. Raises StageError."""
+    return _hinted(path, lambda text: parsed(text, _EXPECTED))
+
+
+def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
+    """What a stage file is read as; an error says what a file of another kind is for. Raises StageError."""
     try:
-        return loads(text_of(Path(path), _EXPECTED), origin=str(path))
+        return read(text_of(Path(path), _EXPECTED))
     except InputError as error:
+        error = error.found_in(str(path))
         hint = _HINTS.get(Path(path).suffix.lower(), "").format(shell_word(str(path)))
         if hint:
             error = InputError(error.key, error.actual, f"{error.expected}; or {hint}", "", str(path))

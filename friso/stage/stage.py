@@ -113,7 +113,7 @@ class Stage(Section):
     )
 
     def __init__(self, /, **data: Any) -> None:
-        self._take(data, _axis_written(data))
+        self._take(data, axis_written(data))
 
     def __getstate__(self) -> dict[Any, Any]:
         """What is pickled: the tables, without what has been worked out from them."""
@@ -308,7 +308,7 @@ def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> Stage:
         raise StageError(begun[0], actual, expected, error.example) from None
 
 
-def _axis_written(tables: Mapping[str, Any]) -> AxisKind:
+def axis_written(tables: Mapping[str, Any]) -> AxisKind:
     """The axis that tables of a stage file are of; what is wrong with the table [axis] is found later."""
     axis = tables.get("axis")
     name = axis.kind if isinstance(axis, AxisTable) else axis.get("kind") if isinstance(axis, dict) else None
