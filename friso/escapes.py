@@ -3,6 +3,7 @@ formula."""
 
 from __future__ import annotations
 
+import json
 import re
 
 _STEERING = re.compile(
@@ -12,8 +13,9 @@ _STEERING = re.compile(
 """Control characters but for line feed and tab, marks and overrides of the direction of writing, characters without
 width, halves of surrogate pairs, tags."""
 
-_FORMULA = ("=", "+", "-", "@", "\t", "\n")
-"""How a cell begins that a spreadsheet takes for a formula."""
+_FORMULA = ("=", "+", "-", "@", "\t", "\n", "\uff1d", "\uff0b", "\uff0d", "\uff20")
+"""How a cell begins that a spreadsheet takes for a formula; the last four are the wide forms of the first, which Excel
+takes in East Asian languages."""
 
 
 def escaped(text: str) -> str:
@@ -29,6 +31,18 @@ def one_line(text: str) -> str:
 def table_cell(text: str) -> str:
     """The text as a cell of a CSV file: escaped, and with an apostrophe before what would be a formula."""
     return f"'{escaped(text)}" if text.startswith(_FORMULA) else escaped(text)
+
+
+def toml_text(text: str) -> str:
+    r"""The text as TOML has it in quotes, the same again when it is read: what steers is written out, "\u202e"."""
+    return _STEERING.sub(_as_in_toml, json.dumps(text, ensure_ascii=False))
+
+
+def _as_in_toml(match: re.Match[str]) -> str:
+    code = ord(match[0])
+    if 0xD800 <= code < 0xE000:  # half a character, for which TOML has no escape
+        return match[0]
+    return f"\\u{code:04x}" if code < 0x10000 else f"\\U{code:08x}"
 
 
 def _written_out(match: re.Match[str]) -> str:

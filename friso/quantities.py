@@ -19,6 +19,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from friso.axis import LINEAR, ROTARY, AxisKind
 from friso.errors import InputError
+from friso.escapes import toml_text
 
 LARGEST_INTEGER = 10**60
 """Whole numbers from here on are kept and written as floats."""
@@ -57,7 +58,7 @@ def as_toml(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+        return toml_text(value)
     if isinstance(value, float):
         return repr(float(value))  # float(): numpy's own repr is no TOML
     if isinstance(value, int):

@@ -92,6 +92,7 @@ def test_a_unit_in_other_capitals_is_recognised(unit: str, meant: str) -> None:
         ('"8 Hz"', '8 Hz"', '"'),
         ("[masses]", "[masses", ""),
         ("alpha = 0.1", "alpha 0.1", "0"),
+        ('"8 Hz"', "\u201c8 Hz\u201d", "\u201c"),
     ],
 )
 def test_the_line_is_shown_with_a_caret(old: str, new: str, below: str, refused: Refused) -> None:

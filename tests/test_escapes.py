@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 from inside import friso_inside
 from pages import packed_values
 
+import friso
 from friso.cli.terminal import Escaping, console, spelled
 from friso.escapes import escaped, one_line, table_cell
 from friso.studies.export import export
@@ -38,7 +39,7 @@ def test_no_text_steers(text: str) -> None:
         assert unicodedata.category(character) == "Cf"  # a sign of a script, which joins numbers or letters
         assert unicodedata.bidirectional(character) in ("AN", "ON", "L", "BN", "NSM")
     assert "\n" not in one_line(text)
-    assert table_cell(text)[:1] not in ("=", "+", "-", "@", "\t")
+    assert table_cell(text)[:1] not in ("=", "+", "-", "@", "\t", "\uff1d")
 
 
 @pytest.mark.parametrize("text", ["Ångström µm²", "שלום", "ruler −5 °C", "a\tb\nc", "日本"])
@@ -86,6 +87,16 @@ def test_a_stage_file_steers_neither_terminal_nor_page(tmp_path: Path, undrawn: 
     assert r"\x1b[2J" in page.read_text(encoding="utf-8")
     text = re.sub(r"<script.*?</script>", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert not steers(text)
+
+
+def test_a_drawing_a_notebook_and_a_saved_stage_steer_nothing() -> None:
+    stage = friso.load(EXAMPLES / "thesis_leaves.toml").replace({"name": HOSTILE})
+    answer = friso.flexure(stage)
+    drawing = answer.files()["flexure_drawing.svg"]
+    assert isinstance(drawing, str)
+    ET.fromstring(drawing)  # what a control character would break
+    assert not steers(drawing + answer._repr_html_() + stage.to_toml())
+    assert friso.loads(stage.to_toml()) == stage
 
 
 def test_a_path_steers_nothing(tmp_path: Path) -> None:

@@ -54,9 +54,9 @@ def test_a_text_file_has_a_largest_size_and_a_name_a_longest(tmp_path: Path) -> 
 def test_a_table_of_countless_keys_is_refused_at_once() -> None:
     """For each of which the nearest known one would be looked for."""
     text = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
-    keys = "".join(f"k{number} = 1\n" for number in range(50_000))
+    keys = "".join(f"k{number} = 1\n" for number in range(15_000))
     for place in ("", "[masses]\n"):
-        with pytest.raises(InputError, match="a table of 5000"):
+        with pytest.raises(InputError, match="a table of 1500"):
             friso.loads(text.replace(place, place + keys, 1))
 
 

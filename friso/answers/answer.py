@@ -227,7 +227,8 @@ class Answer(ABC):
         first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
         blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
         tables = blocks + "".join(map(_html_table, self.tables()))
-        return f"<div><p><b>{first}</b></p>{''.join(f'<p>{sentence}</p>' for sentence in rest)}{tables}</div>"
+        texts = "".join(f"<p>{sentence}</p>" for sentence in rest)
+        return escaped(f"<div><p><b>{first}</b></p>{texts}{tables}</div>")
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_") or name == "result":

@@ -200,7 +200,7 @@ def _of_others(folder: Path, maker: str, expected: str) -> InputError:
 
 def _beside(folder: Path) -> str:
     """The option for another folder."""
-    return f"--out {shell_word(f'{folder}-2')}"
+    return f"--out {shell_word(f'{folder}-2' if folder.name.strip('.') else 'report')}"
 
 
 def _entries(folder: Path) -> list[str]:

@@ -182,6 +182,10 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
     if key := _MANY_PARTS.search(text):
         line = text.count("\n", 0, key.end()) + 1
         raise InputError("", f"a key of more than {_PARTS} parts in line {line}", expected, example)
+    if (lines := text.count("\n")) > MOST_LINES:
+        raise InputError("", f"{lines} lines", f"at most {MOST_LINES} lines", example)
+    if (tables := len(_TABLE.findall(text))) > MOST_TABLES:
+        raise InputError("", f"{tables} tables", f"at most {MOST_TABLES} tables", example)
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -198,7 +202,14 @@ _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_PARTS}}}", re.MULTILINE)
 """Keys of more parts than any table has; the time that thousands of them take grows with the square of their number."""
 
+_TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
+
+MOST_TABLES, MOST_LINES = 1000, 20_000
+"""How many tables and lines a text has at most: those of a megabyte take seconds."""
+
 _PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
+
+_TYPOGRAPHIC = tuple("\u2018\u2019\u201a\u201c\u201d\u201e\u00ab\u00bb")
 
 _WIDTH = 100
 """How much of a line is shown, at most."""
@@ -211,9 +222,11 @@ def _syntax_error(text: str, message: str) -> str:
         return message
     number, column = int(place[1]), int(place[2])
     line = text.split("\n")[number - 1].rstrip("\r")
-    why = message[: place.start()]
+    why = re.sub(r"\('(.*)',\)", r"\1", message[: place.start()])  # the parts of a key, of which there is one
     if (opened := _open_quote(line)) is not None:
         column, why = opened + 1, "a quote that is not closed"
+    elif line[column - 1 : column] in _TYPOGRAPHIC:
+        why = "a typographic quote in place of a straight one"
     start = max(0, column - _WIDTH // 2) if column > _WIDTH else 0
     before, line = one_line(line[start : column - 1]), one_line(line[start : start + _WIDTH])
     place_in_words = f"(at line {number}, column {column})"

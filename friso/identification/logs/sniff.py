@@ -135,7 +135,8 @@ def layout(path: Path) -> TextLayout:
                 raise LogError("log", f"{best.columns} columns", expected, "", str(path))
             return best
     actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
-    raise LogError("log", actual, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
+    expected = "a heading and rows of numbers" + ("; a stage file is for friso check" if path.suffix == ".toml" else "")
+    raise LogError("log", actual, expected, "time [s];position [mm];force [N]", str(path))
 
 
 def _fit(

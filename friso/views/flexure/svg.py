@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterable
 from xml.sax.saxutils import escape, quoteattr
 
+from friso.escapes import escaped
+
 SheetPoint = tuple[float, float]
 
 TEXT = 3.0
@@ -47,7 +49,7 @@ def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
     paper = f'<rect width="{_n(width)}" height="{_n(height)}" fill="#ffffff"/>'
     body = "\n".join([f"<title>{escape(label)}</title>", HATCH, paper, *parts])
     font = "font-family=\"'DejaVu Sans', Arial, sans-serif\""
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {font} role="img">\n{body}\n</svg>\n'
+    return escaped(f'<svg xmlns="http://www.w3.org/2000/svg" {size} {font} role="img">\n{body}\n</svg>\n')
 
 
 def path(points: Iterable[SheetPoint], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
