@@ -33,7 +33,7 @@ def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
     """The folder and its lock. Before that is held another process may remove the folder, and filelock makes it again,
     for others to read: then it is another folder that is tried."""
-    folder = root / f"{prefix}{uuid.uuid4().hex}"
+    folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
     folder.mkdir(mode=0o700)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
     held = FileLock(folder / lock)
     try:
