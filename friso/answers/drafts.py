@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from friso.interrupts import hold_interrupts
 from friso.leftovers import locked_folder, remove_leftovers
-from friso.system import delete_file, replace_file
+from friso.system import delete_file, once_free, replace_file
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -70,7 +70,7 @@ class Drafts:
                 undo += [folder.rmdir for folder in made(path.parent)]
                 if os.path.lexists(path):
                     spare = self._spare(path)
-                    _duplicate(path, spare)
+                    once_free(partial(_duplicate, path, spare))
                     undo.append(partial(replace_file, spare, path))
                 elif draft is not None:
                     undo.append(partial(delete_file, path))
