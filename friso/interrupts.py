@@ -7,6 +7,7 @@ command begins it is noted. Nothing is installed where friso is used as a librar
 
 from __future__ import annotations
 
+import atexit
 import os
 import signal
 import sys
@@ -86,6 +87,12 @@ def _install() -> dict[int, Any]:
     return {number: handler for number, handler in before.items() if handler is not None}
 
 
+def _ignore() -> None:
+    """Ignore the signals from now on: when Python takes its handlers away they would end a command that is done."""
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def _arrived(number: int, frame: FrameType | None) -> None:
     if number in SIGNALS:
         _came.append(number)
@@ -122,3 +129,4 @@ _IS_COMMAND = ("-m", "friso") in zip(sys.orig_argv, sys.orig_argv[1:], strict=Fa
 
 if _IS_COMMAND:
     _install()
+    atexit.register(_ignore)  # among the first, and so among the last that are called

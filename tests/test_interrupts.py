@@ -67,6 +67,21 @@ def test_a_signal_that_a_library_turns_into_something_else(
     assert signal.getsignal(number) is before
 
 
+AT_THE_END = """
+import atexit, signal, sys
+
+atexit.register(lambda: print(signal.getsignal(signal.SIGTERM) is signal.SIG_IGN))
+sys.argv[0] = "friso"
+import friso.interrupts
+"""
+
+
+def test_a_command_that_is_done_is_not_ended_by_a_signal() -> None:
+    """As it would be once Python has taken its handlers away."""
+    done = subprocess.run([sys.executable, "-c", AT_THE_END], capture_output=True, text=True)
+    assert done.stdout == "True\n", done.stderr
+
+
 def test_a_termination_in_code_from_a_text_has_its_own_status(tmp_path: Path) -> None:
     """Python remembers that such code ended in a KeyboardInterrupt, and would end by SIGINT."""
     lines = ["from friso.cli import app", f"app._run = lambda: exec({_TERMINATION!r})", "app.main()"]

@@ -2,6 +2,7 @@
 
 import itertools
 import os
+import re
 import struct
 import sys
 import zlib
@@ -370,6 +371,19 @@ def test_lvm(tmp_path: Path) -> None:
     assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
     assert channel(table, "force").unit == "N"
     assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]  # the library leaves a cache unless told not to
+
+
+@pytest.mark.parametrize(("library", "name"), [("pyuff", "a.uff"), ("lvm_read", "a.lvm")])
+def test_a_log_with_fewer_samples_than_it_states_says_so(tmp_path: Path, library: str, name: str) -> None:
+    pytest.importorskip(library)
+    path = tmp_path / name
+    if name == "a.uff":
+        log_files.write_uff(path, M["time"], SIGNALS)
+        path.write_text(re.sub("(?m)^( +[24]) +400 ", r"\1       500 ", path.read_text()))
+    else:
+        log_files.write_lvm(path, SIGNALS)
+        path.write_text("\n".join(path.read_text().splitlines()[:-100]) + "\n")
+    assert [note for note in read_table(path).read if "position ends early" in note]
 
 
 def test_without_the_library_the_message_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

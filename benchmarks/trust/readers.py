@@ -77,7 +77,7 @@ def _binary_log(path: Path) -> None:
 
 def _forked(command: list[str], **_: Any) -> SimpleNamespace:
     """Run the program that reads a binary log, within its bounds of memory and time."""
-    kind, file, memory = command[-3:]
+    kind, file, memory, seconds = command[-4:]
     with tempfile.TemporaryFile() as out:
         child = os.fork()
         if not child:
@@ -85,7 +85,7 @@ def _forked(command: list[str], **_: Any) -> SimpleNamespace:
                 sys.stdout = open(out.fileno(), "w", closefd=False)  # noqa: SIM115
                 signal.alarm(int(confined.SECONDS))
                 used = psutil.Process().memory_info().vms
-                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0)
+                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0, int(seconds))
                 sys.stdout.flush()
             finally:
                 os._exit(0)

@@ -1,9 +1,10 @@
 """The program in which binary logs are read, by the libraries of their formats; `friso.identification.logs.confined`
 runs it.
 
-It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY``, the memory in bytes (0 for
-no limit). On standard output, pickled: what the file holds as plain dicts, lists, texts, numbers and NumPy arrays, and
-the message of the error.
+It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY SECONDS``, the memory in bytes
+(0 for no limit), the seconds those of the processor, after which it ends though nobody waits for it any more. On
+standard output, pickled: what the file holds as plain dicts, lists, texts, numbers and NumPy arrays, and the message of
+the error.
 """
 
 from __future__ import annotations
@@ -198,12 +199,14 @@ def _plain(node: Any) -> Any:
     return node if node is None or type(node) in (bool, int, float, str) else str(node)
 
 
-def main(kind: str, path: Path, memory: int) -> None:
-    """Read a file within so much memory [B]."""
-    if memory and sys.platform != "win32":
+def main(kind: str, path: Path, memory: int, seconds: int) -> None:
+    """Read a file within so much memory [B] and time of the processor [s]."""
+    if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
+        if memory:
+            resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
     content, message = None, ""
     try:
         content = _plain(READERS[kind](path))
@@ -217,4 +220,4 @@ def main(kind: str, path: Path, memory: int) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]))

@@ -33,9 +33,10 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 @lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
-    command = [sys.executable, "-P", binary.__file__, kind, str(path), str(memory)]
-    environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
     seconds = SECONDS + size / BYTES_A_SECOND
+    bounds = [str(memory), str(round(2 * seconds) + 1)]  # the latter in case this process is killed
+    command = [sys.executable, "-P", binary.__file__, kind, str(path), *bounds]
+    environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
     try:
         done = subprocess.run(command, capture_output=True, timeout=seconds, check=False, env=environ)
     except subprocess.TimeoutExpired:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,15 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
         actual = f"a {kind} file, and the library {library} is not installed"
         raise LogError("log", actual, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
     return content(kind, path)
+
+
+def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
+    """Notes on channels that hold fewer samples than their file states, None for nothing: it was cut short."""
+    return [
+        f"{channel.name} ends early: {channel.values.size} of {count:.4g} samples"
+        for channel, count in zip(channels, stated, strict=True)
+        if count is not None and channel.values.size < count
+    ]
 
 
 def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FileHead, LogFormat
-from friso.identification.logs.libraries import content_by, named_table
+from friso.identification.logs.libraries import content_by, cut_short, named_table
 from friso.identification.logs.units import split_heading
 
 
@@ -17,13 +17,15 @@ def read_lvm(path: Path) -> ChannelTable:
     """LabVIEW measurement text. Raises LogError."""
     file = content_by("lvm_read", "LVM", path)
     segments = range(int(file["Segments"]))
-    channels = [channel for k in segments for channel in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
-    return named_table("LVM", channels, [], path)
+    found = [item for k in segments for item in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
+    channels = [channel for channel, _ in found]
+    return named_table("LVM", channels, cut_short(channels, [stated for _, stated in found]), path)
 
 
-def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[Channel]:
-    """The channels of a segment: values over an X column in seconds (the first, or one per channel). What the header
-    states of a channel stands above its column, the first column being that of the keys."""
+def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[tuple[Channel, Any]]:
+    """The channels of a segment, each with the number of samples that the header states, or None: values over an X
+    column in seconds (the first, or one per channel). What the header states of a channel stands above its column, the
+    first column being that of the keys."""
     names, data = segment["Channel names"], np.asarray(segment["data"], dtype=float)
     each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"
     above = 0 if none else -1  # the reader leaves out the empty first column of files without X values
@@ -39,7 +41,8 @@ def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) 
         heading, unit = split_heading(name)
         present = ~np.isnan(data[:, i])
         times = None if clock is None else clock[present]
-        out.append(Channel(heading, unit_above or unit, data[present, i], times, source))
+        channel = Channel(heading, unit_above or unit, data[present, i], times, source)
+        out.append((channel, _above(segment, "Samples", i + above)))
     return out
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
-from friso.identification.logs.libraries import content_by
+from friso.identification.logs.libraries import content_by, cut_short
 from friso.identification.logs.measured_response import MeasuredResponse, check_response, response_unit
 from friso.identification.logs.text import unique
 from friso.identification.logs.units import unit_factor
@@ -66,7 +66,8 @@ def read_uff(path: Path) -> ChannelTable:
     )
     code = times[0]["units_code"]
     foreign = [f"units of code {code} are unknown"] if code is not None and code not in _SYSTEMS else []
-    return ChannelTable(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories", *foreign))
+    short = cut_short(channels, [data.get("num_pts") for data in times])
+    return ChannelTable(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories", *foreign, *short))
 
 
 def _unit(data: dict[str, Any]) -> str:
