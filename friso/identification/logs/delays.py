@@ -73,10 +73,10 @@ def _explained(effect: np.ndarray, causes: np.ndarray) -> np.ndarray:
     """The share of an effect that its causes explain at each lag, of -MOST to MOST samples."""
     middle = effect[MOST:-MOST] - effect[MOST:-MOST].mean()
     energy = middle @ middle
+    causes = causes / np.maximum(np.abs(causes).max(axis=0), np.finfo(float).tiny)
     shares = []
     for k in range(-MOST, MOST + 1):
         shifted = causes[MOST + k : effect.size - MOST + k]
-        shifted = shifted / np.maximum(np.abs(shifted).max(axis=0), np.finfo(float).tiny)
         fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
         shares.append(float(fit @ (shifted.T @ middle)) / energy if energy > 0 else 0.0)
     return np.array(shares)
