@@ -57,7 +57,7 @@ class Prior:
         """The flat keys of the stage as it was set up for a log; none without a stage. Raises InputError."""
         return {} if self.stage is None else as_set_up(self.stage, log)
 
-    def given(self, key: str, log: Log) -> bool:
+    def user_told(self, key: str, log: Log) -> bool:
         """Whether the user told a key of the stage as it was set up for a log. Raises InputError."""
         return self.from_user and key.partition(".")[0] not in self.made_up and key in self.flat(log)
 

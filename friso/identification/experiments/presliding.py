@@ -231,7 +231,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     (log,) = logs
     assert isinstance(log, Log)
     between = believed_between(prior, log)
-    if VISCOUS in prior.estimates or prior.given(VISCOUS, log):
+    if VISCOUS in prior.estimates or prior.user_told(VISCOUS, log):
         return bristles_from_presliding(log, between)
     result = bristles_from_presliding(log, replace(between, viscous=(0.0, 0.0)))
     return replace(result, damping=_at_most(result.damping))

@@ -194,13 +194,13 @@ def _coincident(base: Track, other: Track) -> bool:
 
 def _at(base: Track, other: Track, values: np.ndarray) -> np.ndarray:
     """Values of a track, shape (n,), at the instants of the base, NaN outside of its segments."""
-    found = np.full(base.time.size, np.nan)
+    resampled = np.full(base.time.size, np.nan)
     slack = EVEN * other.period
     for part in other.segments:
         time = other.time[part]
         a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))
-        found[a:b] = np.interp(base.time[a:b], time, values[part])
-    return found
+        resampled[a:b] = np.interp(base.time[a:b], time, values[part])
+    return resampled
 
 
 def _runs(covered: np.ndarray, part: slice) -> list[slice]:
