@@ -16,6 +16,7 @@ from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import hunting
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.margin import margin, search_bandwidths
 from friso.hunting.motions import Motions
@@ -505,3 +506,29 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
     assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["transient"]
     with allowance(1):
         assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["failed"]
+
+
+def test_a_swing_that_grows_without_bound_has_no_size() -> None:
+    """Without anti-windup, where b k_p < m k_i: in a run from 500 mm each swing is larger than the one before."""
+    stage = VARIANTS["rigid"].replace(
+        {
+            "masses": {"stage": "2.8 kg"},
+            "friction.static": "6.5 N",
+            "friction.coulomb": "3.1 N",
+            "friction.viscous": "16 N*s/m",
+            "controller.crossover": "12 Hz",
+            "controller.force_limit": "14 N",
+            "controller.anti_windup": "none",
+            "controller.tuned_mass": "2.8 kg",
+            "motion.displacement": "500 mm",
+            "motion.duration": "3000 s",
+        }
+    )
+    result = hunting(stage)
+    assert result.grows
+    assert not result.certain
+    position = friso.simulate(stage, sample_time=0.1).position.to_numpy()
+    swings = np.abs(position[:30000]).reshape(30, -1).max(axis=1)  # of 100 s each
+    assert (np.diff(swings[3:]) > 0).all()
+    assert swings[-1] > 2 * swings[3]
+    assert not hunting(stage.replace({"controller.anti_windup": "clamp"})).grows

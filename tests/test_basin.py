@@ -29,6 +29,7 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.margin import FARTHEST, margin
+from friso.hunting.verdict import own_motion
 from friso.stage import Stage
 
 RIGID = pytest.mark.xdist_group("rigid")
@@ -72,6 +73,20 @@ def hunts(chosen: Stage) -> bool:
     swing = np.ptp(deviation.to_numpy()) / (2 * cycle().amplitude)
     assert swing < 0.1 or swing == pytest.approx(1, rel=0.1)
     return bool(swing > 0.5)
+
+
+@RIGID
+def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
+    """At the very end of a window of kicks; not a hundredth beside it."""
+    window = windows().windows[0]
+    low, high = 0.98 * window[1], 1.02 * window[1]
+    for _ in range(4):
+        kicks = np.linspace(low, high, 24)
+        ends, _, _ = ends_in({**released(high).flat(), "motion.displacement": kicks}, len(kicks), target())
+        first = int(np.flatnonzero(~ends)[0])
+        low, high = float(kicks[first - 1]), float(kicks[first])
+    turned = [own_motion(released(kick), target(), np.inf).by_chance for kick in (low, 0.99 * low, 1.01 * high)]
+    assert turned == [True, False, False]
 
 
 def released(displacement: float) -> Stage:

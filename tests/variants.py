@@ -204,7 +204,7 @@ VARIANTS: dict[str, Stage] = {
     "free, parasitic, Maxwell slip": stage(
         there_and_back(), friction=maxwell(), joint=free(), parasitic=PARASITIC, controller=van_dijk()
     ),
-    "rigid, elasto-plastic": stage(step(), friction=elasto_plastic(), controller=van_dijk()),
+    "rigid, elasto-plastic": stage(step(), friction=elasto_plastic(1.5), controller=van_dijk()),
     "free, elasto-plastic 1": stage(
         there_and_back(), friction=elasto_plastic(1), joint=free(), controller=gains(**FULL, tau=1e-3)
     ),

@@ -65,6 +65,9 @@ class _KernelPrinter(PythonCodePrinter):
             return f"sqrt({text})" if exponent > 0 else f"(1.0 / sqrt({text}))"
         return f"power({text}, {self._print(exponent)})"
 
+    def _print_re(self, expr: sp.re) -> str:
+        return self._print(expr.args[0])  # everything is real: abs(exp(x)) is exp(re(x)) where SymPy cannot tell of x
+
     def _print_Mul(self, expr: sp.Mul) -> str:
         return "(" + " * ".join(f"({self._print(factor)})" for factor in expr.args) + ")"
 

@@ -62,6 +62,12 @@ UNFOLLOWED = (
 )
 """Why it is not certain that a motion comes to rest where nothing was found that attracts."""
 
+CHANGED = 1 + np.array([0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5])
+"""Masses, as multiples of the stage's own, with which its motion is run: no machine is known as closely."""
+
+BY_CHANCE = "a change of its mass by a hundred-thousandth, or rounding, decides whether this motion ends in hunting"
+"""Why it is not certain how a motion ends that ends otherwise with some of these masses."""
+
 ROOM = 1 << 14
 """Room for turning points of a motion that is followed for long: one that needs more is run again."""
 
@@ -176,42 +182,56 @@ def _with_a_target(
     work: float,
 ) -> Judgement:
     with allowance() as spent:
-        ends, completed, swing = _own_motion(stage, target, REST * work)
-        if not completed[0]:
+        own = own_motion(stage, target, REST * work)
+        if not own.completed:
             return Judgement("failed", attraction)
         within = float(motions.settling[0])
-        doubt = "" if ends[0] else _restless(stage, attraction, float(swing[0]), within)
-        begin(STARTS)
-        starts, started = _starts(stage, target, KICKS * work)
+        doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
+        doubt = BY_CHANCE if own.by_chance else doubt
+        begin(STARTS)  # what swings less than a growing swing at its end may grow as well
+        starts, started = ((None, None, None), ()) if attraction.grows else _starts(stage, target, KICKS * work)
     begin(BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     return Judgement(
-        verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
+        verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0],
         replace(attraction, certain=False, reason=doubt) if doubt else attraction,
         *starts,
         _as_sure(sought.margin, attraction),
         sought.windows,
         sought.lower,
-        None if ends[0] or not np.isfinite(within) else within,
+        None if own.ends or not np.isfinite(within) else within,
         observed=not attraction.attracting,
         given_up=(*given_up, *started),
     )
 
 
-def _own_motion(stage: Stage, target: Target, work: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+@dataclass(frozen=True)
+class OwnMotion:
+    """Where a stage's own motion ends: whether in what attracts it, whether its run was completed, how far it swings at
+    the end, peak to peak [m], and whether a mass that is hardly another turns it."""
+
+    ends: bool
+    completed: bool
+    swing: float
+    by_chance: bool = False
+
+
+def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     """Where the stage's own motion ends (see `ends_in`). One that still swings then, by less than what attracts, is
     followed for longer, if that takes no more than so much work: it may be dying out."""
-    flat, first = stage.flat(), ends_in(stage.flat(), 1, target)
-    ends, completed, swing = (column[0] for column in first)
-    if ends or not completed or swing <= _resting(flat)[0]:
-        return first
+    flat = stage.flat()
+    changed = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
+    ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target)
+    own = OwnMotion(ends[0], completed[0], float(swing[0]), bool(np.any(ends[completed] != ends[0])))
+    if own.ends or own.by_chance or not own.completed or own.swing <= _resting(flat)[0]:
+        return own
     longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
     try:
         with allowance(work):
-            last = ends_in(flat, 1, longer)
+            last = OwnMotion(*(column[0] for column in ends_in(flat, 1, longer)))
     except Exhausted:
-        return first
-    return last if last[1][0] else first
+        return own
+    return last if last.completed else own
 
 
 def _resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:

@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import model_validator
 
+from friso.axis import axis_of
 from friso.errors import StageError
 from friso.quantities import (
     Number,
@@ -105,8 +106,8 @@ def friction_law(name: str) -> type[FrictionSection]:
 
 def passive_where(flat: Mapping[str, Any]) -> str:
     """The condition of passivity that the friction law of a stage, given as flat SI values, does not meet; "" where it
-    is passive, or does not say."""
-    return friction_law(flat["friction.model"]).active(flat)
+    is passive, or does not say; in the units of its axis."""
+    return axis_of(flat).text(friction_law(flat["friction.model"]).active(flat))
 
 
 def friction_laws() -> dict[str, type[FrictionSection]]:

@@ -62,6 +62,9 @@ REACHED = "a cycle that attracts at another bandwidth could be followed to this 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Why cycles of a stage are not searched that may hunt all the same."""
 
+GROWS = "with this force limit and no anti-windup large swings grow without bound: a size is where a run was stopped"
+"""The same where what was observed may be such a swing."""
+
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
 
@@ -130,7 +133,8 @@ class Hunting:
     none, or why it is not `certain` what attracts (if simulations that had to decide failed or were stopped); the
     return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
     `observed` and are none of the cycles; what motions end in that do not come to rest, the `target` (None where
-    nothing attracts); and all of this as it was `surveyed`."""
+    nothing attracts); all of this as it was `surveyed`; and whether what was observed may be a swing that `grows` for
+    ever, of which the size is only where its run was stopped."""
 
     cycles: tuple[Cycle, ...]
     reason: str
@@ -139,6 +143,7 @@ class Hunting:
     observed: tuple[Swing, ...] = ()
     target: Target | None = None
     surveyed: Attractors | None = None
+    grows: bool = False
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
@@ -185,7 +190,8 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         survey = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in survey.motions if m.cycles is not None]
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
-    beyond = "" if survey.motions else _beyond_the_search(stages)
+    grows = any(m.cycles is None for m in survey.motions) and large_swings_grow(stages)
+    beyond = GROWS if grows else "" if survey.motions else _beyond_the_search(stages)
     certain = bool(survey.decided[0]) and not beyond
     doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
     reason = survey.families[0].reasons[0] if certain else doubt
@@ -199,13 +205,19 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         ),
         target=survey.target.of(0) if survey.motions else None,
         surveyed=survey,
+        grows=grows,
     )
+
+
+def large_swings_grow(stages: Ensemble) -> bool:
+    """Whether swings far beyond a force limit without anti-windup may grow without bound, of the first stage."""
+    controller = stages.structure.controller
+    return controller is not None and controller.anti_windup == "none" and not stable_at_lower_gains(stages.flat)
 
 
 def _beyond_the_search(stages: Ensemble) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    controller = stages.structure.controller
-    if controller is not None and controller.anti_windup == "none" and not stable_at_lower_gains(stages.flat):
+    if large_swings_grow(stages):
         return "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
     if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
         return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"

@@ -78,6 +78,8 @@ def _hunting(case: Case) -> str:
     if not case.judgement.observed:
         return f"hunts, {_swing(case)}."
     seen = "This rests on long simulations: no attracting orbit could be closed."
+    if case.judgement.hunting.grows:
+        return f"hunts, {_swing(case)} when its run was stopped. {seen}"
     if case.judgement.swing:
         return f"hunts, {_swing(case)}. {seen}"
     size, after = with_unit(case.judgement.lasting, "m"), with_unit(case.judgement.followed, "s")
@@ -93,6 +95,8 @@ def _bistable(case: Case) -> str:
     first = _unmoved(case) if case.unmoved else "settles after this move"
     if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
+    if case.judgement.hunting.grows:
+        return f"{first}, but another move or a kick may start a swing that grows."
     if not starts:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
     seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
@@ -218,7 +222,7 @@ def _windows(case: Case) -> list[str]:
         if low and high:
             places.append(f"from {low} to {high}")
         elif low or high:
-            places.append(f"above {low}" if low else f"below {high}")
+            places.append(f"above {low}" if low else f"below {high}, but not just above that")
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
