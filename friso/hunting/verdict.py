@@ -13,6 +13,7 @@ import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions
+from friso.equations.bandwidth import faster
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.attractors.rounds import RESOLVED
@@ -27,8 +28,18 @@ from friso.hunting.basin import (
 )
 from friso.hunting.criteria import Verdict, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import DITHERS, REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
-from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
+from friso.hunting.cycle.hunting import (
+    DITHERS,
+    REACHED,
+    Cycle,
+    Hunting,
+    Swing,
+    cannot_hunt,
+    hunting,
+    large_swings_grow,
+    why_not,
+)
+from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, run_motions, some_of
 from friso.hunting.outward import AttractionEnd
@@ -64,6 +75,12 @@ UNFOLLOWED = (
 
 CHANGED = 1 + np.array([0.0, -1e-5, -1e-6, -1e-7, 1e-7, 1e-6, 1e-5])
 """Masses, as multiples of the stage's own, with which its motion is run: no machine is known as closely."""
+
+RUNNING_AWAY = 2.0
+"""How many times as far as what attracts, peak to peak, a motion swings at its end that does not end there."""
+
+RUNS_AWAY = "this motion swings much farther at its end than what was found to attract, and may run away"
+"""Why it is not certain that such a motion hunts as is said."""
 
 BY_CHANCE = "a change of its mass by a hundred-thousandth, or rounding, decides whether this motion ends in hunting"
 """Why it is not certain how a motion ends that ends otherwise with some of these masses."""
@@ -163,7 +180,7 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
     return Judgement(
         word,
         attraction,
-        margin=_as_sure(sought.margin, attraction),
+        margin=_as_sure(stage, sought.margin, attraction),
         windows=sought.windows,
         settled_after=after,
         followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
@@ -188,6 +205,8 @@ def _with_a_target(
         within = float(motions.settling[0])
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
         doubt = BY_CHANCE if own.by_chance else doubt
+        if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
+            doubt = RUNS_AWAY
         begin(STARTS)  # what swings less than a growing swing at its end may grow as well
         starts, started = ((None, None, None), ()) if attraction.grows else _starts(stage, target, KICKS * work)
     begin(BANDWIDTHS)
@@ -196,7 +215,7 @@ def _with_a_target(
         verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0],
         replace(attraction, certain=False, reason=doubt) if doubt else attraction,
         *starts,
-        _as_sure(sought.margin, attraction),
+        _as_sure(stage, sought.margin, attraction),
         sought.windows,
         sought.lower,
         None if own.ends or not np.isfinite(within) else within,
@@ -232,6 +251,11 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     except Exhausted:
         return own
     return last if last.completed else own
+
+
+def _widest(attraction: Hunting) -> float:
+    """The largest swing that attracts, peak to peak [m]."""
+    return 2 * max(swing.amplitude for swing in (*attraction.attracting, *attraction.observed))
 
 
 def _resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
@@ -282,9 +306,13 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
     return sought, (left,) if search.exhausted else ()
 
 
-def _as_sure(edge: Margin | None, attraction: Hunting) -> Margin | None:
-    """An edge is not more certain than the verdict."""
-    return edge and replace(edge, certain=edge.certain and attraction.certain)
+def _as_sure(stage: Stage, edge: Margin | None, attraction: Hunting) -> Margin | None:
+    """An edge is not more certain than the verdict, nor certain where the stage may run away beyond it."""
+    if edge is None or not edge.certain:
+        return edge
+    beyond = faster(stage.flat(), np.array([DISTANCE * edge.quiet]))
+    certain = attraction.certain and not large_swings_grow(Ensemble.held(beyond, 1))
+    return replace(edge, certain=certain)
 
 
 def _keeps_moving(flat: Mapping[str, Any]) -> bool:

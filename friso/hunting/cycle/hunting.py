@@ -133,8 +133,9 @@ class Hunting:
     none, or why it is not `certain` what attracts (if simulations that had to decide failed or were stopped); the
     return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
     `observed` and are none of the cycles; what motions end in that do not come to rest, the `target` (None where
-    nothing attracts); all of this as it was `surveyed`; and whether what was observed may be a swing that `grows` for
-    ever, of which the size is only where its run was stopped."""
+    nothing attracts); all of this as it was `surveyed`; and whether large motions may grow without bound, and the
+    stage so `runs_away`: an observed swing may then be one that grows, its size only that at which its run was
+    stopped."""
 
     cycles: tuple[Cycle, ...]
     reason: str
@@ -143,12 +144,17 @@ class Hunting:
     observed: tuple[Swing, ...] = ()
     target: Target | None = None
     surveyed: Attractors | None = None
-    grows: bool = False
+    runs_away: bool = False
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
         """The cycles that attract."""
         return tuple(cycle for cycle in self.cycles if cycle.attracts)
+
+    @property
+    def grows(self) -> bool:
+        """Whether what attracts was observed, and may be a swing that grows without bound."""
+        return self.runs_away and bool(self.observed)
 
     @property
     def possible(self) -> bool:
@@ -190,7 +196,8 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         survey = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in survey.motions if m.cycles is not None]
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
-    grows = any(m.cycles is None for m in survey.motions) and large_swings_grow(stages)
+    runs_away = large_swings_grow(stages)
+    grows = runs_away and any(m.cycles is None for m in survey.motions)
     beyond = GROWS if grows else "" if survey.motions else _beyond_the_search(stages)
     certain = bool(survey.decided[0]) and not beyond
     doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
@@ -205,7 +212,7 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         ),
         target=survey.target.of(0) if survey.motions else None,
         surveyed=survey,
-        grows=grows,
+        runs_away=runs_away,
     )
 
 

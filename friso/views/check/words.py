@@ -41,7 +41,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
-    return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *after])
+    return " ".join([*loop, says[case.verdict](case), *feeds, *_doubts(case), *_running_away(case), *after])
 
 
 def _loop(case: Case) -> list[str]:
@@ -160,6 +160,12 @@ def _doubts(case: Case) -> list[str]:
     if hunting.certain:
         return []
     return [f"This is not certain ({hunting.reason}){'' if hunting.target else ': other motions may end in hunting'}."]
+
+
+def _running_away(case: Case) -> list[str]:
+    """That large motions may grow without bound, and what keeps them from it."""
+    says = "Large motions may run away, because the force limit has no anti-windup: set controller.anti_windup."
+    return [says] if case.judgement.hunting.runs_away else []
 
 
 def _outlook(case: Case) -> list[str]:
