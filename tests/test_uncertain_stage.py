@@ -183,6 +183,8 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path, refused: 
         'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[2, 0.5], [0.5, 1]]',
         'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1]]',
         'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0], [1]]',
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = []',
+        pytest.param(f'keys = ["friction.coulomb"]\nmatrix = [[{"9" * 400}]]', id="huge"),
         'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, nan], [nan, 1]]',
         'keys = ["friction.coulomb", "friction.coulomb"]\nmatrix = [[1, 0], [0, 1]]',
         'keys = ["friction.static"]\nmatrix = [[1]]',

@@ -23,10 +23,14 @@ PART = {name: 1 if name in COMMANDS else 10 for name in HEAVY}
 """How many cases are run in one go; of light ones 100."""
 
 
+GROUPS = {"light": [name for name in NAMES if name not in COMMANDS], "heavy": [*COMMANDS]}
+"""Campaigns that have a name together: those within this process, and those of commands as processes."""
+
+
 def main() -> int:
     """Run the campaigns; 1 where a case failed."""
     arguments = _arguments()
-    names = arguments.campaigns or [*NAMES]
+    names = [name for given in arguments.campaigns or [*GROUPS] for name in GROUPS.get(given, [given])]
     end = time.monotonic() + 60 * arguments.minutes
     rows, failed = [], 0
     shares = [1 if name in HEAVY else SHARE for name in names]
@@ -74,14 +78,14 @@ def _parts(name: str, seed: int, numbers: range, jobs: int, end: float) -> Itera
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.trust", description=__doc__)
-    parser.add_argument("campaigns", nargs="*", metavar="CAMPAIGN", help=f"of {', '.join(NAMES)}")
+    parser.add_argument("campaigns", nargs="*", metavar="CAMPAIGN", help=f"light, heavy, or of {', '.join(NAMES)}")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--cases", type=int, default=16_000, help="of each campaign of light cases")
     parser.add_argument("--minutes", type=float, default=10.0, help="in all")
     parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
     parser.add_argument("--number", type=int, help="this case alone")
     arguments = parser.parse_args()
-    if strange := {*arguments.campaigns} - {*NAMES}:
+    if strange := {*arguments.campaigns} - {*NAMES, *GROUPS}:
         parser.error(f"no such campaign: {', '.join(strange)}")
     return arguments
 

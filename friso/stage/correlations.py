@@ -18,7 +18,7 @@ import numpy as np
 
 from friso.errors import InputError, StageError
 from friso.intervals import COVERAGE
-from friso.quantities import as_toml, percent, quoted
+from friso.quantities import LARGEST_INTEGER, as_toml, percent, quoted
 from friso.stage.controllers import as_tuned
 from friso.stage.files import parsed, text_of
 from friso.stage.section import unknown_key
@@ -103,6 +103,10 @@ def correlations_text(correlations: Correlations, stage: Stage) -> str:
     return "\n".join(["keys = [", *names, "]", "matrix = [", *rows, "]", ""])
 
 
+def _is_number(value: Any) -> bool:
+    return type(value) is float or (type(value) is int and abs(value) < LARGEST_INTEGER)
+
+
 def _from(document: dict[str, Any]) -> Correlations:
     for key in document:
         if key not in ("keys", "matrix"):
@@ -110,13 +114,11 @@ def _from(document: dict[str, Any]) -> Correlations:
     keys, rows = document.get("keys"), document.get("matrix")
     if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
         raise StageError("keys", quoted(keys), "a list of keys of the stage file", _EXAMPLE)
-    if not isinstance(rows, list) or not all(
-        isinstance(row, list) and all(type(value) in (int, float) for value in row) for row in rows
-    ):
+    if not isinstance(rows, list) or not all(isinstance(row, list) and all(map(_is_number, row)) for row in rows):
         raise StageError("matrix", quoted(rows), "a list of rows of numbers", _EXAMPLE)
     if len({len(row) for row in rows}) > 1:
         raise StageError("matrix", "rows of different lengths", "one row and one column per key", _EXAMPLE)
-    return Correlations(tuple(keys), np.array(rows, dtype=float).reshape(len(rows), -1))
+    return Correlations(tuple(keys), np.array(rows, dtype=float).reshape(len(rows), len(rows[0]) if rows else 0))
 
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
