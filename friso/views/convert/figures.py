@@ -29,7 +29,7 @@ def conversion_figure(conversion: LawConversion) -> Figure:
     for stage, curve, colour, dash in stages:
         flat, near = stage.flat(), curve.displacement <= reach
         label = flat["friction.model"]
-        shows = "points, straight between them" if conversion.points and curve is before else label
+        shows = "measured points" if conversion.points and curve is before else label
         virgin.append(Series(curve.displacement[near], curve.force[near], shows, colour, dash))  # type: ignore[arg-type]
         steady.append(Series(speeds, steady_force(flat, speeds, True), label, colour, dash))  # type: ignore[arg-type]
     panels = (
