@@ -27,8 +27,9 @@ SCALE = 0.06
 PRECISE = 1e-5
 """Share of the bandwidth up to which the end of a branch is known."""
 
-PACE = 3.0
-"""How much faster branches are followed than where they are drawn."""
+PACE, SHORTEST = 3.0, 1e-4
+"""How much faster branches are followed than where they are drawn, and their shortest step: the end of a branch that is
+lost is known to a thousandth at best."""
 
 FLAT = 3e-4
 """Step along a branch that ends the search for a fold: there the bandwidth changes with the square of it."""
@@ -257,7 +258,7 @@ class Outward:
             return self._stages(at * np.exp(ahead * places))
 
         length = abs(float(np.log(self.farthest / at)))
-        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=PACE)
+        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings, pace=PACE, shortest=SHORTEST)
         start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
         farthest, reserve = start, PRECISE
 

@@ -84,7 +84,7 @@ class Branch:
 class Tracer:
     """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
     those of the cycle (the latter only if they are not as few as there may be); `pace` times as fast as a curve is
-    drawn."""
+    drawn, in steps not shorter than `shortest`."""
 
     def __init__(
         self,
@@ -94,9 +94,11 @@ class Tracer:
         farthest: float = 1.0,
         swings: int | None = None,
         pace: float = 1.0,
+        shortest: float = SHORTEST,
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
         self.first, self.longest, self.smooth = pace * FIRST, pace * LONGEST, pace * SMOOTH
+        self.shortest = shortest
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -138,8 +140,8 @@ class Tracer:
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
         while len(points) <= MOST:
             last = points[-1]
-            states = _straight_on(points[-2], last, step) if len(points) > 1 else None
-            point = self.solve(last, last.vector + step * direction, direction, states)
+            target, states = _continued(points[-3:], step, direction)
+            point = self.solve(last, target, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
             near = point is not None and 0 < length < (2 * step if len(points) > 1 else self.longest)
@@ -149,7 +151,7 @@ class Tracer:
             if point is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
                 step /= 3  # and along the direction that the branch turned out to have
                 points[-1] = replace(last, jacobians=None)  # which may have led astray
-                if step < SHORTEST:
+                if step < self.shortest:
                     return points[1:], f"{NO_FARTHER} (multiplier {last.multiplier:.3g})"
                 continue
             coarse = abs(point.multiplier - last.multiplier) > self.smooth and abs(last.multiplier) < STEEP
@@ -201,7 +203,15 @@ class Tracer:
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 
 
-def _straight_on(before: Point, last: Point, step: float) -> np.ndarray:
-    """States (1, states) of the cycle a step beyond two others, on the straight line through them."""
-    share = step / float(np.linalg.norm(last.vector - before.vector))
-    return last.cycle.states + share * (last.cycle.states - before.cycle.states)
+def _continued(points: Sequence[Point], step: float, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    """Where the cycle a step beyond the last of up to three points is, in the space of place, log distance and log
+    time, a step ahead along a direction there; and its states (1, states), None if there is one point alone: on the
+    straight line through two, on the parabola through three, over the lengths between them."""
+    last = points[-1]
+    if len(points) == 1:
+        return last.vector + step * direction, None
+    lengths = [float(np.linalg.norm(last.vector - point.vector)) for point in points]
+    weights = [np.prod([(step + b) / (b - a) for k, b in enumerate(lengths) if k != j]) for j, a in enumerate(lengths)]
+    vector = sum(weight * point.vector for weight, point in zip(weights, points, strict=True))
+    states = sum(weight * point.cycle.states for weight, point in zip(weights, points, strict=True))
+    return vector + (step - (vector - last.vector) @ direction) * direction, states

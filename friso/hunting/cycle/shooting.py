@@ -33,6 +33,11 @@ CLOSED, CLOSED_CHATTERING = 1e-8, 1e-4
 FINEST, FINEST_CHATTERING = 1e-11, 1e-8
 """Gap that is as good as none, and that for a limiter that may chatter, where gaps below it are rounding's."""
 
+FOLLOWED, PATIENCE = 1e-6, 3
+"""Gap on the way along a branch up to which an orbit counts as closed that gets no closer for so many steps, as where
+the stage is stiff and its runs are not as exact; where a limiter may chatter, multipliers are rougher than orbits with
+such a gap, which is as good as none."""
+
 NUDGE = 1e-5
 """Change of a place over which the derivative by it is taken."""
 
@@ -133,7 +138,8 @@ Family = Callable[[np.ndarray, np.ndarray], Ensemble]
 
 class Followed(NamedTuple):
     """Orbits, the places of their stages, and the Jacobians that they were closed with, shape (count, states + 2,
-    states + 2), with which orbits near them may begin (NaN: there is none)."""
+    states + 2), with which orbits near them may begin (NaN: there is none, as where a limiter chatters:
+    they change too fast there)."""
 
     orbits: Orbits
     places: np.ndarray
@@ -189,6 +195,7 @@ class _Shooting:
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
         self.finest = FINEST_CHATTERING if self.chatters else FINEST
+        self.limit, self.patience = CLOSED_CHATTERING if self.chatters else CLOSED, STALLED[1]
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
@@ -242,8 +249,8 @@ class _Shooting:
             best[better] = current[better]
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
-        far, near, closed = STALLED
-        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > CLOSED, near, closed))
+        far, _, closed = STALLED
+        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > CLOSED, self.patience, closed))
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
@@ -260,8 +267,7 @@ class _Shooting:
 
     @property
     def orbits(self) -> Orbits:
-        limit = CLOSED_CHATTERING if self.chatters else CLOSED
-        closed = self.gaps < limit
+        closed = self.gaps < self.limit
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, swings_of_simplest(self.sign))
 
 
@@ -275,6 +281,11 @@ class _Following(_Shooting):
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
+        self.patience = PATIENCE
+        if self.chatters:
+            self.finest = FOLLOWED
+        else:
+            self.limit = FOLLOWED
         # of each orbit its last step, and what that was to bring to zero
         self.latest: list[tuple[np.ndarray, np.ndarray] | None] = [None] * len(self.times)
 
@@ -305,8 +316,9 @@ class _Following(_Shooting):
         return step
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
-        better = which[gaps < self.gaps[which]]
-        self.best_jacobians[better] = self.jacobians[better]
+        if not self.chatters:
+            better = which[gaps < self.gaps[which]]
+            self.best_jacobians[better] = self.jacobians[better]
         super()._keep_best(which, gaps)
 
     def _set_border(self, which: np.ndarray, stages: Ensemble) -> None:
@@ -319,8 +331,12 @@ class _Following(_Shooting):
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
         self.jacobians[which, :-1, :-1] = super()._jacobians(which, stages, shot)
-        behind, ahead = self._beside(which)
-        self.jacobians[which, :-1, -1] = (ahead - behind) / (2 * NUDGE)
+        gaps = np.max(np.abs(shot.ends - self.states[which]) / stages.scales, axis=1)
+        serves = self.chatters & np.isfinite(self.gaps[which]) & (gaps < SERVES * self.gaps[which])
+        stale = which[~serves]
+        if stale.size:
+            behind, ahead = self._beside(stale)
+            self.jacobians[stale, :-1, -1] = (ahead - behind) / (2 * NUDGE)
         self._set_border(which, stages)
         for k in which:
             self.latest[k] = None
