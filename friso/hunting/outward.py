@@ -352,14 +352,13 @@ def orbit_distance(point: Point, orbit: Swinging) -> float:
 
 def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> float:
     """Up to what share of its bandwidth a flip is known, between two points: twice by what the multiplier changes at a
-    tighter tolerance, over its slope. It is rough where a law turns sharply, as rolling friction at full deflection;
-    where a limiter chatters the slope of the return map decides, and this says nothing. Not finite: it is not known."""
+    tighter tolerance, over its slope. It is rough where a law turns sharply, as rolling friction at full deflection,
+    and where a limiter chatters. Not finite: it is not known."""
     stages = tracer.family(np.zeros(1, np.int64), np.array([last.place]))
-    if stages.chatters:
-        return PRECISE
-    tight = multipliers(stages, last.cycle.orbits, TIGHTER * tracer.rtol).local[0, 0]
+    tight = multipliers(stages, last.cycle.orbits, TIGHTER * tracer.rtol)
+    multiplier = float(tight.slope[0] if stages.chatters else tight.local[0, 0].real)
     slope = (second.multiplier - first.multiplier) / (second.place - first.place)
-    rough = 2 * abs(float(tight.real) - last.multiplier) / abs(slope)
+    rough = 2 * abs(multiplier - last.multiplier) / abs(slope)
     return float(rough)
 
 
