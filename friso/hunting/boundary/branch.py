@@ -212,6 +212,6 @@ def _continued(points: Sequence[Point], step: float, direction: np.ndarray) -> t
         return last.vector + step * direction, None
     lengths = [float(np.linalg.norm(last.vector - point.vector)) for point in points]
     weights = [np.prod([(step + b) / (b - a) for k, b in enumerate(lengths) if k != j]) for j, a in enumerate(lengths)]
-    vector = sum(weight * point.vector for weight, point in zip(weights, points, strict=True))
-    states = sum(weight * point.cycle.states for weight, point in zip(weights, points, strict=True))
+    vector = np.tensordot(weights, [point.vector for point in points], 1)
+    states = np.tensordot(weights, [point.cycle.states for point in points], 1)
     return vector + (step - (vector - last.vector) @ direction) * direction, states

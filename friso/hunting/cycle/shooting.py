@@ -33,10 +33,10 @@ CLOSED, CLOSED_CHATTERING = 1e-8, 1e-4
 FINEST, FINEST_CHATTERING = 1e-11, 1e-8
 """Gap that is as good as none, and that for a limiter that may chatter, where gaps below it are rounding's."""
 
-FOLLOWED, PATIENCE = 1e-6, 3
-"""Gap on the way along a branch up to which an orbit counts as closed that gets no closer for so many steps, as where
-the stage is stiff and its runs are not as exact; where a limiter may chatter, multipliers are rougher than orbits with
-such a gap, which is as good as none."""
+FOLLOWED, STALLED_FOLLOWED = 1e-6, (3, 3, 1)
+"""Gap on the way along a branch up to which an orbit counts as closed that gets no closer, as where the stage is stiff
+and its runs are not as exact, and after how many steps it does not; where a limiter may chatter, multipliers are
+rougher than orbits with such a gap, which is as good as none."""
 
 NUDGE = 1e-5
 """Change of a place over which the derivative by it is taken."""
@@ -195,7 +195,7 @@ class _Shooting:
         self.active, self.serves = np.ones(count, bool), np.zeros(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
         self.finest = FINEST_CHATTERING if self.chatters else FINEST
-        self.limit, self.patience = CLOSED_CHATTERING if self.chatters else CLOSED, STALLED[1]
+        self.limit, self.stalled = CLOSED_CHATTERING if self.chatters else CLOSED, STALLED
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
@@ -249,8 +249,8 @@ class _Shooting:
             best[better] = current[better]
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
-        far, _, closed = STALLED
-        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > CLOSED, self.patience, closed))
+        far, near, closed = self.stalled
+        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > CLOSED, near, closed))
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
@@ -281,7 +281,7 @@ class _Following(_Shooting):
         size = self.states.shape[1] + 2
         self.jacobians = np.full((len(self.times), size, size), np.nan)
         self.best_jacobians = self.jacobians.copy()
-        self.patience = PATIENCE
+        self.stalled = STALLED_FOLLOWED
         if self.chatters:
             self.finest = FOLLOWED
         else:
