@@ -10,7 +10,7 @@ from variants import VARIANTS
 
 import friso
 from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
-from friso.hunting.boundary.branch import REACHED, Point, Tracer
+from friso.hunting.boundary.branch import REACHED, Point, Tracer, continued
 from friso.hunting.boundary.locate import changes, corrected
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
@@ -261,3 +261,17 @@ NO_INTEGRAL = VARIANTS["rigid cart, P"]
 def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], refused: Refused) -> None:
     with refused():
         friso.boundary(stage, axes)
+
+
+def test_a_branch_goes_on_along_a_parabola(over_crossover: Diagram) -> None:
+    points = max((branch.points for branch in over_crossover.branches), key=len)[2:-2]  # its ends may stand there twice
+    off: list[list[float]] = []
+    for *known, ahead in zip(points, points[1:], points[2:], points[3:], strict=False):
+        last = known[-1]
+        step = float(np.linalg.norm(ahead.vector - last.vector))
+        direction = last.vector - known[-2].vector
+        direction /= np.linalg.norm(direction)
+        guesses = [continued(some, step, direction)[0] for some in (known[1:], known)]
+        off.append([float(np.linalg.norm(guess - ahead.vector)) for guess in guesses])
+    straight, parabola = np.median(off, axis=0)
+    assert parabola < straight / 3

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -140,7 +141,7 @@ class Tracer:
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), self.first
         while len(points) <= MOST:
             last = points[-1]
-            target, states = _continued(points[-3:], step, direction)
+            target, states = continued(points[-3:], step, direction)
             point = self.solve(last, target, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
@@ -203,14 +204,15 @@ class Tracer:
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
 
 
-def _continued(points: Sequence[Point], step: float, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+def continued(points: Sequence[Point], step: float, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     """Where the cycle a step beyond the last of up to three points is, in the space of place, log distance and log
     time, a step ahead along a direction there; and its states (1, states), None if there is one point alone: on the
     straight line through two, on the parabola through three, over the lengths between them."""
     last = points[-1]
     if len(points) == 1:
         return last.vector + step * direction, None
-    lengths = [float(np.linalg.norm(last.vector - point.vector)) for point in points]
+    chords = [float(np.linalg.norm(b.vector - a.vector)) for a, b in pairwise(points)]
+    lengths = [sum(chords[k:]) for k in range(len(points))]
     weights = [np.prod([(step + b) / (b - a) for k, b in enumerate(lengths) if k != j]) for j, a in enumerate(lengths)]
     vector = np.tensordot(weights, [point.vector for point in points], 1)
     states = np.tensordot(weights, [point.cycle.states for point in points], 1)
