@@ -266,12 +266,12 @@ def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], ref
 def test_a_branch_goes_on_along_a_parabola(over_crossover: Diagram) -> None:
     points = max((branch.points for branch in over_crossover.branches), key=len)[2:-2]  # its ends may stand there twice
     off: list[list[float]] = []
-    for *known, ahead in zip(points, points[1:], points[2:], points[3:], strict=False):
-        last = known[-1]
+    for *before, ahead in zip(points, points[1:], points[2:], points[3:], strict=False):
+        last = before[-1]
         step = float(np.linalg.norm(ahead.vector - last.vector))
-        direction = last.vector - known[-2].vector
+        direction = last.vector - before[-2].vector
         direction /= np.linalg.norm(direction)
-        guesses = [continued(some, step, direction)[0] for some in (known[1:], known)]
+        guesses = [continued(some, step, direction)[0] for some in (before[1:], before)]
         off.append([float(np.linalg.norm(guess - ahead.vector)) for guess in guesses])
     straight, parabola = np.median(off, axis=0)
     assert parabola < straight / 3

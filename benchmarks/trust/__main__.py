@@ -30,7 +30,7 @@ GROUPS = {"light": [name for name in NAMES if name not in COMMANDS], "heavy": [*
 def main() -> int:
     """Run the campaigns; 1 where a case failed."""
     arguments = _arguments()
-    names = [name for given in arguments.campaigns or [*GROUPS] for name in GROUPS.get(given, [given])]
+    names = [name for group in arguments.campaigns or [*GROUPS] for name in GROUPS.get(group, [group])]
     end = time.monotonic() + 60 * arguments.minutes
     rows, failed = [], 0
     shares = [1 if name in HEAVY else SHARE for name in names]

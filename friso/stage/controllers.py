@@ -76,6 +76,9 @@ class ControllerSection(AgainstFriction):
     """The shares of the force and what they are called in plots."""
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
+    usual: ClassVar[Mapping[str, tuple[float, float, str, tuple[str, ...]]]] = MappingProxyType({})
+    """Names of keys to the values that positioning stages have, from and to, their unit, and those in which they are
+    told; of gains, in N of something, per kilogram that they move."""
     symbols: ClassVar[Mapping[str, tuple[str, str]]] = MappingProxyType({})
     """Names of keys to what they are called in a table of gains, and their symbols, where the name itself will not
     do."""

@@ -55,9 +55,6 @@ _USUAL: Mapping[str, _Usual] = {
     "drive.delay": _CYCLE,
     "drive.current_bandwidth": _Usual(5.0, 1e5, "Hz", ("kHz", "Hz")),
     "drive.encoder_resolution": _Usual(1e-12, 1e-4, "m", ("nm", "um", "pm")),
-    "controller.kv": _Usual(0.05, 1e4, "1/s", ("1/s", "1/min")),
-    "controller.velocity_integral_time": _Usual(1e-4, 1e2, "s", ("ms", "us", "s")),
-    "controller.velocity_filter": _Usual(1e-7, 1.0, "s", ("ms", "us", "s")),
     "friction.stribeck_velocity": _SLOWLY,
     f"{MOTOR_FRICTION}.stribeck_velocity": _SLOWLY,
     MOTOR_MASS: _MASS,
@@ -88,6 +85,13 @@ def implausible_values(stage: Stage) -> Iterator[str]:
     flat = stage.flat()
     usual_values = dict(_ROTARY) if stage.axis_kind == ROTARY else _usual(flat)
     usual_values |= {key: _FREQUENCY for key in flat if _OF_FILTER.fullmatch(key)}
+    if stage.controller:
+        mass = moving_mass(flat)
+        for name, (low, high, unit, units) in stage.controller.usual.items():
+            times = mass if "N" in unit else 1.0  # gains follow the mass
+            if stage.axis_kind == ROTARY and "N" in unit:
+                continue
+            usual_values[stage.controller.key(name)] = _Usual(times * low, times * high, unit, units)
     if (bandwidth := stage.controller and stage.controller.bandwidth_key) is not None:
         usual_values[bandwidth] = _FREQUENCY
     for key, usual in usual_values.items():
@@ -103,8 +107,7 @@ _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
 
 
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """What is usual for the stage: friction follows its weight, and what gives way before it slides follows friction;
-    the gain of a velocity loop follows the mass."""
+    """What is usual for the stage: friction follows its weight, and what gives way before it slides follows friction."""
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():
@@ -118,8 +121,6 @@ def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
         for key in element_keys(flat, f"{table}.element_stiffness"):
             share = flat.get(key.replace("element_stiffness", "element_share"), 1.0)
             usual[key] = _presliding(share * force)
-    if "controller.kv" in flat:
-        usual["controller.kp"] = _Usual(0.3 * moving, 3e4 * moving, "N*s/m", ("N*s/m", "N*s/mm", "kN*s/m"))
     return usual
 
 

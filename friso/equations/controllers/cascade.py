@@ -67,6 +67,14 @@ class Cascade(ControllerSection):
     """By the sign of the reference's velocity."""
     viscous_feedforward: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
 
+    usual: ClassVar[Mapping[str, tuple[float, float, str, tuple[str, ...]]]] = MappingProxyType(
+        {
+            "kv": (0.05, 1e4, "1/s", ("1/s", "1/min")),
+            "velocity_integral_time": (1e-4, 1e2, "s", ("ms", "us", "s")),
+            "velocity_filter": (1e-7, 1.0, "s", ("ms", "us", "s")),
+            "kp": (0.3, 3e4, "N*s/m", ("N*s/m", "N*s/mm", "kN*s/m")),
+        }
+    )
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType(
         {"kv": 1, "kp": 1, "position_integral_time": -1, "velocity_integral_time": -1, "velocity_filter": -1}
     )

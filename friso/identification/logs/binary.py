@@ -204,9 +204,11 @@ def main(kind: str, path: Path, memory: int, seconds: int) -> None:
     if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-        if memory:
-            resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
+        for what, wanted in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory)):
+            _, allowed = resource.getrlimit(what)
+            limit = wanted if allowed == resource.RLIM_INFINITY else min(wanted, allowed)
+            if wanted:
+                resource.setrlimit(what, (limit, limit))
     content, message = None, ""
     try:
         content = _plain(READERS[kind](path))

@@ -22,6 +22,8 @@ MOST_GAPS = 0.1
 EVEN = 0.01
 """Time stamps that scatter (rms) by less than this share of a sample time are taken as even: interpolation would change
 a signal by less than 1 % of what it changes per sample."""
+CLEAR = 0.25
+"""Share of a sample time by which it may be off at most: more is no whole number of samples."""
 SCATTER = 4.0
 """Standard deviations of the other steps by which one over a gap may differ from a whole number of sample times."""
 SHORTEST = 10
@@ -65,7 +67,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = float(steps[~gaps].mean())
     lost = np.round(steps / period) - 1
-    scatter = max(EVEN, SCATTER * float(np.std(steps[~gaps])) / period)
+    scatter = min(max(EVEN, SCATTER * float(np.std(steps[~gaps])) / period), CLEAR)
     whole = np.abs(steps / period - 1 - lost) <= scatter  # else the clock began anew
     bridged = gaps & whole & (lost >= 1) & (lost <= BRIDGED)
     edges = [0, *(np.flatnonzero(gaps & ~bridged) + 1).tolist(), time.size]

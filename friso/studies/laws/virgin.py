@@ -18,8 +18,8 @@ from friso.identification.logs.units import unit_factor
 EXAMPLE = "displacement [um],force [N]"
 """Heading of a file with such a curve."""
 
-LEAST, REACHES = 3, 0.9
-"""Points at least, and the share of static friction up to which they have to go at least."""
+LEAST, MOST, REACHES = 3, 2000, 0.9
+"""Points at least and at most, and the share of static friction up to which they have to go at least."""
 
 NEAR = 1e-6
 """Share of the last displacement within which there are no two points, so that slopes can be told."""
@@ -39,7 +39,9 @@ def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.
         raise _refused(path, "a point that is no number", "numbers in every row")
     if displacement[0] < 0 or np.any(np.diff(displacement) <= 0):
         raise _refused(path, "displacements that do not increase", "displacements from rest (0) on, each larger")
-    if force[-1] <= 0:
+    if len(force) > MOST:
+        raise _refused(path, f"{len(force)} points", f"at most {MOST}: thin them out")
+    if force[-1] <= max(force[0], 0.0) or force.min() < 0:
         raise _refused(path, "a force that does not rise", "the force that opposes the displacement, positive")
     return displacement, force
 

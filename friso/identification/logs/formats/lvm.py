@@ -17,9 +17,9 @@ def read_lvm(path: Path) -> ChannelTable:
     """LabVIEW measurement text. Raises LogError."""
     file = content_by("lvm_read", "LVM", path)
     segments = range(int(file["Segments"]))
-    found = [item for k in segments for item in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
-    channels = [channel for channel, _ in found]
-    return named_table("LVM", channels, cut_short(channels, [stated for _, stated in found]), path)
+    read = [item for k in segments for item in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
+    channels = [channel for channel, _ in read]
+    return named_table("LVM", channels, cut_short(channels, [stated for _, stated in read]), path)
 
 
 def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[tuple[Channel, Any]]:
