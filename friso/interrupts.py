@@ -28,6 +28,8 @@ _AGAIN = 0.02
 
 _came: list[int] = []
 _raising = False
+_held = 0
+"""Blocks in which signals wait for the end (`hold_interrupts`), one within another."""
 
 
 def came() -> int:
@@ -67,11 +69,14 @@ def hold_interrupts() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
+    global _held
     arrived: list[int] = []
     before = {number: signal.signal(number, lambda number, frame: arrived.append(number)) for number in SIGNALS}
+    _held += 1
     try:
         yield
     finally:
+        _held -= 1
         for number, handler in before.items():
             if handler is not None:  # not Python's
                 signal.signal(number, handler)
@@ -98,7 +103,7 @@ def _arrived(number: int, frame: FrameType | None) -> None:
         _came.append(number)
     if not _raising:
         return
-    if _imports(frame):
+    if _imports(frame) or _held:  # one that came during an import comes again
         signal_later(_AGAIN, _arrived)
         return
     raise KeyboardInterrupt

@@ -109,6 +109,26 @@ def _import_and_wait() -> None:
     time.sleep(10)
 
 
+def test_ctrl_c_that_came_during_an_import_waits_for_what_must_be_whole(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "half_there_too.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    done: list[str] = []
+    with pytest.raises(KeyboardInterrupt), interrupts.raising():
+        _import_and_write(done)
+    assert done == ["whole"]
+
+
+def _import_and_write(done: list[str]) -> None:
+    import_module("half_there_too")
+    with interrupts.hold_interrupts():
+        time.sleep(0.1)
+        done.append("whole")
+    time.sleep(10)
+    done.append("not interrupted")
+
+
 class Going:
     """Is struck by Ctrl-C while it goes, where Python ignores what is raised."""
 

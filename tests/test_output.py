@@ -123,7 +123,7 @@ def test_a_file_that_is_there_is_refused(command: str, tmp_path: Path) -> None:
 def test_the_folder_of_a_map_is_its_store(tmp_path: Path) -> None:
     """Another command takes it for one that friso map made; beside files of others, no store is made."""
     (tmp_path / "a.zarr").mkdir()
-    (tmp_path / "a.zarr" / ".zattrs").write_text('{"equations": "1"}')
+    (tmp_path / "a.zarr" / ".zattrs").write_text('{"equations": "1", "friso": "1"}')
     with pytest.raises(InputError, match="friso map"):
         place(tmp_path / "a.zarr")
     check_store_folder(tmp_path / "a.zarr")

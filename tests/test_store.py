@@ -546,6 +546,27 @@ def test_what_is_no_store_is_not_replaced_even_when_told(rig: Stage, tmp_path: P
     assert (tmp_path / "mine" / "thesis.txt").read_text() == "precious"
 
 
+def test_files_of_others_in_a_store_do_not_go_with_it(stored: Path, rig: Stage, tmp_path: Path) -> None:
+    """Nor does a folder whose metadata speak of equations, but not of friso."""
+    other = Request(rig, {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}).study()
+    for name in ("notes.txt", "mine/thesis.txt", "peaks/notes"):
+        (stored / name).parent.mkdir(exist_ok=True)
+        (stored / name).write_text("precious")
+        with pytest.raises(StoreError, match=name), Store.opened(stored, other, overwrite=True):
+            pass
+        assert (stored / name).read_text() == "precious"
+        (stored / name).unlink()
+    (stored / "mine").rmdir()
+    with Store.opened(stored, other, overwrite=True) as store:
+        assert store.missing()
+    foreign = tmp_path / "flow.zarr"
+    (foreign / "data").mkdir(parents=True)
+    (foreign / ".zattrs").write_text('{"equations": "Navier-Stokes"}')
+    with pytest.raises(StoreError), Store.opened(foreign, other, overwrite=True):
+        pass
+    assert (foreign / "data").exists()
+
+
 def test_leftovers_of_a_killed_run_are_removed(rig: Stage, tmp_path: Path) -> None:
     left, being_made = (tmp_path / f".a.zarr.{digit * 32}" for digit in "ab")
     for draft in (left, being_made):

@@ -107,7 +107,7 @@ _OF_FILTER = re.compile(r"controller\.filters\.\d+\.(frequency|width)")
 
 
 def _usual(flat: Mapping[str, Any]) -> dict[str, _Usual]:
-    """What is usual for the stage: friction follows its weight, and what gives way before it slides follows friction."""
+    """What is usual: friction follows the weight, and what gives way before it slides follows friction."""
     carried, moving = sum(flat.get(f"masses.{body}", 0.0) for body in ("cart", "stage")), moving_mass(flat)
     usual = dict(_USUAL)
     for table, mass in {"friction": carried, MOTOR_FRICTION: moving}.items():

@@ -147,9 +147,13 @@ def checked_metadata(path: Path) -> Metadata:
     raise StoreError("", actual, expected, "--out study.zarr", str(path))
 
 
+_WORDS = (b'"equations"', f'"{_OWN}"'.encode())
+"""Keys that stand together in the metadata of stores alone."""
+
+
 def is_store(path: Path) -> bool:
     """Whether friso made the folder, as far as its metadata tell, damaged or not."""
-    return any(_mentions(path / name, b'"equations"') for name in (_FILE, _ATTRIBUTES))
+    return any(all(_mentions(path / name, words) for words in _WORDS) for name in (_FILE, _ATTRIBUTES))
 
 
 def _says(file: Path, content: Any) -> bool:

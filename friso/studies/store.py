@@ -27,7 +27,14 @@ from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
 from friso.studies.store_files import refuse_foreign
-from friso.studies.store_folder import exchange, lock_store, make, remove_leftovers, remove_partial_files
+from friso.studies.store_folder import (
+    exchange,
+    lock_store,
+    make,
+    refuse_others_files,
+    remove_leftovers,
+    remove_partial_files,
+)
 from friso.studies.study import CellBlock, Study, study_of
 from friso.system import cause_of, once_free
 
@@ -86,6 +93,7 @@ class Store:
             try:
                 _refuse_other(self.path, self.study)
             except StoreError:
+                refuse_others_files(self.path)
                 exchange(self.path, self._fill, lock)
 
     def _fill(self, folder: Path) -> None:

@@ -7,6 +7,7 @@ Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a f
 
 from __future__ import annotations
 
+import re
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -39,6 +40,27 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
         except OSError:
             if not path.exists():
                 raise  # else another process was quicker; whose study that is will be seen
+
+
+def refuse_others_files(path: Path) -> None:
+    """Raise StoreError if there is anything in the folder of a store that no store has: it would go with the store."""
+    others = []
+    for item in sorted(path.iterdir()):
+        if item.is_dir() and not item.is_symlink() and item.name not in _FOLDERS:
+            others += [f"{item.name}/{part.name}" for part in sorted(item.iterdir()) if not _OF_ARRAY(part.name)]
+        elif item.is_file() and not (_OF_ARRAY(item.name) or item.name == LOCK or is_partial(item)):
+            others.append(item.name)
+    if others:
+        more = f" and {len(others) - 1} more" if len(others) > 1 else ""
+        actual = f"a store with {others[0]}{more} in it, which friso did not write"
+        raise StoreError("", actual, "nothing else in it: move that away, or another --out", origin=str(path))
+
+
+_FOLDERS = (".blocks", ".answers")
+"""Folders of a store besides those of its arrays."""
+
+_OF_ARRAY = re.compile(rf"\.z[a-z]+|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
+"""Whether a name is one that Zarr gives, or of a file that was being written."""
 
 
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:

@@ -152,6 +152,8 @@ def tdms_channels(path: Path) -> dict[str, Any]:
 
     heard, logger = _Heard(), logging.getLogger("nptdms")
     logger.handlers = [heard]
+    with path.open("rb") as opened:  # by its name the library would read the index beside it, whatever that is of
+        file = nptdms.TdmsFile.read(opened)
     channels = [
         {
             "group": group.name,
@@ -161,7 +163,7 @@ def tdms_channels(path: Path) -> dict[str, Any]:
             "start": float(item.properties.get("wf_start_offset", 0.0)),
             "unit": str(item.properties.get("unit_string") or item.properties.get("NI_UnitDescription") or ""),
         }
-        for group in nptdms.TdmsFile.read(path).groups()
+        for group in file.groups()
         for item in group.channels()
     ]
     return {"channels": channels, "heard": heard.lines}

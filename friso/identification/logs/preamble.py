@@ -21,6 +21,8 @@ _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
 """What stands around a key and its value, and is no part of them."""
 _SEPARATOR = re.compile(r"\t\s*[:=;,]|[:=;,\t]")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
+LONGEST = 100
+"""Characters of a value at most that is looked at: an amount with its unit is shorter."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
@@ -47,7 +49,7 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
     for line, (stated, value) in pairs.items():
         name, unit = split_heading(stated)
         key = re.sub(r"[\W\d_]+", "", name.lower())
-        amount = _AMOUNT.fullmatch(value) if key in RATES | STEPS else None
+        amount = _AMOUNT.fullmatch(value) if key in RATES | STEPS and len(value) < LONGEST else None
         if amount is None:
             continue
         if _GROUPED.fullmatch(amount["number"]):
