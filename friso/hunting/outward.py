@@ -27,7 +27,7 @@ SCALE = 0.06
 PRECISE = 1e-5
 """Share of the bandwidth up to which the end of a branch is known."""
 
-PACE, SHORTEST = 3.0, 1e-4
+PACE, SHORTEST = 3.0, 1e-5
 """How much faster branches are followed than where they are drawn, and their shortest step: the end of a branch that is
 lost is known to a thousandth at best."""
 
