@@ -43,7 +43,11 @@ def make(path: Path, fill: Callable[[Path], object]) -> None:
 
 
 def refuse_others_files(path: Path) -> None:
-    """Raise StoreError if there is anything in the folder of a store that no store has: it would go with the store."""
+    """Refuse a store that has anything in its folder that no store has: it would go with the store.
+
+    Raises:
+        StoreError: naming the first of what friso did not write.
+    """
     others = []
     for item in sorted(path.iterdir()):
         if item.is_dir() and not item.is_symlink() and item.name not in _FOLDERS:
