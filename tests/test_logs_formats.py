@@ -269,6 +269,25 @@ def test_twincat_rows_that_have_shifted(tmp_path: Path, delimiter: str, refused:
         read_table(path)
 
 
+def test_twincat_takes_a_time_in_proportion_to_the_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Many groups, each a row shorter than the one before: the usual step of each is found once."""
+    medians: list[int] = []
+    median = np.median
+    monkeypatch.setattr(np, "median", lambda values: medians.append(1) or median(values))
+    groups = 60
+    rows = ["\t".join(f"{row}\t{row}.5" if row < 80 - group else "\t" for group in range(groups)) for row in range(80)]
+    names = "\t".join(f"Name\tc{group}" for group in range(groups))
+    (tmp_path / "a.csv").write_text("\n".join([names, "\t".join(["SampleTime[ms]\t1"] * groups), *rows]) + "\n")
+    table = read_table(tmp_path / "a.csv")
+    assert [channel.values.size for channel in table.channels] == [80 - group for group in range(groups)]
+    assert len(medians) <= groups
+
+
+def test_channels_have_names_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("t [s];pos;pos;pos #2;pos\n0;1;2;3;4\n1;2;3;4;5\n")
+    assert [c.name for c in read_table(tmp_path / "a.csv").channels] == ["t", "pos", "pos #3", "pos #2", "pos #4"]
+
+
 def test_twincat_absolute_times(tmp_path: Path) -> None:
     groups = [(0.25, [("ActPos", "mm", M["position"])])]
     table = read_table(log_files.write_twincat(tmp_path / "a.csv", groups, start=132959733843760000))

@@ -55,11 +55,12 @@ def escaping() -> Iterator[None]:
 
 
 def console(stream: TextIO, **options: Any) -> Console:
-    """What draws on a stream with escape sequences of its own: texts have to be escaped before they come here."""
+    """What draws on a stream with escape sequences of its own: texts have to be escaped before they come here. It makes
+    no pictures of names such as ":x:"."""
     from rich.console import Console
 
     plain = cast("TextIO", Piped(stream.stream)) if isinstance(stream, Escaping) else stream
-    return Console(file=plain, **options)
+    return Console(file=plain, emoji=False, **options)
 
 
 SPELLED = "friso.spelled"

@@ -9,6 +9,7 @@ from typing import Any
 
 from friso.drives.questions import OpenQuestion, UserAnswers
 from friso.errors import InputError
+from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.registry import Registry
 
@@ -25,6 +26,9 @@ class AxisParameters:
     values: Mapping[str, Any]
     machine: Mapping[str, Any] = field(default_factory=dict)
     letter: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", one_line(self.name))
 
     def number(self, name: str, default: float | None = None) -> float:
         """A finite number. Raises InputError where it is something else, or absent without a `default`."""

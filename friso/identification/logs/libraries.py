@@ -10,7 +10,6 @@ from typing import Any
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.confined import content
-from friso.identification.logs.text import unique
 
 
 def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
@@ -35,11 +34,9 @@ def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> li
     ]
 
 
-def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
-    """The channels under names of their own. Raises LogError for none."""
-    filled = [channel for channel in channels if channel.values.size]
+def filled_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
+    """The channels with samples. Raises LogError for none."""
+    filled = tuple(channel for channel in channels if channel.values.size)
     if not filled:
         raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
-    names = unique([channel.name for channel in filled])
-    renamed = tuple(Channel(name, c.unit, c.values, c.time, c.source) for name, c in zip(names, filled, strict=True))
-    return ChannelTable(renamed, {}, (f"format: {kind}", f"{len(renamed)} channels", *notes))
+    return ChannelTable(filled, {}, (f"format: {kind}", f"{len(filled)} channels", *notes))

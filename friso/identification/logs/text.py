@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
-from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.channel import Channel, ChannelTable, unique
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.roles import role_of
 from friso.identification.logs.sniff import DOS_END, STAMP, TextLayout, layout, split_line
@@ -133,16 +133,6 @@ def _has_comma(path: Path, form: TextLayout) -> bool:
         for _ in range(form.first):
             at = bytes_.find(b"\n", at) + 1
         return bytes_.find(b",", at) >= 0
-
-
-def unique(names: list[str]) -> list[str]:
-    """Names, with a number where they are the same."""
-    counts: dict[str, int] = {}
-    out = []
-    for name in names:
-        counts[name] = counts.get(name, 0) + 1
-        out.append(name if counts[name] == 1 or not name else f"{name} #{counts[name]}")
-    return out
 
 
 def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:

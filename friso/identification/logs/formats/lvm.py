@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import FileHead, LogFormat
-from friso.identification.logs.libraries import content_by, cut_short, named_table
+from friso.identification.logs.libraries import content_by, cut_short, filled_table
 from friso.identification.logs.units import split_heading
 
 
@@ -19,7 +19,7 @@ def read_lvm(path: Path) -> ChannelTable:
     segments = range(int(file["Segments"]))
     read = [item for k in segments for item in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
     channels = [channel for channel, _ in read]
-    return named_table("LVM", channels, cut_short(channels, [stated for _, stated in read]), path)
+    return filled_table("LVM", channels, cut_short(channels, [stated for _, stated in read]), path)
 
 
 def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[tuple[Channel, Any]]:

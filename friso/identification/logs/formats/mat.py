@@ -13,7 +13,6 @@ from friso.identification.logs.binary import OBJECT, is_hdf5
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.confined import content
 from friso.identification.logs.format import FileHead, LogFormat
-from friso.identification.logs.text import unique
 from friso.identification.logs.units import split_heading
 
 MOST_COLUMNS = 64
@@ -51,7 +50,7 @@ def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
     """The channels without the name of the variable they stand in, where they differ without it."""
     short = [channel.name.rpartition("/")[2] for channel in channels]
     names = [s if short.count(s) == 1 else c.name.replace("/", ".") for s, c in zip(short, channels, strict=True)]
-    return tuple(replace(channel, name=name) for channel, name in zip(channels, unique(names), strict=True))
+    return tuple(replace(channel, name=name) for channel, name in zip(channels, names, strict=True))
 
 
 def _walk(node: Any, name: str, walk: _Contents) -> None:

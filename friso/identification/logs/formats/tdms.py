@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
-from friso.identification.logs.libraries import content_by, named_table
+from friso.identification.logs.libraries import content_by, filled_table
 from friso.identification.logs.units import split_heading
 
 
@@ -24,7 +24,7 @@ def read_tdms(path: Path) -> ChannelTable:
         time = item["start"] + item["step"] * np.arange(values.size) if item["step"] > 0 else None
         name, unit = split_heading(item["name"])
         channels.append(Channel(name, item["unit"] or unit, values.astype(float), time, place))
-    return named_table("TDMS", channels, notes + file["heard"], path)
+    return filled_table("TDMS", channels, notes + file["heard"], path)
 
 
 FORMAT = LogFormat("TDMS", lambda head: head.start.startswith(b"TDSm"), read_tdms)

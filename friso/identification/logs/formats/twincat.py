@@ -17,7 +17,7 @@ from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
 from friso.identification.logs.sniff import TextLayout, csv_cells, decoded_head, is_number
-from friso.identification.logs.text import as_numbers, read_frame, unique
+from friso.identification.logs.text import as_numbers, read_frame
 from friso.identification.logs.units import spelled
 from friso.quantities import quoted
 
@@ -88,7 +88,6 @@ def _channels(
     """The channels of all groups, and lines that tell of them. Raises LogError."""
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
-    names = unique(labels)
     times = [_floats(path, form, frame, start) for start in clocks]
     times = [
         time[: int(np.flatnonzero(~np.isnan(time))[-1]) + 1] if not np.isnan(time).all() else time[:0] for time in times
@@ -104,7 +103,7 @@ def _channels(
                 continue  # files of old versions end each row with a delimiter
             values = _floats(path, form, frame, column)[: len(time)]
             info = {key: cells[column] for key, cells in table.items() if column < len(cells)}
-            out.append(Channel(names[column], spelled(info.get("Unit", "")), values, seconds, _source(column, info)))
+            out.append(Channel(labels[column], spelled(info.get("Unit", "")), values, seconds, _source(column, info)))
         notes.append(f"group {labels[start + 1 : end]}: {len(time)} samples, {seconds[0]:g} s to {seconds[-1]:g} s")
     if not out:
         raise LogError("log", "no channel with samples", "an export with data", "", str(path))
@@ -114,17 +113,21 @@ def _channels(
 def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.ndarray]) -> None:
     """Raises LogError where, in the row in which a group ends, the clock of another one jumps: the cells of the first
     are missing, with their delimiters, and those behind them have moved to the left."""
-    for row in sorted({time.size for time in times} - {0}):
-        for time in times:
-            if 2 < row < time.size:
-                usual, step = np.median(np.diff(time[:row])), time[row] - time[row - 1]
-                if not abs(step - usual) < 0.5 * usual:
-                    line = form.first + 1 + int(frame.index[row])
-                    jump = f"from {time[row - 1]:.12g} to {time[row]:.12g}"
-                    actual = f"fewer cells in line {line}, and the times of a group jump there {jump}"
-                    raise LogError(
-                        "log", actual, "empty cells, with their delimiters, where a group has ended", "", str(path)
-                    )
+    ends = np.array(sorted({time.size for time in times} - {0}))
+    for time in times:
+        rows = ends[(ends > 2) & (ends < time.size)]
+        if not rows.size:
+            continue
+        every, steps = np.diff(time), time[rows] - time[rows - 1]
+        usual = np.median(every[np.isfinite(every)]) if np.isfinite(every).any() else np.nan
+        wrong = rows[~(abs(steps - usual) < 0.5 * usual)]
+        if wrong.size:
+            row = int(wrong[0])
+            line = form.first + 1 + int(frame.index[row])
+            jump = f"from {time[row - 1]:.12g} to {time[row]:.12g}"
+            actual = f"fewer cells in line {line}, and the times of a group jump there {jump}"
+            expected = "empty cells, with their delimiters, where a group has ended"
+            raise LogError("log", actual, expected, "", str(path))
 
 
 def _source(column: int, info: dict[str, str]) -> str:

@@ -12,7 +12,6 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.format import LogFormat
 from friso.identification.logs.libraries import content_by, cut_short
 from friso.identification.logs.measured_response import MeasuredResponse, check_response, response_unit
-from friso.identification.logs.text import unique
 from friso.identification.logs.units import unit_factor
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
@@ -62,7 +61,7 @@ def read_uff(path: Path) -> ChannelTable:
     headings = [label(d, "id1") or f"node {d['rsp_node']} direction {d['rsp_dir']}" for d in times]
     channels = tuple(
         Channel(name, _unit(d), np.real(d["data"]).astype(float), _seconds(d), "dataset 58")
-        for name, d in zip(unique(headings), times, strict=True)
+        for name, d in zip(headings, times, strict=True)
     )
     code = times[0]["units_code"]
     foreign = [f"units of code {code} are unknown"] if code is not None and code not in _SYSTEMS else []
