@@ -5,10 +5,13 @@ import pytest
 from beyond_flip import STEEP
 
 from friso.equations.bandwidth import faster
+from friso.hunting.attractors.survey import of_cycles
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.cycle.held import RANGE, held_by
 from friso.hunting.cycle.rest import stuck
 from friso.hunting.outward import Outward
+from friso.stage import Stage
 
 BEFORE = np.linspace(-RANGE, RANGE, 61)
 
@@ -55,3 +58,19 @@ def test_the_steep_stage_swings_on_beyond_its_flip() -> None:
         stages = Ensemble.held(faster(STEEP.flat(), np.full(24, share * FLIP)), 24)
         results = stages.run(stuck(stages, distances), np.full(24, 26 * 300.0), 1e-8, window=0.95)
         assert np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 200e-6)
+
+
+def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_scatter(rig: Stage) -> None:
+    """That of the thesis's rig passes -1 at 5.599, 5.609 and 5.614 Hz: which of them is met depends on the start."""
+    flat = rig.replace({"joint.locked": False}).flat()
+    flips, outward = [], Outward(flat, 10.0)
+    for crossover in (5.45, 5.5):
+        at = crossover / flat["controller.crossover"]
+        stages = Ensemble.held(faster(flat, np.array([at])), 1)
+        (orbit,) = of_cycles(np.arange(1), hunting_cycles(stages), stages.sticking)
+        factor, _, end, reserve = outward.followed(at, orbit)
+        flips.append((end, factor * flat["controller.crossover"], reserve))
+    for end, flip, reserve in flips:
+        assert end == "found"
+        assert 2e-3 < reserve < 0.01
+        assert flip * (1 - reserve) < 5.599 < 5.614 < flip * (1 + reserve)

@@ -46,8 +46,9 @@ SPREAD, ENOUGH = 9, 6
 """Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
 known."""
 
-NEAR = 1.03
-"""The range of factors about the flip over which that curve is laid again."""
+NEAR, ABOUT = 1.03, 1.01
+"""The range of factors about the flip over which that curve is laid again; and that of an orbit that was followed to
+it."""
 
 FOUND, LOST, UNCLEAR = "found", "lost", "unclear"
 """What is known of the end of an orbit."""
@@ -142,8 +143,7 @@ class Outward:
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
         """The same; the place is what is known on the way."""
-        chatters = Ensemble.held(self.flat, 1).chatters
-        beyond = CHATTERING if chatters else BEYOND
+        beyond = CHATTERING if self._chatters else BEYOND
         for _ in range(HOPS):
             at, outside = place.at, place.outside
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
@@ -152,11 +152,11 @@ class Outward:
                 if place.outside / place.at < beyond and place.at / place.outside < beyond:
                     break
                 continue
-            flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
+            flip = self._flip(at, outside) if self._chatters and _is_simple(orbit) else None
             if flip:
                 (place.at, reserve), distance, end = flip, orbit.distance, FOUND
             else:
-                place.at, distance, end, reserve = self._followed(at, orbit)
+                place.at, distance, end, reserve = self.followed(at, orbit)
             at = place.at
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
@@ -243,11 +243,15 @@ class Outward:
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
 
+    @property
+    def _chatters(self) -> bool:
+        return Ensemble.held(self.flat, 1).chatters
+
     def _ahead(self, at: float) -> float:
         return 1.0 if self.farthest >= at else -1.0
 
     @np.errstate(all="ignore")
-    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float, str, float]:
+    def followed(self, at: float, orbit: Swinging) -> tuple[float, float, str, float]:
         """The last factor at which a closed orbit attracts, the distance [m] at which the stage sticks there; whether
         its end was `FOUND`: a flip, a fold or a torus, or it was `LOST` on the way, where it attracted well, or that is
         `UNCLEAR`; and up to what share of it the factor is known."""
@@ -277,8 +281,9 @@ class Outward:
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
             if last is not None and kind == "flip":
-                rough = _rough(tracer, last, first, second)
+                place, rough = _smoothed(tracer, last) if self._chatters else _rough(tracer, last, first, second)
                 ended, reserve = bool(np.isfinite(rough)), float(np.fmax(PRECISE, rough))
+                farthest = replace(farthest, place=place) if ended else farthest
         elif tracer.reaches(points, reason):
             raise Beyond
         lost = LOST if reason.startswith(NO_FARTHER) and abs(farthest.multiplier) < FIRM else UNCLEAR
@@ -301,17 +306,10 @@ class Outward:
             closed = np.isfinite(excess)
             if np.count_nonzero(closed) < ENOUGH or not np.any(excess < 0):
                 break
-            places, excess = np.linspace(0, 1, SPREAD)[closed], excess[closed]
-            curve = np.polyfit(places, excess, 3)
-            roots = np.roots(curve)
-            real = roots.real[np.abs(roots.imag) < 1e-9]
-            inside = real[(real >= 0) & (real <= places[-1])]
-            if not inside.size:
+            place, uncertainty = _crossing(np.linspace(0, 1, SPREAD)[closed], excess[closed])
+            if not np.isfinite(uncertainty):
                 break
-            place = float(inside.max())
-            scatter = float(np.sqrt(np.sum((excess - np.polyval(curve, places)) ** 2) / max(len(places) - 4, 1)))
-            slope = abs(float(np.polyval(np.polyder(curve), place)))
-            uncertainty = 2 * scatter / slope * abs(float(np.log(outside / at)))
+            uncertainty *= abs(float(np.log(outside / at)))
             before, flip_at = flip, float(at * (outside / at) ** place)
             flip = flip_at, uncertainty if before is None else max(uncertainty, abs(flip_at / before[0] - 1))
             at, outside = flip_at / NEAR, flip_at * NEAR  # a curve over less is closer
@@ -350,16 +348,46 @@ def orbit_distance(point: Point, orbit: Swinging) -> float:
     return float(np.copysign(np.exp(point.distance), orbit.distance))
 
 
-def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> float:
-    """Up to what share of its bandwidth a flip is known, between two points: twice by what the multiplier changes at a
-    tighter tolerance, over its slope. It is rough where a law turns sharply, as rolling friction at full deflection,
-    and where a limiter chatters. Not finite: it is not known."""
+def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> tuple[float, float]:
+    """The place of a flip, the last point before it, and up to what share of its bandwidth it is known, between two
+    points: twice by what the multiplier changes at a tighter tolerance, over its slope. It is rough where a law turns
+    sharply, as rolling friction at full deflection. Not finite: it is not known."""
     stages = tracer.family(np.zeros(1, np.int64), np.array([last.place]))
     tight = multipliers(stages, last.cycle.orbits, TIGHTER * tracer.rtol)
-    multiplier = float(tight.slope[0] if stages.chatters else tight.local[0, 0].real)
     slope = (second.multiplier - first.multiplier) / (second.place - first.place)
-    rough = 2 * abs(multiplier - last.multiplier) / abs(slope)
-    return float(rough)
+    return last.place, float(2 * abs(tight.local[0, 0].real - last.multiplier) / abs(slope))
+
+
+def _smoothed(tracer: Tracer, flip: Point) -> tuple[float, float]:
+    """The place of a flip, and up to what share of its bandwidth it is known, from a curve through the multipliers of
+    orbits about a first guess: where a limiter chatters these scatter, and may pass -1 several times. Not finite: it is
+    not known."""
+    found: list[Point] = []
+    for way in (-1.0, 1.0):
+        near: Point | None = flip
+        for away in way * np.linspace(0, np.log(ABOUT), SPREAD // 2 + 1)[1:]:
+            target = flip.vector + np.array([away, 0.0, 0.0])
+            near = near and tracer.solve(near, target, np.array([1.0, 0.0, 0.0]))
+            found += [near] if near else []
+    if len(found) < ENOUGH:
+        return np.nan, np.nan
+    places = np.array([point.place for point in found])
+    place, uncertainty = _crossing(places, np.array([-point.multiplier - 1 for point in found]))
+    return place, float(max(uncertainty, abs(place - flip.place)))
+
+
+def _crossing(places: np.ndarray, excess: np.ndarray) -> tuple[float, float]:
+    """The last place at which a cubic through what scatters about it passes 0, and twice how far this scattering may
+    move it; not finite where there is none."""
+    curve = np.polynomial.Polynomial.fit(places, excess, 3)
+    roots = curve.roots()
+    real = roots.real[np.abs(roots.imag) < 1e-9 * np.ptp(places)]
+    inside = real[(real >= places.min()) & (real <= places.max())]
+    if not inside.size:
+        return np.nan, np.nan
+    place = float(inside.max())
+    scatter = float(np.sqrt(np.sum((excess - curve(places)) ** 2) / max(len(places) - 4, 1)))
+    return place, 2 * scatter / abs(float(curve.deriv()(place)))
 
 
 def _kind(first: Point, second: Point) -> Bifurcation:
