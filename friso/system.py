@@ -1,5 +1,6 @@
 """What differs between operating systems: Linux, macOS and Windows."""
 
+import errno
 import math
 import os
 import re
@@ -38,7 +39,6 @@ def _paths_of(error: OSError) -> list[str]:
 if sys.platform == "win32":
     import _thread
     import ctypes
-    import errno
 
     PATIENCE = 2.0
     """How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
@@ -81,19 +81,25 @@ if sys.platform == "win32":
         while True:
             try:
                 return use()
-            except PermissionError as error:
-                if time.monotonic() > end or not _may_be_held(error):
-                    raise
+            except OSError as error:
+                if time.monotonic() > end or not (_may_be_held(error) or error.errno == errno.ENOTEMPTY):
+                    raise  # a file that was deleted while another program reads it stays in its folder for as long
                 time.sleep(0.05)
 
-    def _may_be_held(error: PermissionError) -> bool:
+    def _may_be_held(error: OSError) -> bool:
         """Whether what is refused is there: Windows gives the same reason where another program holds it open."""
-        return any(os.path.exists(path) for path in _paths_of(error))
+        return isinstance(error, PermissionError) and any(os.path.exists(path) for path in _paths_of(error))
 
     def check_free(path: Path) -> None:
-        """Raises PermissionError where a file cannot be replaced, since another program holds it open."""
+        """Raises OSError where a file cannot be replaced, since it is read-only, or another program holds it open."""
+        if not os.access(path, os.W_OK):
+            raise OSError(errno.EROFS, "it is read-only", str(path))
         with suppress(FileExistsError):
             once_free(partial(path.rename, path))  # which changes nothing, but takes the same rights
+
+    def name_new_file(draft: Path, path: Path) -> None:
+        """Give a file a name and place where there is nothing. Raises OSError, FileExistsError where there is."""
+        once_free(partial(draft.rename, path))
 
     def rename_folder(folder: Path, path: Path) -> None:
         """Give a folder another's name and place, in which no file is open. Raises OSError, where there is something
@@ -133,7 +139,7 @@ if sys.platform == "win32":
     def cause_of(error: OSError) -> str:
         """Why a file or a folder could not be used. Of a path that is too long Windows says that it is not there."""
         cause, path = error.strerror or str(error), path_of(error)
-        if isinstance(error, PermissionError) and _may_be_held(error):
+        if _may_be_held(error):
             return f"{cause}; it may be open in another program"
         length = len(os.path.abspath(path)) if path else 0
         if length <= _LONGEST or not isinstance(error, FileNotFoundError):
@@ -178,6 +184,15 @@ else:
 
     def check_free(path: Path) -> None:
         """Nothing: see `once_free`."""
+
+    def name_new_file(draft: Path, path: Path) -> None:
+        """Give a file a name and place where there is nothing. Raises OSError, FileExistsError where there is."""
+        try:
+            os.link(draft, path)
+        except OSError as error:  # or a disk without links
+            if os.path.lexists(path):
+                raise FileExistsError(errno.EEXIST, "it was not there before", str(path)) from error
+            draft.replace(path)
 
     def rename_folder(folder: Path, path: Path) -> None:
         """Give a folder another's name and place. Raises OSError, where there is something but an empty folder too."""
@@ -227,7 +242,9 @@ else:
 
 
 def open_file(path: Path, flags: int) -> int:
-    """The descriptor of a file that is opened, once no other program holds it. Raises OSError."""
+    """The descriptor of a file that is opened, once no other program holds it. Raises OSError, for a folder too."""
+    if path.is_dir():  # which Windows calls one that may not be read
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
     return once_free(partial(os.open, path, flags))
 
 

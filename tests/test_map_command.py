@@ -16,6 +16,7 @@ from inside import friso_inside
 from refusals import Refused, Wording
 from systems import posix
 
+import friso as friso_api
 from friso.studies.cells import USUAL
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
@@ -235,6 +236,28 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, 
     assert (tmp_path / "b.png").read_text() == "precious"
     assert friso_inside(tmp_path, "map", "b.zarr", "--overwrite").returncode == 0
     assert friso_inside(tmp_path, "map", "b.zarr").returncode == 0  # they are its own from then on
+    (tmp_path / "b.html").write_text("mine, under a name that was friso's")
+    assert friso_inside(tmp_path, "map", "b.zarr").returncode == 2
+
+
+def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
+) -> None:
+    """Nor is one replaced that a user puts beside a store that was filled from Python."""
+    small = {"joint.stroke": "0.2 mm, 1 mm"}
+    friso_api.sweep(RIG, small, out=tmp_path / "a.zarr")
+    (tmp_path / "a.html").write_text("precious")
+    assert friso_inside(tmp_path, "map", "a.zarr").returncode == 2
+    (tmp_path / "a.html").unlink()
+
+    def appears(*arguments: object) -> None:
+        (tmp_path / "a.html").write_text("precious")
+
+    monkeypatch.setattr("friso.answers.map_study.drawn_runs", appears)
+    done = friso_inside(tmp_path, "map", "a.zarr")
+    assert (done.returncode, "the runs are in a.zarr" in done.stderr) == (1, True)
+    assert {path.name for path in tmp_path.iterdir()} == {"a.zarr", "a.html"}
+    assert (tmp_path / "a.html").read_text() == "precious"
 
 
 def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:

@@ -18,6 +18,7 @@ from inside import friso_inside
 from refusals import Refused
 from systems import posix
 
+from friso.answers import drafts as drafts_module
 from friso.answers.drafts import DRAFTS, Drafts, made
 from friso.answers.output_folder import MARKER, UNFINISHED, OutputFolder, _check_writable, check_store_folder, write
 from friso.cli.app import command_line
@@ -99,7 +100,7 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(
 
 
 def test_an_answer_whose_files_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def full(drafts: Drafts) -> None:
+    def full(*arguments: object) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", "gains.html")
 
     monkeypatch.setattr(Drafts, "put_in_place", full)
@@ -171,6 +172,27 @@ def test_unfinished_work_is_kept_nowhere_else(tmp_path: Path) -> None:
         OutputFolder("reproduce", tmp_path / "out", False)
 
 
+@pytest.mark.parametrize("links", [True, False])
+def test_a_file_that_appears_while_others_are_drawn_stays(
+    tmp_path: Path, links: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only what was there, and may be replaced, is: not what others put there meanwhile, be it a link to nothing."""
+    out = tmp_path / "out"
+    place(out).write({"a.txt": "old"})
+
+    def appears(draft: Path) -> None:
+        draft.write_text("new")
+        (out / "b.txt").symlink_to("nothing") if links else (out / "b.txt").write_text("mine")
+
+    if not links:
+        monkeypatch.setattr(os, "link", failing(os.link, 2, OSError(errno.EOPNOTSUPP, "no links")))
+    with pytest.raises(FileExistsError, match=r"b\.txt"):
+        place(out).write({"a.txt": "new", "b.txt": appears})
+    assert ((out / "a.txt").read_text(), (out / "b.txt").is_symlink()) == ("old", links)
+    with pytest.raises(InputError, match="--overwrite"):  # found before
+        place(out).write({"b.txt": ""})
+
+
 def test_overwriting_does_not_make_the_folder_friso_s(tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     place(tmp_path, overwrite=True).write({"page.html": ""})
@@ -207,6 +229,11 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+def write_over(files: dict[Path, Content]) -> list[Path]:
+    """Write files in place of what is there."""
+    return write(files, [*files])
+
+
 def contents(folder: Path, **others: Content) -> dict[Path, Content]:
     return {folder / name: others.get(Path(name).stem, "new") for name in NAMES}
 
@@ -220,7 +247,7 @@ def test_an_error_while_a_file_is_written_leaves_all_as_it_was(folder: Path, num
 
     before = tree(folder)
     with pytest.raises(type(error)):
-        write(contents(folder, **{Path(NAMES[number]).stem: half}))
+        write_over(contents(folder, **{Path(NAMES[number]).stem: half}))
     assert tree(folder) == before
 
 
@@ -236,29 +263,33 @@ def failing(real: Callable[..., Any], after: int, error: BaseException) -> Calla
     return call
 
 
-@pytest.mark.parametrize(("method", "after"), [*(("replace", k) for k in (1, 2, 3)), ("mkdir", 1), ("mkdir", 2)])
+@pytest.mark.parametrize(
+    ("owner", "method", "after"),
+    [*((Path, method, k) for method in ("replace", "mkdir") for k in (1, 2)), (drafts_module, "name_new_file", 1)],
+)
 def test_an_error_while_files_get_their_names_is_undone(
-    folder: Path, method: str, after: int, monkeypatch: pytest.MonkeyPatch
+    folder: Path, owner: Any, method: str, after: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Three files that get a name, two folders to make."""
+    """Two files that are replaced, one that gets a name, two folders to make."""
     before = tree(folder)
     with Drafts() as drafts:
-        for path, content in contents(folder, a=None).items():
+        files = contents(folder, a=None)
+        for path, content in files.items():
             drafts.add(path, content)
-        monkeypatch.setattr(Path, method, failing(getattr(Path, method), after, OSError("no")))
+        monkeypatch.setattr(owner, method, failing(getattr(owner, method), after, OSError("no")))
         with pytest.raises(OSError, match="no"):
-            drafts.put_in_place()
+            drafts.put_in_place(files)
     assert tree(folder) == before
 
 
 def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -> None:
     """By the next that writes, when there is one."""
-    write({tmp_path / "out" / "a" / "page.html": ""})
+    write_over({tmp_path / "out" / "a" / "page.html": ""})
     left = [folder / f"{DRAFTS}left" for folder in (tmp_path, tmp_path / "out", tmp_path / "out" / "a")]
     for draft in left:
         draft.mkdir(mode=0o700)
         os.utime(draft, (0, 0))
-    write({tmp_path / "out" / "a" / "page.html": None})
+    write_over({tmp_path / "out" / "a" / "page.html": None})
     assert not any(draft.exists() for draft in left)
 
 
@@ -273,7 +304,7 @@ def test_what_others_may_have_put_there_is_no_draft(tmp_path: Path) -> None:
     (tmp_path / f"{DRAFTS}open").mkdir()
     (tmp_path / f"{DRAFTS}open").chmod(0o777)
     os.utime(tmp_path / f"{DRAFTS}open", (0, 0))
-    write({tmp_path / "page.html": ""})
+    write_over({tmp_path / "page.html": ""})
     assert (mine / "lock").read_text() == "precious"
     assert [*(tmp_path / f"{DRAFTS}open").iterdir()] == []
 
@@ -290,10 +321,10 @@ def test_a_name_always_has_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch)
         raise OSError(errno.EOPNOTSUPP, "no links")
 
     monkeypatch.setattr(Path, "replace", replace)
-    write(contents(folder))
-    assert seen == [["old", "old"], ["old", "old"], ["new", "old"], ["new", "new"]]
+    write_over(contents(folder))
+    assert seen == [["old", "old"], ["new", "old"]]
     monkeypatch.setattr(os, "link", no_links)
-    assert write(contents(folder)) == [folder / name for name in NAMES]
+    assert write_over(contents(folder)) == [folder / name for name in NAMES]
 
 
 def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
@@ -305,7 +336,7 @@ def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
     with FileLock(alive / "lock"):
         for draft in (left, alive):
             os.utime(draft, (0, 0))
-        write(contents(folder))
+        write_over(contents(folder))
     assert (left.exists(), alive.exists()) == (False, True)
 
 
@@ -324,7 +355,7 @@ def test_a_signal_while_files_get_their_names_waits(
     monkeypatch.setattr(Path, "replace", replace)
     before = signal.signal(number, lambda number, frame: seen.append(number))
     try:
-        write(contents(folder))
+        write_over(contents(folder))
     finally:
         signal.signal(number, before)
     assert seen == [number]
@@ -368,7 +399,7 @@ def _interrupted_at(number: int, work: Callable[[], object]) -> bool:
 
 
 def test_files_that_are_there_are_replaced(folder: Path) -> None:
-    assert write(contents(folder, a=None)) == [folder / name for name in NAMES[1:]]
+    assert write_over(contents(folder, a=None)) == [folder / name for name in NAMES[1:]]
     written = {name: content for name, content in tree(folder).items() if content is not None}
     assert written == dict.fromkeys(NAMES[1:], b"new")
 
@@ -377,7 +408,7 @@ def test_a_folder_in_the_way_is_not_moved(folder: Path) -> None:
     (folder / "a.txt").mkdir()
     before = tree(folder)
     with pytest.raises(IsADirectoryError):
-        write(contents(folder))
+        write_over(contents(folder))
     assert tree(folder) == before
 
 
@@ -385,7 +416,9 @@ def test_a_folder_in_the_way_is_not_moved(folder: Path) -> None:
 def test_a_command_that_fails_while_writing_leaves_nothing(
     command: str, stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
 ) -> None:
-    monkeypatch.setattr("friso.answers.drafts.Drafts.put_in_place", failing(lambda self: None, 1, OSError("disk full")))
+    monkeypatch.setattr(
+        "friso.answers.drafts.Drafts.put_in_place", failing(lambda *named: None, 1, OSError("disk full"))
+    )
     done = friso_inside(tmp_path, command, stage, "--out", "out")
     assert done.returncode == 1
     assert "disk full" in done.stderr

@@ -81,7 +81,8 @@ def killed(rng: random.Random, folder: Path) -> None:
         assert done.returncode in (0, 2 if name in ONE_FILE else 0), f"{name}: {done.stderr[-300:]}"
         _assert_as(_undisturbed(name), folder, name)
     else:
-        write({folder / "out" / "next.txt": "", folder / "next.txt": ""})
+        files = {folder / "out" / "next.txt": "", folder / "next.txt": ""}
+        write(files, files)
         _whole_or_nothing(name, folder, False)
 
 

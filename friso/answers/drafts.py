@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import ExitStack, suppress
 from functools import partial
 from itertools import count
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from friso.interrupts import hold_interrupts
 from friso.leftovers import locked_folder, remove_leftovers
-from friso.system import delete_file, once_free, replace_file
+from friso.system import delete_file, name_new_file, once_free, replace_file
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -60,24 +60,26 @@ class Drafts:
             draft.write_bytes(content.encode() if isinstance(content, str) else content)
         self.drafts.append((draft, path))
 
-    def put_in_place(self) -> None:
-        """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the drafts
-        are gone. A name always has a file, the earlier one or the new."""
+    def put_in_place(self, may_replace: Collection[Path] = ()) -> None:
+        """Give all drafts their names; only files of those paths that `may_replace` names give way. An error on the
+        way, and all is as it was before; Ctrl-C waits until the drafts are gone. A name always has a file, the earlier
+        one or the new. Raises FileExistsError where anything else is in the way by now, another OSError."""
         undo: list[Callable[[], object]] = []
         self.held.enter_context(hold_interrupts())
         try:
             for draft, path in self.drafts:
                 undo += [folder.rmdir for folder in made(path.parent)]
-                if os.path.lexists(path):
+                if path in may_replace and os.path.lexists(path):
                     spare = self._spare(path)
                     once_free(partial(_duplicate, path, spare))
                     undo.append(partial(replace_file, spare, path))
+                    if draft is None:
+                        delete_file(path)
+                    else:
+                        replace_file(draft, path)
                 elif draft is not None:
+                    name_new_file(draft, path)
                     undo.append(partial(delete_file, path))
-                if draft is not None:
-                    replace_file(draft, path)
-                elif os.path.lexists(path):
-                    delete_file(path)
         except BaseException:
             for step in reversed(undo):
                 with suppress(OSError):  # the rest is undone all the same

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.answers.inputs import Changes, axes_of, pairs_of, wrong
-from friso.answers.output_folder import check_file, check_store_folder, refuse_place
+from friso.answers.output_folder import check_file, check_store_folder, drafts_of, refuse_place, written
 from friso.errors import InputError, StoreError
 from friso.progress import Progress, silent
 from friso.quantities import quoted
@@ -204,29 +204,68 @@ def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> Non
     if store in exports:
         raise wrong("export", f"{store}, which is the store", "another name", "map.nc")
     check_store_folder(store)
-    claimed = _claimed(store)
-    for name in own_views(store):
-        check_file("--out", store.parent / name, overwrite, [store], is_own=name in claimed)
+    own = _own_views(store)
+    for view in _views(store):
+        check_file("--out", view, overwrite, [store], is_own=view in own)
     for path in exports:
         check_file("--export", path, overwrite, [store])
 
 
-def own_views(store: Path) -> list[str]:
-    """The names of figure and page beside a store, which it notes as its own once they are about to be written: the
-    next run may replace them."""
+def write_beside(files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress) -> list[Path]:
+    """Write files beside a store, all of them or none; their paths. Of what is there by then, only the figure and the
+    page that the store wrote give way, unless `overwrite`; that it writes these, it notes first.
+
+    Raises StoreError where another process holds the store, OSError where a file cannot be written.
+    """
+    from friso.studies.metadata import annotate_metadata
+    from friso.studies.store_folder import lock_store
+
+    with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE):
+        own, views = _own_views(store), _views(store)
+        digests = {
+            path.name: sorted({str(_digest(file)) for file in ([draft, path] if path in own else [draft])})
+            for draft, path in drafts.drafts
+            if draft is not None and path in views
+        }
+        annotate_metadata(store, notes={"views": digests})
+        drafts.put_in_place([*files] if overwrite else own)
+    return written(files)
+
+
+PATIENCE = 10.0
+"""How long [s] another process is waited for that is noting something in a store."""
+
+
+def _views(store: Path) -> list[Path]:
+    """The figure in all formats and the page beside a store."""
     from friso.views.map.page import FORMS
 
-    return [_path_beside(store, form).name for form in FORMS]
+    return [_path_beside(store, form) for form in FORMS]
 
 
-def _claimed(store: Path) -> list[str]:
-    """The files beside a store that are its own; none where that is not known."""
+def _own_views(store: Path) -> list[Path]:
+    """Those among the figure and the page beside a store that are as it wrote them, by the digests that it notes."""
     from friso.studies.metadata import checked_metadata
 
     try:
-        return list(checked_metadata(store).notes.get("views", []))
+        noted = checked_metadata(store).notes.get("views")
     except StoreError:
         return []
+    digests = noted if isinstance(noted, dict) else {}
+    return [view for view in _views(store) if _digest(view) in (digests.get(view.name) or [])]
+
+
+def _digest(view: Path) -> str | None:
+    from friso.studies.store_files import digest_of
+
+    try:
+        return digest_of(view, _MOST_OF_A_VIEW)
+    except PermissionError:
+        return None
+
+
+_MOST_OF_A_VIEW = 1 << 30
+"""Bytes of a page at most that is known again: those of ten million cells have fewer."""
 
 
 def _path_beside(store: Path, form: str) -> Path:

@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -51,7 +52,8 @@ class OutputFolder:
             )
         _check_writable(folder)
         maker, self.files = marked(folder)
-        self.is_own = maker == command or not _entries(folder)
+        self.is_marked = maker == command
+        self.is_own = self.is_marked or not _entries(folder)
         if not (self.is_own or overwrite):
             raise _of_others(folder, maker, f"one that friso {command} made, or {OVERWRITE}, {REPLACES}")
         own = [name for name in self.files if self.is_own]
@@ -66,9 +68,9 @@ class OutputFolder:
 
     def check(self, names: Iterable[str]) -> None:
         """Raises InputError where a file of such a name may not be written."""
-        existing = [name for name in names if (self.folder / name).exists()]
+        existing = [name for name in names if os.path.lexists(self.folder / name)]
         for name in existing:
-            if any(file.exists() and (self.folder / name).samefile(file) for file in self.inputs):
+            if any(_are_one(self.folder / name, file) for file in self.inputs):
                 actual = f"{self.folder}, where {name} is read"
                 raise InputError("--out", actual, "another folder", _beside(self.folder))
         others = [name for name in existing if name not in self.files]
@@ -93,10 +95,12 @@ class OutputFolder:
         Raises InputError where one may not be written, OSError where one cannot.
         """
         self.check(files)
-        others = [name for name in files if name not in self.files and (self.folder / name).exists()]
+        others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
         contents = {self.folder / name: content for name, content in files.items()}
         marker = {self.folder / MARKER: self._marker(files)} if self.is_own else {}
-        write({**contents, **(beside or {}), **marker}, progress)
+        own = contents if self.overwrite else [self.folder / name for name in self.files]
+        own = [*own, *(beside or ()), *(marker if self.is_marked else ())]
+        write({**contents, **(beside or {}), **marker}, own, progress)
         if others:
             LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
         return [path for path, content in contents.items() if content is not None]
@@ -134,12 +138,14 @@ def check_file(
     refuse_place(option, path)
     example = f"{path.stem}-2{path.suffix}"
     example = f"{option} {example}" if option.startswith("--") else example
-    if any(file and file.exists() and path.exists() and path.samefile(file) for file in inputs):
+    if any(file and _are_one(path, file) for file in inputs):
         raise InputError(option, f"{path}, which is read", "another file; nothing was overwritten", example)
     if os.path.lexists(path) and not ((is_own or overwrite) and path.is_file()):
         expected = f"a new file, or {OVERWRITE}; nothing was overwritten"
         raise InputError(option, f"{path}, which already exists", expected, example)
     try:
+        if path.exists():
+            check_free(path)
         _try_draft(path)
     except OSError as error:
         raise _unwritable(option, path, error) from None
@@ -150,7 +156,7 @@ def write_file(option: str, path: Path, content: Content, overwrite: bool) -> No
     check_file(option, path, overwrite)
     try:
         path.parent.stat()  # a folder that is missing is a mistake, not one to make
-        write({path: content})
+        write({path: content}, [path] if overwrite else ())
     except OSError as error:
         raise _unwritable(option, path, error) from None
 
@@ -167,14 +173,32 @@ def output_folder(
     return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 
 
-def write(files: Mapping[Path, Content], progress: Progress = silent) -> list[Path]:
-    """Write files, all of them or none, at any moment; their paths. Raises OSError where one cannot be written."""
+def write(files: Mapping[Path, Content], may_replace: Collection[Path], progress: Progress = silent) -> list[Path]:
+    """Write files, all of them or none, at any moment; their paths. Those that `may_replace` does not name have to be
+    new. Raises FileExistsError where one is not, another OSError where it cannot be written."""
+    with drafts_of(files, progress) as drafts:
+        drafts.put_in_place(may_replace)
+    return written(files)
+
+
+@contextmanager
+def drafts_of(files: Mapping[Path, Content], progress: Progress = silent) -> Iterator[Drafts]:
+    """The drafts of some files. Raises OSError."""
     with Drafts() as drafts:
         for number, (path, content) in enumerate(files.items()):
             progress(number, len(files), "files")
             drafts.add(path, content)
-        drafts.put_in_place()
+        yield drafts
+
+
+def written(files: Mapping[Path, Content]) -> list[Path]:
+    """The files that are there once some are written: one without content is deleted."""
     return [path for path, content in files.items() if content is not None]
+
+
+def _are_one(path: Path, other: Path) -> bool:
+    """Whether two paths lead to the same file."""
+    return path.exists() and other.exists() and path.samefile(other)
 
 
 def marker(command: str, names: Iterable[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,6 @@ from friso.answers.map_study import (
     coloured_by,
     drawn_runs,
     export_files,
-    own_views,
     place_of_store,
     refuse_overwriting,
     stored_study,
@@ -45,8 +44,8 @@ if TYPE_CHECKING:
     from friso.views.drawing.figure import Figure
     from friso.views.files import Content, Files
 
-FileKeeper = Callable[[Mapping[Path, "Content"]], object]
-"""What is done with files by their paths."""
+FileKeeper = Callable[[Mapping[Path, "Content"], Collection[Path]], object]
+"""What is done with files by their paths, of which some may be replaced."""
 
 LARGE = 10_000_000
 """Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
@@ -193,7 +192,8 @@ def sweep(
     yes : bool
         Whether a study of more than ten million cells is meant.
     keep : callable, optional
-        Called with the exports by path; default: they are written, all of them or none.
+        Called with the exports by path, and those of them that may be replaced; default: they are written, all of them
+        or none.
     progress : Progress
         Called as cells are done.
 
@@ -239,7 +239,7 @@ def sweep(
             refuse_overwriting(store, exports, overwrite)
             runs = _filled(study, store, crew, share, overwrite, metric, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
-    keep(export_files(held, exports))
+    keep(export_files(held, exports), exports if overwrite else ())
     return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
 
 
@@ -313,7 +313,6 @@ def _filled(
         with Store.opened(store, study, overwrite) as opened:
             opened.note(metric=opened.notes.get("metric", metric))
             runs = fill(opened, crew, share, counted)
-            opened.note(views=own_views(store))
             return runs
     except (KeyboardInterrupt, OSError, RuntimeError):
         if store.exists():

@@ -59,13 +59,13 @@ def ask(
     show(answer, files, as_json, details, unwritten)
 
 
-def tried(write: Callable[[], list[Path]]) -> tuple[list[Path], str]:
+def tried(write: Callable[[], list[Path]], nothing: str = "no file was written") -> tuple[list[Path], str]:
     """The files that `write` writes, and why it could not, "" where it could: what was computed is shown all the
-    same."""
+    same. `nothing` says what is missing then."""
     try:
         return write(), ""
     except OSError as error:
-        return [], f"no file was written: {cause_of(error)}: {path_of(error)}".removesuffix(": ")
+        return [], f"{nothing}: {cause_of(error)}: {path_of(error)}".removesuffix(": ")
 
 
 def show(

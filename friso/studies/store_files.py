@@ -28,11 +28,11 @@ def stored(file: Path) -> bytes:
     return content_of(file, MOST_BYTES, follow=False)
 
 
-def digest_of(file: Path) -> str | None:
-    """The SHA-256 of a file of a store; None where there is none, or no file. Raises PermissionError where it cannot
-    be read, which does not tell of damage."""
+def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
+    """The SHA-256 of a file of a store, or beside it; None where there is none, no file, or one of more than `most`
+    bytes. Raises PermissionError where it cannot be read, which does not tell of damage."""
     try:
-        return hashlib.sha256(stored(file)).hexdigest()
+        return hashlib.sha256(content_of(file, most, follow=False)).hexdigest()
     except PermissionError:
         raise
     except OSError:

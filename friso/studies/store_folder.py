@@ -105,11 +105,12 @@ def remove_partial_files(path: Path) -> None:
 
 
 @contextmanager
-def lock_store(path: Path) -> Iterator[FileLock]:
-    """Keep other processes out of a store; the lock. Raises StoreError if one is in."""
+def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
+    """Keep other processes out of a store; the lock. Raises StoreError if one is in, and still so after `patience`
+    [s]."""
     lock = FileLock(path / LOCK)
     try:
-        lock.acquire(timeout=0)
+        lock.acquire(timeout=patience)
     except Timeout:
         expected = "to wait, or another --out"
         raise StoreError("", "a store that another friso is writing to", expected, origin=str(path)) from None

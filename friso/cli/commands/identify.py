@@ -114,7 +114,7 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
     if any(place.parent == folder for place in texts):
         target.write({}, beside=texts)  # so that the folder is known for its own next time
     else:
-        write(texts)
+        write(texts, [*filter(Path.is_file, texts)])  # mappings too, as they could be read
 
 
 def _command(options: Sequence[str]) -> str:

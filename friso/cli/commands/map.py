@@ -66,7 +66,7 @@ def map_cells(
     """
     if check:
         return _check(source, as_json)
-    from friso.answers.output_folder import write
+    from friso.answers.map_study import write_beside
     from friso.answers.sweep import sweep
     from friso.axis import speak_of
 
@@ -83,9 +83,13 @@ def map_cells(
     }
     with ProgressBar() as progress, named_as_options(options):
         # The exports are written together with the figure and the page, all of them or none.
-        answer = sweep(source, **options, keep=lambda exports: None, progress=progress)
+        answer = sweep(source, **options, keep=lambda exports, replaced: None, progress=progress)
         speak_of(answer.axis_kind)
-        files, unwritten = tried(lambda: write(answer.files_beside(progress), progress))
+        place = answer.store or source
+        files, unwritten = tried(
+            lambda: write_beside(answer.files_beside(progress), place, overwrite, progress),
+            f"the runs are in {place}, but no file was written beside it",
+        )
     show(answer, files, as_json, unwritten=unwritten)
 
 
