@@ -7,16 +7,18 @@ from functools import cache
 import numpy as np
 import pytest
 from beyond_flip import CREEPING, LIGHT
+from patched import patched
 from variants import VARIANTS
 
 import friso
 import friso.hunting.attractors
+import friso.hunting.cycle.hunting
 from friso.engine.allowance import allowance
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import hunting
+from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.margin import margin, search_bandwidths
 from friso.hunting.motions import Motions
@@ -526,7 +528,11 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     )
     result = hunting(stage)
     assert result.grows
-    assert not result.certain
+    assert (result.certain, result.reason) == (False, GROWS)
+    hidden = {"attractors": lambda *_, **__: result.surveyed, "at_lower_gains": lambda _: "unknown"}
+    with patched({friso.hunting.cycle.hunting: hidden}):
+        unknown = hunting(stage)
+    assert (unknown.grows, unknown.certain, unknown.reason) == (True, False, MAY_GROW)
     position = friso.simulate(stage, sample_time=0.1).position.to_numpy()
     swings = np.abs(position[:30000]).reshape(30, -1).max(axis=1)  # of 100 s each
     assert (np.diff(swings[3:]) > 0).all()

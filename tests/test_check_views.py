@@ -34,6 +34,9 @@ from refusals import Wording
 from snapshots import Snapshots
 
 from friso.hunting import Judgement, Kick, Margin
+from friso.hunting.criteria import Verdict
+from friso.hunting.cycle.hunting import Swing
+from friso.hunting.loop import LowerGains
 from friso.hunting.margin import BandwidthWindow
 from friso.hunting.outward import AttractionEnd
 from friso.hunting.verdict import BANDWIDTHS, LOWER, STARTS
@@ -281,6 +284,15 @@ def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None
     return verdict_sentence(ShownCase("given", "As given", "#000000", case), cases or {"given": case})
 
 
+def growing(lower_gains: LowerGains, verdict: Verdict) -> Judgement:
+    """A stage whose force is limited without anti-windup; what attracts it, if anything does, was observed alone."""
+    if verdict == "settles":
+        return settles(hunting=replace(fake_hunting(), lower_gains=lower_gains))
+    swings = (Swing(8.9, 52.0, regular=True, swings=2),)
+    found = replace(fake_hunting(reason="not closed", certain=False), observed=swings, lower_gains=lower_gains)
+    return hunts(verdict=verdict, hunting=found, displacement=None, push=None, moves=None, observed=True)
+
+
 def said_by_name() -> dict[str, str]:
     """What is said of stages that differ in one respect."""
     free = {"free": replace(fake_case(), judgement=settles())}
@@ -302,6 +314,11 @@ def said_by_name() -> dict[str, str]:
         "hunts, observed": sentence(seen),
         "bistable": sentence(hunts(verdict="bistable")),
         "bistable, no kick starts it": sentence(hunts(verdict="bistable", displacement=none, push=none, moves=None)),
+        "hunts, grows": sentence(growing("unstable", "hunts")),
+        "hunts, may grow": sentence(growing("unknown", "hunts")),
+        "bistable, grows": sentence(growing("unstable", "bistable")),
+        "settles, may run away": sentence(growing("unstable", "settles")),
+        "settles, not known whether it may": sentence(growing("unknown", "settles")),
         "transient": sentence(transient, peak_to_peak=6.9e-4, period=1.33),
         "transient, at rest": sentence(still, peak_to_peak=1e-7),
         "transient, longer run given up": sentence(replace(still, followed=None), peak_to_peak=1e-7),
@@ -333,6 +350,8 @@ def test_sentences(snapshots: Snapshots) -> None:
         ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.750 Hz"]),
         ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
+        ("hunts, grows", ["was stopped", "may run away", "controller.anti_windup"]),
+        ("settles, not known whether it may", ["not known", "controller.anti_windup"]),
     ],
 )
 def test_numbers_in_sentences(name: str, facts: list[str]) -> None:

@@ -17,9 +17,24 @@ from friso.engine.arrays import Status
 from friso.hunting import basin, verdict
 from friso.hunting.attractors import Attractors, Target
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt
-from friso.hunting.margin import NOT_SOUGHT, SearchedBandwidths
+from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.verdict import BANDWIDTHS, LEFT_OVER, LOWER, STARTS, SWINGS_ON, UNFOLLOWED, Judgement, judge
+from friso.hunting.outward import AttractionEnd
+from friso.hunting.verdict import (
+    BANDWIDTHS,
+    BY_CHANCE,
+    CHANGED,
+    LEFT_OVER,
+    LOWER,
+    RUNS_AWAY,
+    STARTS,
+    SWINGS_ON,
+    UNCHECKED,
+    UNFOLLOWED,
+    Judgement,
+    judge,
+)
+from friso.stage import Stage
 
 STAGE = VARIANTS["rigid"]
 TARGET = Target(1e-3, 1.6, 100.0, 25.0)
@@ -78,23 +93,28 @@ def judged(
     settling: float = np.nan,
     ends: bool = False,
     completed: bool = True,
+    other: tuple[bool, bool] | None = None,
     swing: float = 0.0,
     complete: bool = True,
     starts: tuple[Kick, Kick, MoveShare | None] = (HUNTING, HUNTING, None),
     sought: Callable[[], SearchedBandwidths] = lambda: NOT_SOUGHT,
+    stage: Stage = STAGE,
+    certain: bool = True,
 ) -> Judgement:
-    """The verdict on a stage that something attracts, where its own motion ends so."""
-    attraction = replace(fake_hunting(fake_cycle()), surveyed=surveyed(complete))
+    """The verdict on a stage that something attracts, where its own motion ends so, and is completed or not; and with
+    the last of the other masses."""
+    attraction = replace(fake_hunting(fake_cycle(), certain=certain), surveyed=surveyed(complete))
+    runs = np.array([(ends, completed)] * (len(CHANGED) - 1) + [other or (ends, completed)])
     made_up = {
         "hunting": lambda *_, **__: attraction,
-        "ends_in": lambda *_: (np.array([ends]), np.array([completed]), np.array([swing])),
+        "ends_in": lambda *_: (*runs.T, np.full(len(runs), swing)),
         "search_bandwidths": lambda *_: sought(),
         "displacements_that_hunt": lambda *_: starts[0],
         "pushes_that_hunt": lambda *_: starts[1],
         "moves_that_hunt": lambda *_: starts[2],
     }
     with patched({verdict: made_up}):
-        return judge(STAGE, run_to(settling), 1e-6)
+        return judge(stage, run_to(settling), 1e-6)
 
 
 @pytest.mark.parametrize(
@@ -105,6 +125,8 @@ def judged(
         ({"complete": False, "settling": 0.5}, ""),
         ({"swing": 2e-4}, SWINGS_ON),
         ({"swing": 1e-5, "settling": 0.5}, SWINGS_ON),
+        ({"other": (True, True)}, BY_CHANCE),
+        ({"other": (False, False)}, UNCHECKED),
     ],
 )
 def test_a_motion_that_may_end_in_another_swing_does_not_surely_settle(run: dict[str, Any], doubt: str) -> None:
@@ -121,6 +143,29 @@ def test_a_longer_run_that_is_not_completed_gives_no_verdict() -> None:
 def test_what_ends_in_the_hunting_that_was_found_hunts_whatever_else_there_is() -> None:
     judgement = judged(ends=True, swing=1e-3, complete=False)
     assert (judgement.verdict, judgement.hunting.certain) == ("hunts", True)
+    judgement = judged(ends=True, swing=1e-2)
+    assert (judgement.verdict, judgement.hunting.certain, judgement.hunting.reason) == ("hunts", False, RUNS_AWAY)
+
+
+@pytest.mark.parametrize(
+    ("certain", "changes", "sure"),
+    [
+        (True, {}, True),
+        (False, {}, False),
+        (True, {"controller.force_limit": "14 N", "controller.anti_windup": "clamp"}, True),
+        (True, {"controller.force_limit": "14 N", "controller.anti_windup": "none"}, False),
+    ],
+)
+def test_no_edge_is_more_certain_than_the_verdict_or_than_large_motions_are_bounded_there(
+    certain: bool, changes: dict[str, Any], sure: bool
+) -> None:
+    """The viscous friction of this stage is too small to bound them without anti-windup."""
+    lower, again = AttractionEnd(0.5, 0.4, True), AttractionEnd(4.0, 3.9, True)
+    found = SearchedBandwidths(Margin(2.0, 16.0, True, 2.1), (BandwidthWindow(again, None),), lower)
+    judgement = judged(sought=lambda: found, stage=STAGE.replace(changes), certain=certain)
+    edges = judgement.margin, judgement.lower, judgement.windows[0].low
+    assert [edge is not None and edge.certain for edge in edges] == [sure] * 3
+    assert judgement.windows[0].high is None
 
 
 @pytest.mark.parametrize(

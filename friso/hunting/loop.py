@@ -16,6 +16,7 @@ from friso.stage.standstill import NO_SETTINGS
 from friso.stage.transmission import BACKLASH, MOTOR_MASS, MOTOR_STATES
 
 LoopState = Literal["sticks", "slides"]
+LowerGains = Literal["stable", "unstable", "unknown"]
 
 STEP = 1e-6
 """Share of the magnitude of a state by which it is moved to take derivatives."""
@@ -32,12 +33,12 @@ LOWER = np.geomspace(1e-6, 1.0, 37)
 
 
 @np.errstate(all="ignore")
-def stable_at_lower_gains(flat: Mapping[str, Any]) -> bool:
+def at_lower_gains(flat: Mapping[str, Any]) -> LowerGains:
     """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones, by the
-    viscous friction of the direction in which that is less.
+    viscous friction of the direction in which that is less, or unstable at one of them.
 
-    False, too, where that is not known: where the controller does not tell which keys its gain is, or acts otherwise
-    about the reference than far from it, which the linear loop at rest does not show.
+    That is unknown where the controller does not tell which keys its gain is, or acts otherwise about the reference
+    than far from it, which the linear loop at rest does not show.
 
     A force limit acts as a lower gain, the lower the larger the motion. Without anti-windup the largest motions go by
     the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
@@ -47,9 +48,12 @@ def stable_at_lower_gains(flat: Mapping[str, Any]) -> bool:
     gains = {controller.key(name): flat[controller.key(name)] * LOWER for name in controller.loop_gain}
     settings = form.controller.settings if form.controller else NO_SETTINGS
     if not gains or settings.deadband or settings.dead_zone or settings.gains or settings.push:
-        return False
+        return "unknown"
     stages = Ensemble.held({**flat, **gains}, len(LOWER), form=form)
-    return bool((_growths(stages, np.min)["slides"] <= GROWTH * stages.number("rate")).all())
+    growths, limit = _growths(stages, np.min)["slides"], GROWTH * stages.number("rate")
+    if np.any(growths > limit):
+        return "unstable"
+    return "stable" if np.all(growths <= limit) else "unknown"
 
 
 def unstable(stage: Stage) -> tuple[LoopState, ...]:

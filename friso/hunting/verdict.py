@@ -35,8 +35,8 @@ from friso.hunting.cycle.hunting import (
     Hunting,
     Swing,
     cannot_hunt,
+    far_beyond_a_limit,
     hunting,
-    large_swings_grow,
     why_not,
 )
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
@@ -84,6 +84,9 @@ RUNS_AWAY = "this motion swings much farther at its end than what was found to a
 
 BY_CHANCE = "a change of its mass by a hundred-thousandth, or rounding, decides whether this motion ends in hunting"
 """Why it is not certain how a motion ends that ends otherwise with some of these masses."""
+
+UNCHECKED = "runs with hardly different masses, which show whether chance decides how this motion ends, were given up"
+"""The same where it is not known whether it does."""
 
 ROOM = 1 << 14
 """Room for turning points of a motion that is followed for long: one that needs more is run again."""
@@ -175,12 +178,13 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         sought, given_up = _sought(stage, attraction, work - spent.used)
     if sought.contradicts:
         attraction = replace(attraction, certain=False, reason=REACHED)
+    sought = _as_sure(stage, sought, attraction)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
     return Judgement(
         word,
         attraction,
-        margin=_as_sure(stage, sought.margin, attraction),
+        margin=sought.margin,
         windows=sought.windows,
         settled_after=after,
         followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
@@ -204,18 +208,19 @@ def _with_a_target(
             return Judgement("failed", attraction)
         within = float(motions.settling[0])
         doubt = "" if own.ends else _restless(stage, attraction, own.swing, within)
-        doubt = BY_CHANCE if own.by_chance else doubt
+        doubt = own.doubt or doubt
         if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
             doubt = RUNS_AWAY
         begin(STARTS)  # what swings less than a growing swing at its end may grow as well
         starts, started = ((None, None, None), ()) if attraction.grows else _starts(stage, target, KICKS * work)
     begin(BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
+    sought = _as_sure(stage, sought, attraction)
     return Judgement(
         verdicts(np.ones(1, bool), np.ones(1, bool), np.array([own.ends]), np.zeros(1, bool))[0],
         replace(attraction, certain=False, reason=doubt) if doubt else attraction,
         *starts,
-        _as_sure(stage, sought.margin, attraction),
+        sought.margin,
         sought.windows,
         sought.lower,
         None if own.ends or not np.isfinite(within) else within,
@@ -227,12 +232,12 @@ def _with_a_target(
 @dataclass(frozen=True)
 class OwnMotion:
     """Where a stage's own motion ends: whether in what attracts it, whether its run was completed, how far it swings at
-    the end, peak to peak [m], and whether a mass that is hardly another turns it."""
+    the end, peak to peak [m], and what makes that uncertain, "" if nothing does: a mass that is hardly another may."""
 
     ends: bool
     completed: bool
     swing: float
-    by_chance: bool = False
+    doubt: str = ""
 
 
 def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
@@ -241,8 +246,9 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     flat = stage.flat()
     changed = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
     ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target)
-    own = OwnMotion(ends[0], completed[0], float(swing[0]), bool(np.any(ends[completed] != ends[0])))
-    if own.ends or own.by_chance or not own.completed or own.swing <= _resting(flat)[0]:
+    doubt = BY_CHANCE if np.any(ends[completed] != ends[0]) else "" if completed.all() else UNCHECKED
+    own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
+    if own.ends or own.doubt or not own.completed or own.swing <= _resting(flat)[0]:
         return own
     longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
     try:
@@ -306,13 +312,25 @@ def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBan
     return sought, (left,) if search.exhausted else ()
 
 
-def _as_sure(stage: Stage, edge: Margin | None, attraction: Hunting) -> Margin | None:
-    """An edge is not more certain than the verdict, nor certain where the stage may run away beyond it."""
-    if edge is None or not edge.certain:
-        return edge
-    beyond = faster(stage.flat(), np.array([DISTANCE * edge.quiet]))
-    certain = attraction.certain and not large_swings_grow(Ensemble.held(beyond, 1))
-    return replace(edge, certain=certain)
+def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> SearchedBandwidths:
+    """The same, no edge more certain than the verdict, nor certain where the stage may run away beyond it."""
+
+    def sure(end: AttractionEnd) -> bool:
+        if not (end.certain and attraction.certain):
+            return False
+        beyond = end.outside * (DISTANCE if end.outside > end.inside else 1 / DISTANCE)
+        return far_beyond_a_limit(Ensemble.held(faster(stage.flat(), np.array([beyond])), 1)) == "stable"
+
+    def as_sure(end: AttractionEnd | None) -> AttractionEnd | None:
+        return end and replace(end, certain=sure(end))
+
+    edge = sought.margin
+    return replace(
+        sought,
+        margin=edge and replace(edge, certain=sure(edge.end)),
+        windows=tuple(BandwidthWindow(as_sure(window.low), as_sure(window.high)) for window in sought.windows),
+        lower=as_sure(sought.lower),
+    )
 
 
 def _keeps_moving(flat: Mapping[str, Any]) -> bool:

@@ -20,7 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.loop import stable_at_lower_gains
+from friso.hunting.loop import LowerGains, at_lower_gains
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
 
@@ -62,8 +62,11 @@ REACHED = "a cycle that attracts at another bandwidth could be followed to this 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Why cycles of a stage are not searched that may hunt all the same."""
 
-GROWS = "with this force limit and no anti-windup large swings grow without bound: a size is where a run was stopped"
-"""The same where what was observed may be such a swing."""
+GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
+"""The same where what was observed may be such a swing, as the loop is unstable at lower gains."""
+
+MAY_GROW = "without anti-windup it is not known whether large swings grow: a size is where a run was stopped"
+"""The same where it is not known whether it is."""
 
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
@@ -133,9 +136,9 @@ class Hunting:
     none, or why it is not `certain` what attracts (if simulations that had to decide failed or were stopped); the
     return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
     `observed` and are none of the cycles; what motions end in that do not come to rest, the `target` (None where
-    nothing attracts); all of this as it was `surveyed`; and whether large motions may grow without bound, and the
-    stage so `runs_away`: an observed swing may then be one that grows, its size only that at which its run was
-    stopped."""
+    nothing attracts); all of this as it was `surveyed`; and the loop as motions far beyond a force limit without
+    anti-windup see it, at `lower_gains`: unless it is stable there, large motions may run away, and an observed swing
+    may be one that grows, its size only that at which its run was stopped."""
 
     cycles: tuple[Cycle, ...]
     reason: str
@@ -144,7 +147,7 @@ class Hunting:
     observed: tuple[Swing, ...] = ()
     target: Target | None = None
     surveyed: Attractors | None = None
-    runs_away: bool = False
+    lower_gains: LowerGains = "stable"
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
@@ -154,7 +157,7 @@ class Hunting:
     @property
     def grows(self) -> bool:
         """Whether what attracts was observed, and may be a swing that grows without bound."""
-        return self.runs_away and bool(self.observed)
+        return self.lower_gains != "stable" and bool(self.observed)
 
     @property
     def possible(self) -> bool:
@@ -196,9 +199,10 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         survey = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in survey.motions if m.cycles is not None]
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
-    runs_away = large_swings_grow(stages)
-    grows = runs_away and any(m.cycles is None for m in survey.motions)
-    beyond = GROWS if grows else "" if survey.motions else _beyond_the_search(stages)
+    far = far_beyond_a_limit(stages)
+    unclosed = any(m.cycles is None for m in survey.motions)
+    grows = {"stable": "", "unstable": GROWS, "unknown": MAY_GROW}[far] if unclosed else ""
+    beyond = grows or ("" if survey.motions else _beyond_the_search(stages))
     certain = bool(survey.decided[0]) and not beyond
     doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
     reason = survey.families[0].reasons[0] if certain else doubt
@@ -212,19 +216,20 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         ),
         target=survey.target.of(0) if survey.motions else None,
         surveyed=survey,
-        runs_away=runs_away,
+        lower_gains=far,
     )
 
 
-def large_swings_grow(stages: Ensemble) -> bool:
-    """Whether swings far beyond a force limit without anti-windup may grow without bound, of the first stage."""
+def far_beyond_a_limit(stages: Ensemble) -> LowerGains:
+    """The loop of the first stage as swings far beyond a force limit without anti-windup see it: where it is unstable
+    they grow, where it is stable, or there is no such limit, they shrink."""
     controller = stages.structure.controller
-    return controller is not None and controller.anti_windup == "none" and not stable_at_lower_gains(stages.flat)
+    return at_lower_gains(stages.flat) if controller and controller.anti_windup == "none" else "stable"
 
 
 def _beyond_the_search(stages: Ensemble) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    if large_swings_grow(stages):
+    if far_beyond_a_limit(stages) != "stable":
         return "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
     if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
         return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"

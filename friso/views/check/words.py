@@ -163,9 +163,12 @@ def _doubts(case: Case) -> list[str]:
 
 
 def _running_away(case: Case) -> list[str]:
-    """That large motions may grow without bound, and what keeps them from it."""
-    says = "Large motions may run away, because the force limit has no anti-windup: set controller.anti_windup."
-    return [says] if case.judgement.hunting.runs_away else []
+    """That large motions may grow without bound, or that this is not known, and what keeps them from it."""
+    return {
+        "stable": [],
+        "unstable": ["Large motions may run away, as the force limit has no anti-windup: set controller.anti_windup."],
+        "unknown": ["Whether large motions run away is not known: the force limit has no controller.anti_windup."],
+    }[case.judgement.hunting.lower_gains]
 
 
 def _outlook(case: Case) -> list[str]:
