@@ -1,9 +1,11 @@
 """friso: friction-induced hunting of positioning stages, and the friction isolator that stops it."""
 
+import friso.early  # noqa: F401 (notes a signal that comes while the rest is imported)
+
+# isort: split
 import importlib
 from typing import TYPE_CHECKING, Any
 
-import friso.interrupts  # noqa: F401 (notes a signal that comes while the rest is imported)
 from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:

@@ -2,39 +2,50 @@
 
 Importing friso and its libraries takes up to a second, in which an exception is lost, or ends in a traceback out of a
 library that is half there. So a signal raises KeyboardInterrupt only where no import is under way, and before the
-command begins it is noted. Nothing is installed where friso is used as a library.
+command begins it is noted (`friso.early`). Where that does not end the command in time, the process is ended.
 """
 
 from __future__ import annotations
 
-import atexit
 import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 from typing import Any
 
-from friso.system import no_signal_later, signal_later
-
-SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
-"""The signals that end a command."""
+from friso import early
+from friso.early import SIGNALS
+from friso.system import no_signal_later, signal_later, signals_told
 
 _AGAIN = 0.02
 """After how long [s] it is looked again whether an import has ended."""
 
-_came: list[int] = []
-_raising = False
+PATIENCE = 10.0
+"""How long [s] after a signal a command may take to end."""
+
+_raising = _said = False
 _held = 0
 """Blocks in which signals wait for the end (`hold_interrupts`), one within another."""
+
+_whole = threading.RLock()
+"""Held in these blocks."""
 
 
 def came() -> int:
     """The signal that came first, 0 for none."""
-    return _came[0] if _came else 0
+    return early.came[0] if early.came else 0
+
+
+def last_word(number: int) -> str:
+    """How a command says what ended it, its last line."""
+    global _said
+    _said = True
+    return "interrupted" if number in (0, signal.SIGINT) else "terminated"
 
 
 @contextmanager
@@ -46,6 +57,8 @@ def raising() -> Iterator[None]:
         yield
         return
     before, ignored = _install(), sys.unraisablehook
+    if early.IS_COMMAND:
+        threading.Thread(target=_end_in_time, args=(signals_told(),), daemon=True).start()
     sys.unraisablehook = partial(_lost, ignored)
     _raising = True
     try:
@@ -55,9 +68,9 @@ def raising() -> Iterator[None]:
     finally:
         _raising = False
         no_signal_later()
-        if not _IS_COMMAND:  # which ends now, and is not to be interrupted in that
+        if not early.IS_COMMAND:  # which ends now, and is not to be interrupted in that
             sys.unraisablehook = ignored
-            _came.clear()
+            early.came.clear()
             for number, handler in before.items():
                 signal.signal(number, handler)
 
@@ -74,7 +87,8 @@ def hold_interrupts() -> Iterator[None]:
     before = {number: signal.signal(number, lambda number, frame: arrived.append(number)) for number in SIGNALS}
     _held += 1
     try:
-        yield
+        with _whole:
+            yield
     finally:
         _held -= 1
         for number, handler in before.items():
@@ -92,21 +106,31 @@ def _install() -> dict[int, Any]:
     return {number: handler for number, handler in before.items() if handler is not None}
 
 
-def _ignore() -> None:
-    """Ignore the signals from now on: when Python takes its handlers away they would end a command that is done."""
-    for number in SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
-
-
 def _arrived(number: int, frame: FrameType | None) -> None:
     if number in SIGNALS:
-        _came.append(number)
+        early.came.append(number)
     if not _raising:
         return
     if _imports(frame) or _held:  # one that came during an import comes again
         signal_later(_AGAIN, _arrived)
         return
     raise KeyboardInterrupt
+
+
+def _end_in_time(told: int) -> None:
+    """End the process some time after a signal, whatever its main thread is at: an import that does not return, a
+    library that leaves the interpreter for minutes or swallows the exception. What must be whole, becomes so before.
+
+    `told`: the descriptor from which the signals can be read, a byte each, while the main thread hears none."""
+    number = came()
+    while number not in SIGNALS:
+        number = os.read(told, 1)[0]
+    time.sleep(PATIENCE)
+    while not _whole.acquire(blocking=False):
+        time.sleep(PATIENCE)
+    if not _said:
+        os.write(2, f"friso: {last_word(number)}\n".encode())
+    os._exit(128 + number)
 
 
 def _lost(otherwise: Callable[[Any], object], what: Any) -> None:
@@ -125,13 +149,3 @@ def _imports(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
-
-
-_IS_COMMAND = ("-m", "friso") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or (
-    os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
-)
-"""Whether this process was started as friso, or as python -m friso."""
-
-if _IS_COMMAND:
-    _install()
-    atexit.register(_ignore)  # among the first, and so among the last that are called

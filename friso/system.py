@@ -74,6 +74,12 @@ if sys.platform == "win32":
     def no_signal_later() -> None:
         """Nothing: the timer ends with the process."""
 
+    def signals_told() -> int:
+        """A descriptor from which the numbers of signals can be read as they come, a byte each."""
+        told, tell = os.pipe()
+        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+        return told
+
     def once_free(use: Callable[[], _T]) -> _T:
         """What `use` returns: where another program holds the file open, it is tried again for as long as `PATIENCE`.
         Raises what `use` raises."""
@@ -177,6 +183,13 @@ else:
     def no_signal_later() -> None:
         """Have it not called after all: Python's end takes its handlers away, and SIGALRM would kill the process."""
         signal.setitimer(signal.ITIMER_REAL, 0)
+
+    def signals_told() -> int:
+        """A descriptor from which the numbers of signals can be read as they come, a byte each."""
+        told, tell = os.pipe()
+        os.set_blocking(tell, False)
+        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
+        return told
 
     def once_free(use: Callable[[], _T]) -> _T:
         """What `use` returns: no program keeps others from a file. Raises what `use` raises."""

@@ -19,7 +19,7 @@ from filelock import FileLock
 from inside import friso_inside
 from systems import posix
 
-from friso import interrupts
+from friso import early, interrupts
 from friso.engine import building
 from friso.engine.overtaken import Overtaken, ended_by
 
@@ -38,14 +38,14 @@ def test_a_signal_while_friso_starts_is_one_line(tmp_path: Path, seed: int) -> N
         assert process.stderr is not None
         imported = 0
         for line in process.stderr:
-            imported += imported > 0 or "friso.interrupts" in line
+            imported += imported > 0 or "friso.early" in line
             if imported == wanted:
                 process.send_signal(number)
         assert process.wait() == 128 + number
     assert line == f"friso: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
 
 
-@pytest.mark.parametrize("number", interrupts.SIGNALS)
+@pytest.mark.parametrize("number", early.SIGNALS)
 @pytest.mark.parametrize("becomes", [None, ImportError("a library that is half there"), SystemExit(0)])
 def test_a_signal_that_a_library_turns_into_something_else(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, becomes: BaseException | None
@@ -127,6 +127,50 @@ def _import_and_write(done: list[str]) -> None:
         done.append("whole")
     time.sleep(10)
     done.append("not interrupted")
+
+
+STUCK = """
+import os, signal, sys, time
+from hashlib import pbkdf2_hmac
+from threading import Timer
+
+sys.argv[0] = "friso"
+from friso import interrupts
+
+def swallow():
+    while True:
+        try:
+            time.sleep(60)
+        except KeyboardInterrupt:
+            pass
+
+def write():
+    try:
+        with interrupts.hold_interrupts():
+            time.sleep(1)
+            open("whole", "w").close()
+    except KeyboardInterrupt:
+        swallow()
+
+interrupts.PATIENCE = 0.2
+Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
+open("endless.py", "w").write("import time\\ntime.sleep(60)\\n")
+sys.path.insert(0, "")
+with interrupts.raising():
+    WAY
+"""
+
+
+@pytest.mark.parametrize(
+    "way", ["import endless", "pbkdf2_hmac('sha256', b'', b'', 2 * 10**9)", "swallow()", "write()"]
+)
+def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str) -> None:
+    """In an import that does not return, in a library that hears nothing, in code that swallows the exception; what
+    must be whole becomes so first."""
+    program = [sys.executable, "-c", STUCK.replace("WAY", way)]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
+    assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "friso: terminated\n")
+    assert (tmp_path / "whole").exists() == (way == "write()")
 
 
 class Going:

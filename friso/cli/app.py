@@ -115,7 +115,7 @@ def _status() -> int:
         # Where code from a text was interrupted (a dataclass's, say), python -m ends by SIGINT whatever the status is,
         # unless other such code ran to its end after it.
         exec("")
-        say("interrupted" if signal in (0, 2) else "terminated")
+        say(interrupts.last_word(signal))
         return 128 + signal if signal else INTERRUPTED
     return status
 
