@@ -6,14 +6,15 @@ from __future__ import annotations
 import errno
 import shutil
 import stat
+import tempfile
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from friso.system import MOVES_OPEN_FOLDERS, foreign_writers, remove_folder
+from friso.system import MOVES_OPEN_FOLDERS, foreign_writers, is_users_own, remove_folder
 
 _TRIES = 3
 
@@ -21,13 +22,19 @@ _TRIES = 3
 @contextmanager
 def locked_folder(root: Path, prefix: str, lock: str) -> Iterator[Path]:
     """A new folder that only this user may open, locked and thus no leftover within, and removed in the end. Raises
-    OSError."""
+    OSError. What killed processes left of such folders is removed first."""
+    remove_leftovers(root, prefix, lock)
     folder, held = _made_and_locked(root, prefix, lock, _TRIES)
     try:
         yield folder
     finally:
         held.release()
         remove_folder(folder)
+
+
+def temporary_folder(prefix: str) -> AbstractContextManager[Path]:
+    """The same where the system keeps temporary files."""
+    return locked_folder(Path(tempfile.gettempdir()), prefix, "lock")
 
 
 def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Path, FileLock]:
@@ -69,22 +76,21 @@ def remove_leftover(folder: Path, lock: str) -> None:
 
 
 def remove_leftovers(root: Path, prefix: str, lock: str) -> None:
-    """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; what others put
-    there, to have a lock made in a folder of this user, stays."""
+    """Remove the leftovers of this user among the folders below `root` whose names begin with a prefix; one that others
+    may write to stays, in which they may have put a link for a lock."""
     for folder in root.glob(f"{prefix}*"):
-        try:
-            status = folder.lstat()
-        except OSError:  # another process was quicker
-            continue
-        if stat.S_ISDIR(status.st_mode) and not foreign_writers(status):
-            remove_leftover(folder, lock)
+        with suppress(OSError):  # another process was quicker
+            if not foreign_writers(folder.lstat()):
+                remove_leftover(folder, lock)
 
 
 @contextmanager
 def _unless_locked(folder: Path, lock: str) -> Iterator[bool]:
-    """Whether nobody else held the lock of a folder, which is held within."""
+    """Whether nobody else held the lock of a folder, which is held within; never that of another user's folder, or of
+    a link to one."""
     try:
-        if folder.is_symlink():
+        status = folder.lstat()
+        if not (stat.S_ISDIR(status.st_mode) and is_users_own(status)):
             raise NotADirectoryError(folder)
         held = FileLock(folder / lock)
         held.acquire(timeout=0)

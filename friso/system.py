@@ -156,6 +156,10 @@ if sys.platform == "win32":
         """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
         return ""
 
+    def is_users_own(status: os.stat_result) -> bool:
+        """Yes: see `foreign_writers`."""
+        return True
+
     def is_open_to_others(status: os.stat_result) -> bool:
         """No: see `foreign_writers`."""
         return False
@@ -239,6 +243,10 @@ else:
         if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not sticky:
             return "can be written by other users"
         return ""
+
+    def is_users_own(status: os.stat_result) -> bool:
+        """Whether a file belongs to this user."""
+        return status.st_uid == os.geteuid()
 
     def is_open_to_others(status: os.stat_result) -> bool:
         """Whether others than this user may read a file, or write to it."""

@@ -288,16 +288,28 @@ def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> N
 
 
 @posix
-def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def none(name: str) -> str:
         raise RuntimeError("could not determine the home directory")
 
     monkeypatch.delenv(cache.FOLDER_VARIABLE, raising=False)
     monkeypatch.setattr(cache, "user_cache_dir", none)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    (tmp_path / f"{cache._PASSING}left").mkdir(mode=0o700)  # by a process that was killed
     folder = cache.cache_folder.__wrapped__()
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    assert [*tmp_path.iterdir()] == [folder.parent]
     cache.remove_if_passing(folder)
     assert not folder.exists()
+
+
+def test_what_a_killed_process_left_where_it_tried_to_write_goes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(cache.FOLDER_VARIABLE, str(tmp_path))
+    folder = cache.cache_folder.__wrapped__()
+    (folder / "trial-left").mkdir(mode=0o700)
+    assert [*cache.cache_folder.__wrapped__().iterdir()] == []
 
 
 # nobody else

@@ -45,6 +45,20 @@ def test_a_folder_that_is_removed_while_it_is_locked_is_made_anew(
     assert [*tmp_path.iterdir()] == []
 
 
+@posix
+def test_what_another_user_left_stays(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Root's, too: nor is anything made in it, such as a lock."""
+    left = tmp_path / "a-left"
+    left.mkdir(mode=0o700)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "geteuid", lambda: left.stat().st_uid + 1)
+        assert not is_leftover(left, LOCK)
+        remove_leftovers(tmp_path, "a-", LOCK)
+        assert ([*tmp_path.iterdir()], [*left.iterdir()]) == ([left], [])
+    with locked_folder(tmp_path, "a-", LOCK) as folder:  # those of this user go with the next
+        assert [*tmp_path.iterdir()] == [folder]
+
+
 def test_a_lock_decides_what_is_left_over(tmp_path: Path) -> None:
     """At whatever age: a process that has not locked its folder yet makes another."""
     for name in ("a-young", "a-old", "b-other"):

@@ -24,9 +24,10 @@ from filelock import FileLock
 from refusals import Refused
 from systems import posix
 
-from friso.errors import StoreError
+import friso as friso_api
+from friso.errors import InputError, StoreError
 from friso.stage import Stage
-from friso.studies import refine
+from friso.studies import ledger, refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
 from friso.studies.metadata import checked_metadata, digest
@@ -304,12 +305,21 @@ def test_a_store_is_there_whole_or_not_at_all(
 
 
 def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path) -> None:
-    study = Request(rig, {"controller.crossover": "1 Hz..40 Hz:100000", "joint.stroke": "0 m..1 mm:10000"}).study()
-    store = Store(tmp_path / "large.zarr", study)
+    """Nor time where it is looked at; nor is it gone on with unless it is meant: it may come from others."""
+    path, axes = tmp_path / "large.zarr", {**AXES, "masses.stage": "0.4 kg..0.5 kg:2"}
+    study = Request(rig, {key: f"{ends.split(':')[0]}:20000" for key, ends in axes.items()}).study()
+    store = Store(path, study)
     assert np.prod(store.blocks) <= storing.LARGEST_BLOCK
-    with Store.opened(tmp_path / "large.zarr", study):
-        size = sum(file.stat().st_size for file in (tmp_path / "large.zarr").rglob("*") if file.is_file())
+    with Store.opened(path, study):
+        size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
     assert size < 3e6  # the axes themselves
+    (path / ".blocks").mkdir()
+    for name in ("0.0.0", "00.0.0", "0.0", "9999999.0.0", "notes"):
+        (path / ".blocks" / name).write_text("")
+    state = check_store(path)
+    assert (state.blocks > 1e8, state.done, state.damaged) == (True, 1, ["0.0.0"])
+    with pytest.raises(InputError, match=r"yes[\s\S]*8e\+12 cells"):
+        friso_api.sweep(path)
 
 
 def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
@@ -367,6 +377,22 @@ def test_a_store_says_whether_it_is_whole(stored: Path, rig: Stage) -> None:
         assert store.state().damaged == []
         flip(stored / "period" / "1.0", 0.6)
         assert store.state().damaged == ["1.0"]
+
+
+def test_a_chunk_that_may_not_be_read_is_named_beside_those_that_are_damaged(
+    stored: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flip(stored / "period" / "1.0", 0.6)
+    real, closed = ledger.digest_of, stored / "peaks" / "0.0"
+
+    def may_not(file: Path) -> str | None:
+        if file == closed:
+            raise PermissionError(errno.EACCES, "Permission denied", str(file))
+        return real(file)
+
+    monkeypatch.setattr(ledger, "digest_of", may_not)
+    state = check_store(stored)
+    assert (state.damaged, state.unreadable) == (["1.0"], [str(closed)])
 
 
 @pytest.mark.parametrize("name", ["peaks", "period", "status", "outcome"])
@@ -536,6 +562,22 @@ def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(stored:
         assert store.read()["outcome"].shape == (2,)
     with Store.opened(stored, other, overwrite=True) as store:  # the same goes on
         assert list(stored.parent.iterdir()) == [stored]
+
+
+def test_a_store_at_the_end_of_a_link_is_replaced_there(stored: Path, rig: Stage, tmp_path: Path) -> None:
+    link, study = tmp_path / "links" / "b.zarr", Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
+    link.parent.mkdir()
+    link.symlink_to(stored)
+    with Store.opened(link, study, overwrite=True):
+        pass
+    assert (read_store(stored)["outcome"].shape, [*link.parent.iterdir()], link.is_symlink()) == ((2,), [link], True)
+    stored.rename(stored.with_name(f".a.zarr.{'c' * 32}.old"))  # killed between the two renames
+    with Store.opened(link, study):
+        pass
+    stored.rename(tmp_path / "elsewhere")
+    with pytest.raises(StoreError, match="a link to"), Store.opened(link, study):
+        pass
+    assert not stored.exists()
 
 
 def test_what_is_no_store_is_not_replaced_even_when_told(rig: Stage, tmp_path: Path) -> None:

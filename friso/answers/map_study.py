@@ -93,14 +93,17 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     return finer(study) if refine else study
 
 
-def stored_study(store: Path, metric: str | None) -> tuple[Study, str]:
+def stored_study(store: Path, metric: str | None, most: int | None) -> tuple[Study, str]:
     """The study of a store that is gone on with, and what colours its map: the `metric`, or what the store was made
-    for. Raises InputError."""
+    for. Raises InputError, also where runs of a study of more than `most` cells are left."""
     from friso.studies.metadata import checked_metadata
-    from friso.studies.store import read_store
+    from friso.studies.store import Store, read_store
 
     with read_store(store) as runs:
         study = study_of(runs)
+    if most is not None and study.cells > most and not Store(store, study).is_done:
+        actual = f"{study.cells:.3g} cells in {store}, not all of which were run"
+        raise InputError("yes", actual, "--yes, if so many are meant; nothing was run", "yes=True")
     metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
     if metric in METRICS and metric not in study.metrics:
         actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a new map"

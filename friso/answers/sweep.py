@@ -223,7 +223,7 @@ def sweep(
             if varied != Varied() or set or rtol or refine or out:
                 raise _another_study(Path(stage))
             store = place_of_store(stage)
-            study, metric = stored_study(store, metric)
+            study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
             metric = metric or "outcome"
             chosen = read_stage(stage, set)
@@ -244,11 +244,11 @@ def sweep(
 
 
 def whole(store: str | os.PathLike[str]) -> dict[str, Any]:
-    """Whether a store is whole: blocks, how many are done, which are damaged. Raises StoreError where it cannot be read
-    at all."""
+    """Whether a store is whole: blocks, how many are done, which are damaged or may not be read. Raises StoreError
+    where it cannot be read at all."""
     state = check_store(Path(store))
-    counts = {"blocks": state.blocks, "done": state.done}
-    return {"store": str(store), **counts, "damaged": state.damaged, "damaged_files": state.files}
+    damage = {"damaged": state.damaged, "damaged_files": state.files, "unreadable": state.unreadable}
+    return {"store": str(store), "blocks": state.blocks, "done": state.done, **damage}
 
 
 def _another_study(store: Path) -> InputError:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import io
 import json
-import tempfile
 import zipfile
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.axis import speaking_of
+from friso.leftovers import temporary_folder
 from friso.stage import Stage
 from friso.views.files import pictures
 
@@ -21,8 +20,8 @@ def archive(answer: Answer, stage: Stage, stem: str) -> bytes:
     """A ZIP file of the files of an answer, its figures in all forms, its document as JSON, and the stage file."""
     held = io.BytesIO()
     packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)
-    with tempfile.TemporaryDirectory(prefix="friso-app-") as folder, packing as file:
-        out = Path(folder) / "out"
+    with temporary_folder("friso-app-") as folder, packing as file:
+        out = folder / "out"
         written = answer.report(out)
         with speaking_of(answer.axis_kind):
             for name, save in pictures(answer.figures()).items():  # some commands write figures in their page alone

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import itertools
-import tempfile
 from collections.abc import AsyncIterable
 from contextlib import ExitStack
 from pathlib import Path
 
 from friso.app.names import plain_name
 from friso.errors import InputError
-from friso.leftovers import locked_folder, remove_leftovers
+from friso.leftovers import temporary_folder
 from friso.system import remove_folder
 
 MOST_BYTES = 64_000_000
@@ -20,8 +19,8 @@ MOST_FILES = 50
 """Files that are kept at most."""
 
 
-PREFIX, LOCK = "friso-uploads-", "lock"
-"""How the folders of servers begin, and the file in each that its server keeps locked."""
+PREFIX = "friso-uploads-"
+"""How the folders of servers begin."""
 
 
 class Uploads:
@@ -29,9 +28,8 @@ class Uploads:
     is deleted by the next."""
 
     def __init__(self) -> None:
-        root, self.held = Path(tempfile.gettempdir()), ExitStack()
-        remove_leftovers(root, PREFIX, LOCK)
-        self.folder = self.held.enter_context(locked_folder(root, PREFIX, LOCK))
+        self.held = ExitStack()
+        self.folder = self.held.enter_context(temporary_folder(PREFIX))
         self.files: dict[str, Path] = {}
         self.numbers = itertools.count(1)
 

@@ -19,9 +19,9 @@ import marshal
 import os
 import re
 import sys
-import tempfile
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache
 from importlib.abc import InspectLoader
@@ -38,7 +38,7 @@ from platformdirs import user_cache_dir
 from friso.engine.private import make_private
 from friso.engine.processor import processor
 from friso.engine.seal import read_sealed, write_sealed
-from friso.leftovers import locked_folder
+from friso.leftovers import locked_folder, temporary_folder
 from friso.system import remove_folder
 from friso.version import VERSION
 
@@ -67,9 +67,10 @@ def cache_folder() -> Path:
             error,
             FOLDER_VARIABLE,
         )
-        folder = Path(tempfile.mkdtemp(prefix=_PASSING)) / "kernels"
+        held = ExitStack()
+        folder = held.enter_context(temporary_folder(_PASSING)) / "kernels"
         folder.mkdir(mode=0o700)
-        atexit.register(remove_if_passing, folder)
+        atexit.register(held.close)
         return folder
 
 

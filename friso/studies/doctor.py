@@ -8,7 +8,6 @@ import pickle
 import platform
 import re
 import struct
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -17,6 +16,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.resources import files
 from pathlib import Path
 
+from friso.leftovers import temporary_folder
 from friso.stage import Stage
 from friso.stage.files import loads
 from friso.system import LIBRARIES, MODES_TELL, is_open_to_others, usable_cores
@@ -123,9 +123,9 @@ def _compiling() -> str:
     from friso.equations.structure import structure
 
     request = KernelRequest(structure(_stage().flat()))
-    with tempfile.TemporaryDirectory(prefix="friso-doctor-") as folder:
+    with temporary_folder("friso-doctor-") as folder:
         begin = time.perf_counter()
-        build(Path(folder), pickle.dumps(((), pickle.dumps(request))))
+        build(folder, pickle.dumps(((), pickle.dumps(request))))
         return f"a kernel in {time.perf_counter() - begin:.1f} s ({request.title})"
 
 

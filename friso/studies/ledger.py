@@ -25,6 +25,10 @@ class Ledger:
         """Whether the block with this number was written."""
         return self._file(number).exists()
 
+    def entered(self) -> list[str]:
+        """The names in the folder of blocks that were written. Raises OSError."""
+        return [] if not self._file("").exists() else sorted(file.name for file in self._file("").iterdir())
+
     def enter(self, number: str) -> None:
         """Enter a block whose chunks were written. Raises OSError."""
         self._file(number).parent.mkdir(exist_ok=True)

@@ -9,7 +9,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import math
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -34,9 +36,10 @@ from friso.studies.store_folder import (
     refuse_others_files,
     remove_leftovers,
     remove_partial_files,
+    where_links_lead,
 )
 from friso.studies.study import CellBlock, Study, study_of
-from friso.system import cause_of, once_free
+from friso.system import cause_of, once_free, path_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -72,8 +75,9 @@ class Store:
 
         Raises StoreError if the folder holds anything else, another study, or is in use by another process.
         """
-        store = cls(path, study)
         remove_leftovers(path)
+        path = where_links_lead(path)
+        store = cls(path, study)
         with _refused(path):
             if not path.exists() or (path.is_dir() and not any(path.iterdir())):
                 make(path, store._fill)
@@ -143,13 +147,45 @@ class Store:
                 logger.warning("%s: block %s is damaged and is run again", self.path, number)
                 yield block
 
+    def done(self) -> list[str]:
+        """The numbers of the blocks that are done. Only what is there is counted: a store may state any size."""
+        return [number for number in self.ledger.entered() if self._is_of_block(number)]
+
+    @property
+    def is_done(self) -> bool:
+        """Whether all blocks are done, as far as is entered."""
+        return len(self.done()) == self._count
+
     def state(self) -> StoreState:
-        """How far the study is, and what is damaged."""
-        ledger, metadata = self.ledger, checked_metadata(self.path)
-        numbers = [self._number(block) for block in self.study.blocks(self.blocks)]
-        done = [number for number in numbers if ledger.has(number)]
-        damaged = [number for number in done if not ledger.is_whole(number)]
-        return StoreState(len(numbers), len(done), damaged, metadata.damaged_files(self.path))
+        """How far the study is, what is damaged, and what cannot be read."""
+        ledger, done = self.ledger, self.done()
+        damaged: list[str] = []
+        unreadable: list[str] = []
+        for number in done:
+            try:
+                if not ledger.is_whole(number):
+                    damaged.append(number)
+            except PermissionError as error:
+                unreadable.append(path_of(error) or number)
+        files = checked_metadata(self.path).damaged_files(self.path)
+        return StoreState(self._count, len(done), damaged, files, unreadable)
+
+    @property
+    def _counts(self) -> list[int]:
+        """How many blocks there are along each axis."""
+        return [-(-length // size) for length, size in zip(self.study.shape, self.blocks, strict=True)]
+
+    @property
+    def _count(self) -> int:
+        return math.prod(self._counts)
+
+    def _is_of_block(self, number: str) -> bool:
+        """Whether a name is that of the files of a block."""
+        parts = number.split(".")
+        return len(parts) == len(self._counts) and all(
+            re.fullmatch("0|[1-9][0-9]{0,17}", part) and int(part) < count
+            for part, count in zip(parts, self._counts, strict=True)
+        )
 
     def _number(self, block: CellBlock) -> str:
         """The name of the files of a block."""
@@ -226,13 +262,14 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class StoreState:
-    """How many blocks a study has, how many of them are done, the numbers of those that are damaged, and the files of
-    metadata that are, which the next run writes anew."""
+    """How many blocks a study has, how many of them are done, the numbers of those that are damaged, the files of
+    metadata that are, which the next run writes anew, and chunks that may not be read."""
 
     blocks: int
     done: int
     damaged: list[str]
     files: list[str]
+    unreadable: list[str]
 
 
 def check_store(path: Path) -> StoreState:

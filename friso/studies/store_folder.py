@@ -7,6 +7,7 @@ Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a f
 
 from __future__ import annotations
 
+import os
 import re
 import uuid
 from collections.abc import Callable, Iterator
@@ -28,6 +29,15 @@ LOCK = ".friso.lock"
 _OLD = ".old"
 
 _DIGITS = "[0-9a-f]" * 32
+
+
+def where_links_lead(path: Path) -> Path:
+    """Where a store is: what is made aside, and what is replaced, is there, not at a link to it. Raises StoreError for
+    a link that leads nowhere, as to a disk that is missing."""
+    if path.is_symlink() and not path.exists():
+        actual = f"a link to {os.path.realpath(path)}, where nothing is"
+        raise StoreError("", actual, "a store, or a new name", "--out study.zarr", str(path))
+    return Path(os.path.realpath(path)) if path.is_symlink() else path
 
 
 def make(path: Path, fill: Callable[[Path], object]) -> None:
@@ -86,6 +96,7 @@ def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None
 def remove_leftovers(path: Path) -> None:
     """Remove what killed processes left beside the store at `path`, or put it back where it was being replaced:
     nobody holds their lock. Raises OSError where it cannot be put back."""
+    path = Path(os.path.realpath(path))
     for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
         if path.exists():
             remove_leftover(old, LOCK)
@@ -129,7 +140,8 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
     into what is deleted here."""
     draft = _free_name(path)
     try:
-        draft.mkdir(parents=True)
+        draft.parent.mkdir(parents=True, exist_ok=True)
+        draft.mkdir(mode=0o700)
         with FileLock(draft / LOCK):  # locked, it is no leftover
             new = draft / "store"
             with hold_interrupts():

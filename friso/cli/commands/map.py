@@ -104,8 +104,9 @@ def _check(store: Path, as_json: bool) -> None:
     else:
         damage = f"damaged: {', '.join(damaged)} (friso map {shell_word(str(store))} recomputes the damaged blocks)"
         done = f"blocks done: {state['done']} of {state['blocks']}"
-        print(f"{store}: {done}; {damage if damaged else 'nothing is damaged'}")
-    if damaged:
+        unread = f"; may not be read: {', '.join(state['unreadable'])}" if state["unreadable"] else ""
+        print(f"{store}: {done}; {damage if damaged else 'nothing is damaged'}{unread}")
+    if damaged or state["unreadable"]:
         raise typer.Exit(1)
 
 
