@@ -4,6 +4,8 @@ the thesis's peak count against scipy."""
 from __future__ import annotations
 
 from dataclasses import fields, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +40,7 @@ from friso.hunting.turns import scan_turning_points
 from friso.hunting.verdict import judge, judge_many
 from friso.stage import Stage
 from friso.studies.rig.moves_on_rails import turning_points
+from friso.views.simulate.words import conclusion
 
 STEP, DURATION = 1 / 128, 20.0
 TIME = np.arange(0, DURATION + STEP / 2, STEP)
@@ -287,3 +290,19 @@ def test_an_end_is_made_of_arrays_of_one_length() -> None:
     end = end_of_traces(TIME, np.zeros((3, len(TIME))), BAND)
     assert {getattr(end, item.name).shape for item in fields(End)} == {(3,)}
     assert outcomes(replace(end, completed=np.array([True, False, True]))).tolist() == ["rests", "failed", "rests"]
+
+
+@pytest.mark.parametrize(
+    ("deviation", "word"),
+    [
+        (10.0 + 0 * TIME, "creeps"),
+        (TIME, "ever farther"),
+        (np.exp(TIME / DURATION) * np.cos(TIME), "ever farther"),
+        (np.exp(-TIME / DURATION) * np.cos(TIME), "come to rest"),
+    ],
+)
+def test_a_run_off_its_reference_is_said_to_creep_only_where_it_hardly_moves(deviation: np.ndarray, word: str) -> None:
+    late = deviation[TIME >= 0.75 * DURATION]
+    measures: Any = SimpleNamespace(outcome=["creeps"], peak_to_peak=[np.ptp(late)])
+    said = conclusion("axis", measures, deviation)
+    assert [other for other in ("creeps", "ever farther", "come to rest") if other in said] == [word]

@@ -54,7 +54,7 @@ class SimulateAnswer(Answer):
         """What the run does."""
         from friso.views.simulate.words import conclusion
 
-        deviation = float(self.result["position"][-1] - self.result["reference"][-1])
+        deviation = (self.result["position"] - self.result["reference"]).to_numpy()
         return [conclusion(self.name if self.of_cell else self.stage.name or self.name, self.measures, deviation)]
 
     def details(self) -> Sequence[str]:
