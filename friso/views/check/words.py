@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from friso.axis import axis_shown
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.criteria import ATTRACTED
@@ -14,7 +13,7 @@ from friso.hunting.verdict import BANDWIDTHS, FEEDING, LOWER, STARTS
 from friso.quantities import percent
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
-from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
+from friso.views.drawing.prefixes import length_at_rest, listed, plus_minus, rounded_down, rounded_up, with_unit
 from friso.views.loop_words import unstable_where
 
 if TYPE_CHECKING:
@@ -70,8 +69,8 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
 
 
 def at_the_end(case: Case) -> str:
-    """Peak to peak; below a nanometre the digits would be those of the solver, not of the stage."""
-    return axis_shown().text("< 1 nm") if case.peak_to_peak < 1e-9 else with_unit(case.peak_to_peak, "m")
+    """Peak to peak."""
+    return length_at_rest(case.peak_to_peak)
 
 
 def _hunting(case: Case) -> str:

@@ -20,7 +20,15 @@ from friso.studies.compare.disturbance_rejection import rejection
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, OptionResult
-from friso.views.drawing.prefixes import NOTHING, listed, percentage, range_with_unit, share_with_interval, with_unit
+from friso.views.drawing.prefixes import (
+    NOTHING,
+    length_at_rest,
+    listed,
+    percentage,
+    range_with_unit,
+    share_with_interval,
+    with_unit,
+)
 from friso.views.machine_words import spread_sentences
 
 COLUMNS = (
@@ -131,7 +139,8 @@ def table_rows(comparison: Comparison) -> list[PairedRow]:
                     for share in (result.swinging, result.counted, result.settled, result.stays)
                 ),
                 _time(result.settling),
-                *(_length(value, unit) for value, unit in ((result.in_position, "m"), (result.force, "N"))),
+                _at_rest(result.in_position),
+                _force(result.force),
                 _margin(result, comparison),
             ],
         )
@@ -160,14 +169,25 @@ def _time(median: EstimatedValue) -> str:
     return middle if middle == low else f"{middle} ({low} to never)"
 
 
-def _length(median: EstimatedValue, unit: str) -> str:
-    if not all(map(math.isfinite, (median.value, median.low, median.high))):
+def _at_rest(median: EstimatedValue) -> str:
+    if not _is_known(median):
         return NOTHING
-    return f"{with_unit(median.value, unit)} ({range_with_unit(median.low, median.high, unit)})"
+    middle, low, high = map(length_at_rest, (median.value, median.low, median.high))
+    return middle if low == high else f"{middle} ({low} to {high})"
+
+
+def _force(median: EstimatedValue) -> str:
+    if not _is_known(median):
+        return NOTHING
+    return f"{with_unit(median.value, 'N')} ({range_with_unit(median.low, median.high, 'N')})"
+
+
+def _is_known(median: EstimatedValue) -> bool:
+    return all(map(math.isfinite, (median.value, median.low, median.high)))
 
 
 def _ratio(median: EstimatedValue) -> str:
-    if not all(map(math.isfinite, (median.value, median.low, median.high))):
+    if not _is_known(median):
         return NOTHING
     return f"{median.value:.3g} ({median.low:.3g} to {median.high:.3g})"
 

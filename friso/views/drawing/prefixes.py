@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.axis import unit_shown
+from friso.axis import axis_shown, unit_shown
 from friso.quantities import NOTHING, percent
 from friso.views.drawing.figure import Array
 
@@ -21,6 +21,9 @@ _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 _PREFIXED = {"m": (-9, 0), "rad": (-9, 0), "s": (-9, 0), "N": (-9, 9), "Hz": (0, 9)}
 _SIGNS = str.maketrans({"*": "·"})
 _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
+
+SOLVED = 1e-9
+"""Length [m] below which a motion that was simulated is not distinguished from rest."""
 
 
 def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
@@ -63,6 +66,11 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     if number == 0 or 1e-3 <= abs(number) < 1e5:
         return f"{_significant(number, digits)} {text}"
     return f"{number:.{digits - 1}e} {text}"
+
+
+def length_at_rest(value: float) -> str:
+    """How far [m] something still moves; below a nanometre the digits would be those of the solver."""
+    return axis_shown().text("< 1 nm") if value < SOLVED else with_unit(value, "m")
 
 
 def digits_that_differ(values: Sequence[float]) -> int:
