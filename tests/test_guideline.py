@@ -479,6 +479,10 @@ def test_interrupted_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     assert calls == [32] * 4
     whole = sweeps.locked_sweep(96, 1, sweeps.Keep(), Tally(silent, 96))
     assert np.array_equal(resumed.edge, whole.edge, equal_nan=True)
+    with monkeypatch.context() as patch:  # what other equations made is not taken over
+        patch.setattr("friso.studies.kept_work.equations_version", lambda: "others")
+        sweeps.locked_sweep(96, 1, keep, Tally(silent, 96))
+    assert (len(calls), keep.count) == (10, 6)
     keep.clear()
     assert keep.count == 0
 

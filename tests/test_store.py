@@ -29,12 +29,15 @@ from friso.errors import InputError, StoreError
 from friso.stage import Stage
 from friso.studies import ledger, refine
 from friso.studies import store as storing
+from friso.studies.cells import WORDS
 from friso.studies.execute import local_crew
+from friso.studies.kept_cells import KeptCells
 from friso.studies.metadata import checked_metadata, digest
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.sealed_store import SealedStore
 from friso.studies.store import Store, check_store, read_store
+from friso.studies.store_files import keep_arrays, kept_arrays
 from friso.studies.store_folder import LOCK, make
 from friso.studies.sweep import run_in_store, sweep
 
@@ -232,6 +235,34 @@ def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, mo
     monkeypatch.undo()
     assert (path / ".answers" / "0.npz").exists()
     same(sweep(rig, AXES, refine=True, store=path), sweep(rig, AXES, refine=True))
+
+
+def test_answers_are_those_of_their_study_and_no_larger(
+    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Others are asked for: of another study of that form, of other metrics, with too much in them."""
+    study, cells, asked = Request(rig, AXES).study(["peaks", "outcome"]), np.arange(5), []
+
+    def ask(cells: np.ndarray) -> dict[str, np.ndarray]:
+        asked.append(cells)
+        names = refine.asked_for(study).metrics
+        return {name: np.full(len(cells), "rests" if name in WORDS else 1.0) for name in names}
+
+    def keeping(digest: str = "a study") -> int:
+        """How often it was asked by then."""
+        KeptCells(tmp_path, study, digest).keeping(ask)(cells)
+        return len(asked)
+
+    assert [keeping(), keeping(), keeping("another"), keeping("another"), keeping()] == [1, 1, 2, 2, 3]
+    whole = kept_arrays(tmp_path / "0.npz", "a study")
+    assert whole is not None
+    for change in ({"peaks": whole["peaks"][1:]}, {"peaks": whole["status"]}, {"more": whole["peaks"]}):
+        keep_arrays(tmp_path / "0.npz", {**whole, **change}, "a study")
+        before = len(asked)
+        assert keeping() == before + 1, change
+    keep_arrays(tmp_path / "0.npz", {**whole, "more": np.zeros(10**6)}, "a study")
+    monkeypatch.setattr(np, "load", lambda *arguments, **named: pytest.fail("it was expanded"))
+    keeping()
 
 
 def test_a_store_of_other_equations_is_refused(

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from itertools import count
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from friso.studies.cells import WORDS, Columns
-from friso.studies.refine import Ask
-from friso.studies.store_files import stored_arrays
+from friso.studies.refine import Ask, asked_for
+from friso.studies.store_files import keep_arrays, kept_arrays
+from friso.studies.study import Study
 from friso.system import remove_folder
-from friso.whole_file import whole_file
 
 
 class KeptCells:
-    """Answers kept in a folder; what is damaged there is asked for again: the files are archives with checksums."""
+    """Answers about the cells of a study, of such a digest, kept in a folder; what is damaged there, or another's, is
+    asked for again."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, study: Study, digest: str) -> None:
+        self.folder, self.metrics, self.digest = folder, asked_for(study).metrics, digest
 
     def keeping(self, ask: Ask) -> Ask:
         """`ask` with its answers kept."""
@@ -28,12 +28,11 @@ class KeptCells:
 
         def kept_or_asked(cells: np.ndarray) -> Columns:
             file = self.folder / f"{next(number)}.npz"
-            if (stored := _kept(file, cells)) is not None:
-                return stored
+            if (kept := self._kept(file, cells)) is not None:
+                return kept
             columns = ask(cells)
-            with whole_file(file) as stream:
-                arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
-                np.savez_compressed(stream, cells=cells, **arrays)
+            arrays = {name: columns[name].astype(WORDS.get(name, "f8")) for name in self.metrics}
+            keep_arrays(file, {"cells": cells, **arrays}, self.digest)
             return columns
 
         return kept_or_asked
@@ -42,9 +41,12 @@ class KeptCells:
         """Remove what was kept: the blocks of the study hold it by now."""
         remove_folder(self.folder)
 
-
-def _kept(file: Path, cells: np.ndarray) -> Columns | None:
-    """What was kept about just these cells, None if nothing."""
-    columns = stored_arrays(file)
-    about = None if columns is None else columns.pop("cells", None)
-    return columns if about is not None and np.array_equal(about, cells) else None
+    def _kept(self, file: Path, cells: np.ndarray) -> Columns | None:
+        """What was kept about just these cells, None if nothing."""
+        forms = {name: np.dtype(WORDS.get(name, "f8")) for name in self.metrics}
+        most = cells.nbytes + cells.size * sum(form.itemsize for form in forms.values()) + 1024 * (2 + len(forms))
+        columns = kept_arrays(file, self.digest, most)
+        if columns is None or not np.array_equal(columns.pop("cells", ()), cells):
+            return None
+        same = {name: column.dtype for name, column in columns.items()} == forms
+        return columns if same and all(column.shape == cells.shape for column in columns.values()) else None

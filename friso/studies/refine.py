@@ -20,7 +20,7 @@ from scipy.ndimage import distance_transform_edt
 from friso.errors import InputError
 from friso.hunting.criteria.run_outcome import SWINGS
 from friso.studies.axes import SweptAxis
-from friso.studies.cells import INFERRED, UNITS, Columns
+from friso.studies.cells import INFERRED, METRICS, UNITS, USUAL, Columns
 from friso.studies.samples import SAMPLE
 from friso.studies.study import Dimension, Study
 
@@ -65,6 +65,11 @@ def _finer(axis: SweptAxis) -> SweptAxis:
     between = np.exp(between) if log else between
     between[::FINER] = axis.values
     return replace(axis, values=between)
+
+
+def asked_for(study: Study) -> Study:
+    """The study of what is asked about cells: refining it takes what is usually known of them."""
+    return replace(study, metrics=tuple(name for name in METRICS if name in (*USUAL, *study.metrics)))
 
 
 def refine_cells(study: Study, ask: Ask) -> Columns:

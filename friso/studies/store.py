@@ -207,7 +207,7 @@ class Store:
     @property
     def answers(self) -> KeptCells:
         """What a refined study keeps until it is done."""
-        return KeptCells(self.path / ".answers")
+        return KeptCells(self.path / ".answers", self.study, checked_metadata(self.path).study)
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
         """Add attributes to the study."""

@@ -23,6 +23,10 @@ MOST_BYTES = 64 << 20
 """Size of a file of a store at most: the largest chunk, of texts that nothing compresses, has a sixth of it."""
 
 
+MOST_EXPANDED = 1 << 30
+"""Bytes of the arrays of an archive at most: a few may state many."""
+
+
 def stored(file: Path) -> bytes:
     """What is in a file of a store. Raises OSError, also for a link, a device, a pipe and more than MOST_BYTES."""
     return content_of(file, MOST_BYTES, follow=False)
@@ -39,27 +43,33 @@ def digest_of(file: Path, most: int = MOST_BYTES) -> str | None:
         return None
 
 
-def stored_arrays(file: Path) -> dict[str, np.ndarray] | None:
-    """The arrays of an archive (.npz); None where there is none, or it is damaged."""
+def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[str, np.ndarray] | None:
+    """The arrays that `keep_arrays` wrote into this file `about` the same; None where they are damaged, another's, or
+    of more than `most` bytes, of which none is expanded then."""
     try:
-        with np.load(io.BytesIO(stored(file)), allow_pickle=False) as arrays:
-            return dict(arrays)
+        content = io.BytesIO(stored(file))
+        with zipfile.ZipFile(content) as archive:
+            if sum(member.file_size for member in archive.infolist()) > most:
+                return None
+        content.seek(0)
+        with np.load(content, allow_pickle=False) as archive:
+            arrays = dict(archive)
     except (OSError, ValueError, EOFError, KeyError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error):
         return None
+    said = arrays.pop(_ABOUT, None)
+    return arrays if said is not None and str(said) == _name(file, about) else None
 
 
-def kept_arrays(file: Path) -> dict[str, np.ndarray] | None:
-    """The arrays that `keep_arrays` wrote into this file; None where they are damaged, or another's."""
-    arrays = stored_arrays(file)
-    about = None if arrays is None else arrays.pop(_ABOUT, None)
-    return None if about is None or str(about) != file.name else arrays
-
-
-def keep_arrays(file: Path, arrays: Mapping[str, Any]) -> None:
-    """Keep arrays in an archive with the name of its file, which tells of one that is exchanged. Raises OSError."""
+def keep_arrays(file: Path, arrays: Mapping[str, Any], about: str = "") -> None:
+    """Keep arrays in an archive with the name of its file and what they are `about`, which tells of one that is
+    exchanged. Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(file) as stream:
-        np.savez_compressed(stream, **{**arrays, _ABOUT: np.array(file.name)})
+        np.savez_compressed(stream, **{**arrays, _ABOUT: np.array(_name(file, about))})
+
+
+def _name(file: Path, about: str) -> str:
+    return f"{about} {file.name}".strip()
 
 
 _ABOUT = "about"

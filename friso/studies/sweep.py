@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,9 +12,9 @@ import numpy as np
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.studies.axes import AxisValues
-from friso.studies.cells import METRICS, USUAL, WORDS, Columns, attributes_of
+from friso.studies.cells import WORDS, Columns, attributes_of
 from friso.studies.execute import Crew, local_crew, run_scattered
-from friso.studies.refine import Ask, finer, refine_cells
+from friso.studies.refine import Ask, asked_for, finer, refine_cells
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store
@@ -130,7 +129,7 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
 
 def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
     """The measures of a refined study, each of its shape; `keeping` may keep the answers of a resumed one."""
-    everything = replace(study, metrics=tuple(name for name in METRICS if name in (*USUAL, *study.metrics)))
+    everything = asked_for(study)
 
     def ask(cells: np.ndarray) -> Columns:
         columns = run_scattered(everything, cells, crew)

@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 from scipy.stats import qmc
 
-import friso.hunting.cycle as hunting_cycle
-from friso.hunting import edges as edges_module
-from friso.hunting import persistence
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.edges import ROUNDS, Edges, concatenate_edges, find_edges
+from friso.hunting.edges import Edges, concatenate_edges, find_edges
 from friso.progress import Tally
-from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
-from friso.studies.store_files import keep_arrays, kept_arrays
-from friso.system import remove_folder
-from friso.version import VERSION
+from friso.studies.kept_work import KeptWork
 
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
 
@@ -99,44 +90,19 @@ def concatenate_sweeps(*sweeps: Sweep) -> Sweep:
     )
 
 
-@dataclass(frozen=True)
-class Keep:
-    """Where the parts of sweeps are kept until they are all done, a folder; None keeps nothing."""
+class Keep(KeptWork):
+    """Where the parts of sweeps are kept until they are all done."""
 
-    folder: Path | None = None
-
-    @property
-    def count(self) -> int:
-        """How many parts are kept."""
-        return 0 if self.folder is None or not self.folder.exists() else len(list(self.folder.glob("*.npz")))
-
-    def clear(self) -> None:
-        """Forget them."""
-        if self.folder is not None:
-            remove_folder(self.folder)
+    sources = ("studies/guideline",)
 
     def part(self, name: str, make: Callable[[], Edges]) -> Edges:
         """The part with this name: as it was kept, or made now and kept."""
-        if self.folder is None:
-            return make()
-        boxes = LOCKED_BOX, JOINT_BOX, LOCKED_GRID.tolist(), FREE_GRID.tolist()
-        settings = (VERSION, _sources(), name, *boxes, ROUNDS)
-        key = hashlib.sha256(repr(settings).encode()).hexdigest()[:16]
-        path = self.folder / f"{key}.npz"
-        kept = kept_arrays(path)
-        if kept is not None and kept.keys() == {field.name for field in fields(Edges)}:
-            return Edges(**kept)
-        edges = make()
-        keep_arrays(path, vars(edges) | {"kind": edges.kind.astype(str)})
-        return edges
+        columns = self.arrays((name,), lambda: _columns(make()), [field.name for field in fields(Edges)])
+        return Edges(**columns)
 
 
-@cache
-def _sources() -> str:
-    """A hash of the modules that make edges: parts that others made are not taken over."""
-    cycle = sorted(Path(hunting_cycle.__file__ or "").parent.glob("*.py"))
-    paths = [*(Path(str(module.__file__)) for module in (edges_module, groups, persistence)), *cycle]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
+def _columns(edges: Edges) -> dict[str, np.ndarray]:
+    return vars(edges) | {"kind": edges.kind.astype(str)}
 
 
 def sobol_samples(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:

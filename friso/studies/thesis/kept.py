@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass
-from functools import cache
-from importlib.metadata import version
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
-from friso.engine.cache import code_digest, machine
 from friso.studies.cells import WORDS
+from friso.studies.kept_work import KeptWork
 from friso.studies.metadata import digest
 from friso.studies.store_files import keep_arrays, kept_arrays, put, stored
-from friso.studies.study import Study, equations_version
+from friso.studies.study import Study
 from friso.studies.sweep import dataset
 from friso.studies.thesis.claims import Finding, Part
 from friso.studies.thesis.studies import thesis_rig
 from friso.studies.thesis.taken_apart import put_together, taken_apart
-from friso.system import remove_folder
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,24 +36,10 @@ Findings = dict[str, Finding]
 """Findings by a name, such as that of a claim."""
 
 
-@dataclass(frozen=True)
-class Kept:
-    """Where maps, experiments and findings are kept, a folder; None keeps nothing. What other code made, or is
-    damaged, is made again."""
+class Kept(KeptWork):
+    """Where maps, experiments and findings of the thesis are kept."""
 
-    folder: Path | None = None
-
-    @property
-    def count(self) -> int:
-        """How many pieces are kept."""
-        if self.folder is None or not self.folder.exists():
-            return 0
-        return sum(1 for file in self.folder.iterdir() if file.suffix in (".npz", ".json"))
-
-    def clear(self) -> None:
-        """Forget them."""
-        if self.folder is not None:
-            remove_folder(self.folder)
+    sources = SOURCES
 
     def runs(self, study: Study, verify: float, make: Callable[[], xr.Dataset]) -> xr.Dataset:
         """The runs of a study, as they were kept or made now."""
@@ -78,14 +60,7 @@ class Kept:
 
     def flags(self, about: tuple[Any, ...], make: Callable[[], Mapping[str, np.ndarray]]) -> Mapping[str, np.ndarray]:
         """Arrays by name `about` something, as they were kept or made now."""
-        file = self._file("npz", "flags", *about)
-        columns = None if file is None else kept_arrays(file)
-        if columns is not None:
-            return columns
-        arrays = make()
-        if file is not None:
-            keep_arrays(file, arrays)
-        return arrays
+        return self.arrays(("flags", *about), make)
 
     def result(self, about: tuple[Any, ...], kind: type[T], make: Callable[[], T]) -> T:
         """A result of a kind (see `taken_apart`) `about` something, as it was kept or made now."""
@@ -112,12 +87,7 @@ class Kept:
         return findings
 
     def _file(self, suffix: str, *about: Any) -> Path | None:
-        if self.folder is None:
-            return None
-        about_all = hashlib.sha256(
-            repr((equations_version(), code_digest(*SOURCES), _built_on(), thesis_rig().to_toml(), about)).encode()
-        ).hexdigest()
-        return self.folder / f"{about_all[:24]}.{suffix}"
+        return super()._file(suffix, thesis_rig().to_toml(), *about)
 
 
 NOT_KEPT = Kept()
@@ -134,9 +104,3 @@ def kept_findings(file: Path) -> Findings | None:
         return {name: Finding(tuple(Part(**part) for part in parts)) for name, parts in document.items()}
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         return None
-
-
-@cache
-def _built_on() -> str:
-    """What decides on a result besides friso's code."""
-    return f"{machine()}, scipy {version('scipy')}"
