@@ -8,7 +8,9 @@ import re
 import shlex
 import sys
 from collections.abc import Iterator
+from copy import deepcopy
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,7 @@ import friso
 from friso.cli.app import main
 from friso.errors import InputError
 from friso.identification import method
+from friso.identification.kind import Prior
 from friso.identification.logs.log import Log
 from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import profile as profiles
@@ -107,7 +110,8 @@ def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
 def test_a_stage_file_may_leave_out_what_the_log_tells(
     inputs: tuple[Path, Path], machine: Machine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Masses, friction and motion; which is handed on, so that these are not said to be given."""
+    """Masses, friction and motion; which is handed on, so that these are not said to be given, as what is set is. The
+    caller's tables stay as they are."""
     taken: list[Any] = []
 
     def instead(sources: object, base: friso.Stage, settings: object, progress: object, made_up: list[str]) -> None:
@@ -116,10 +120,17 @@ def test_a_stage_file_may_leave_out_what_the_log_tells(
 
     monkeypatch.setattr(method, "identify", instead)
     controller = {"controller": friso.load(inputs[1]).as_written()["controller"]}
+    before, told = deepcopy(controller), {"friction.stribeck_velocity": "2 mm/s", "controller.kind": "pid"}
     with pytest.raises(InputError, match="enough"):
-        friso.identify(inputs[0], stage=controller, map={"force": "Force"})
+        friso.identify(inputs[0], stage=controller, set=told, map={"force": "Force"})
     base, made_up = taken
-    assert made_up == ["masses", "friction", "motion"]
+    assert controller == before
+    assert {key.partition(".")[0] for key in made_up} == {"masses", "friction", "motion"}
+    assert "friction.coulomb" in made_up
+    assert not {*told} & {*made_up}
+    log, around = SimpleNamespace(setup={}), Prior(base, True, made_up=made_up)
+    assert around.user_told("friction.stribeck_velocity", log)  # type: ignore[arg-type]
+    assert not around.user_told("friction.viscous", log)  # type: ignore[arg-type]
     assert base.as_written()["controller"] == controller["controller"]
     assert base.flat()["masses.cart"] == pytest.approx(machine.flat["masses.cart"], rel=0.2)
     with pytest.raises(InputError) as open_tables:

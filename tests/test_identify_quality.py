@@ -492,5 +492,5 @@ def test_every_key_says_where_it_comes_from(wording: Wording) -> None:
     assert lines["static"] == NOT_IDENTIFIED
     wording(lines["bristle_stiffness"])
     assert all(comment for key, comment in lines.items() if key not in ("name", "source"))
-    beside = origins(whole, estimates, {}, ["friction"])
-    assert beside["friction.bristle_stiffness"] != beside["masses.cart"] == beside["controller.crossover"]
+    beside = origins(whole, estimates, {}, ["friction.bristle_stiffness"])
+    assert beside["friction.bristle_stiffness"] != beside["friction.viscous"] == beside["controller.crossover"]

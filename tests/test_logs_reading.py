@@ -393,6 +393,12 @@ def test_jitter_is_interpolated_and_told(tmp_path: Path, wording: Wording) -> No
     wording("\n".join(log.warnings))
     assert np.diff(log.time) == pytest.approx(log.sample_time)
     assert np.abs(log["position"] - np.interp(log.time, M["time"], exact)).max() < 1e-4 * np.abs(M["velocity"]).max()
+    period = np.mean(np.diff(M["time"]))
+    coarse = M["time"] + 0.12 * period * rng.normal(size=2000)  # a step in 600 is then over 1.5 periods
+    log = log_of(tmp_path, ["time [s]", "position [m]"], [coarse, exact])
+    assert len(log.segments) == 1
+    assert not any("lost" in line for line in log.warnings)
+    assert log.sample_time == pytest.approx(period, rel=1e-3)
 
 
 @pytest.mark.parametrize(

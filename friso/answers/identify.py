@@ -189,9 +189,11 @@ def identify(
     keep({file.path: file.mapping for file in inputs})
     inputs = [per_unit_of_force(file, beside) for file in inputs]
     sources = [(file.source, file.kind) for file in inputs[: len(paths)]]
+    made_up: list[str] = []
     if stage is not None and lacking:
         made = around(sources)
-        assumed, lacking = (stage_of(stage, set), []) if made is None else (_whole(stage, tables, made, set), lacking)
+        assumed = stage_of(stage, set) if made is None else _whole(stage, tables, made, set)
+        made_up = [] if made is None else _made_up(lacking, made, set)
     axis_kind = axis_of_all([file.source for file in inputs], assumed)
     speak_of(axis_kind)
     others = _logs_to_predict(inputs[len(paths) :])
@@ -200,11 +202,11 @@ def identify(
     from friso.identification.method import predict as predicted
     from friso.identification.method import with_laws
 
-    result = identification(sources, assumed, settings, progress, lacking)
+    result = identification(sources, assumed, settings, progress, made_up)
     if laws:
         result = with_laws(result, [source for source, _ in sources], assumed, progress)
     reused = tuple(file.reused for file in inputs if file.reused)
-    result = replace(result, warnings=(*reused, *_taken_from_logs(lacking), *result.warnings))
+    result = replace(result, warnings=(*reused, *_taken_from_logs(made_up), *result.warnings))
     predictions = [predicted(result, log, settings, assumed) for log in others]
     return IdentifyAnswer(result, inputs, predictions, axis_kind)
 
@@ -217,11 +219,18 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
         raise error if isinstance(source, Stage | Keyed) else error.found_in(str(source)) from None
 
 
-def _taken_from_logs(tables: Sequence[str]) -> list[str]:
-    """A sentence on the tables that a stage file lacks."""
-    if not tables:
+def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
+    """The keys of tables that a stage file lacks, of a stage `made` up around a log, but for those that are set."""
+    told = changes_of(changes)
+    keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
+    return [key for key in keys if key not in told]
+
+
+def _taken_from_logs(made_up: Sequence[str]) -> list[str]:
+    """A sentence on the tables of keys that were made up around a log."""
+    if not made_up:
         return []
-    listed = ", ".join(f"[{name}]" for name in tables)
+    listed = ", ".join(dict.fromkeys(f"[{key.partition('.')[0]}]" for key in made_up))
     return [f"the stage file has no {listed}: begun from the log, and our choice where that does not tell"]
 
 

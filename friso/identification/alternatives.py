@@ -105,7 +105,7 @@ def _timing_sentence(lag: int, width: int, step: float) -> str:
     if width == 1:
         return f"shifting the force {shift} improves the fit considerably, which suggests a delay between the channels"
     averaged, shifted, cause = (
-        ("motion", "the force", "an averaged or filtered force")
+        ("motion", "the force", "an averaged or filtered force, or a coupling between force and position")
         if width > 0
         else ("force", "it", "a position that is filtered, or not measured")
     )

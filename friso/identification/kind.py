@@ -46,7 +46,7 @@ NOTHING_CHOSEN = AnalysisSettings()
 class Prior:
     """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether it
     is the user's, so that its controller is the machine's, the estimates of experiments analysed before, by key, and
-    the tables of the user's stage that were `made_up` around a log."""
+    the keys of that stage that were `made_up` around a log, since its file lacks their tables."""
 
     stage: Stage | None = None
     from_user: bool = False
@@ -59,7 +59,7 @@ class Prior:
 
     def user_told(self, key: str, log: Log) -> bool:
         """Whether the user told a key of the stage as it was set up for a log. Raises InputError."""
-        return self.from_user and key.partition(".")[0] not in self.made_up and key in self.flat(log)
+        return self.from_user and key not in self.made_up and key in self.flat(log)
 
     def believed(self, log: Log) -> dict[str, Any]:
         """The same, with the values that other experiments show. Raises InputError."""

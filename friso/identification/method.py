@@ -70,7 +70,7 @@ def identify(
     made_up: Collection[str] = (),
 ) -> Identification:
     """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`, of which
-    some tables may be `made_up` around a log.
+    some keys may be `made_up` around a log.
 
     With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
     InputError for logs that cannot be used.

@@ -94,19 +94,15 @@ def origins(
     stage: Stage, estimates: Iterable[Estimate], follows: Mapping[str, str], chosen: Collection[str] | None
 ) -> dict[str, str]:
     """Where each key of an identified stage comes from: the estimates that it took, keys that follow another one, and
-    the stage file, or our choice in the `chosen` tables (None: all)."""
+    the stage file, or our choice of the `chosen` keys (None: all)."""
     sources: dict[str, str] = {}
     for estimate in estimates:
         sources[estimate.name] = f"identified: {estimate.method}" if estimate.determined else NOT_IDENTIFIED
     sources |= {key: f"not identified, moved along with {lead}" for key, lead in follows.items()}
     tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
-    ours = tables.keys() if chosen is None else chosen
-    rest = {name: "our choice, not identified" if name in ours else "as given" for name in tables}
-    return {
-        key: sources.get(key, rest[name])
-        for name, table in tables.items()
-        for key in (f"{name}.{key}" for key in table)
-    }
+    keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
+    ours = keys if chosen is None else chosen
+    return {key: sources.get(key, "our choice, not identified" if key in ours else "as given") for key in keys}
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:

@@ -1,6 +1,7 @@
 """The stage: all tables together, and the flat SI mapping that the equations read."""
 
 from collections.abc import Iterable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import replace
 from functools import cached_property
 from typing import Annotated, Any, ClassVar, Self
@@ -291,9 +292,10 @@ class Stage(Section):
         return "\n".join(lines).lstrip() + "\n"
 
 
-def changed(tables: dict[str, Any], changes: Mapping[str, Any]) -> Stage:
-    """The stage of tables in which dotted keys are set, or removed by None. Raises StageError."""
-    own = {*tables}
+def changed(tables: Mapping[str, Any], changes: Mapping[str, Any]) -> Stage:
+    """The stage of tables in which dotted keys are set, or removed by None; they themselves stay as they are. Raises
+    StageError."""
+    own, tables = {*tables}, deepcopy(dict(tables))
     for key, value in changes.items():
         _put(tables, key, getattr(value, "text", value))
     try:

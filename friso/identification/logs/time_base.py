@@ -14,7 +14,8 @@ from friso.identification.logs.checks import repeated_stamps
 from friso.quantities import percent
 
 GAP = 1.5
-"""A step of time above this many sample times is a gap: at least one sample is missing (one missing makes 2)."""
+"""A step of time above this many sample times is a gap, unless the steps beside it make up for it: at least one sample
+is missing (one missing makes 2)."""
 BRIDGED = 3
 """Samples lost in a row at most that are bridged: longer gaps split a record."""
 MOST_GAPS = 0.1
@@ -59,7 +60,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     if repeated:
         read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
     steps = np.diff(time)
-    gaps = steps > GAP * np.median(steps)
+    gaps = _gaps(steps)
     if gaps.mean() > MOST_GAPS:
         actual = (
             f"time stamps with {percent(gaps.mean())} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
@@ -76,6 +77,14 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     ends = np.cumsum([0, *(part[0].size for part in parts)]).tolist()
     time, values, filled = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return _evened(name, Track(time, values, period, [slice(a, b) for a, b in pairwise(ends)], filled, read))
+
+
+def _gaps(steps: np.ndarray) -> np.ndarray:
+    """Which steps of time, shape (n,), are gaps: the samples behind one stay late, while a step that only scatter made
+    long has short ones beside it."""
+    usual = np.median(steps)
+    beside = np.pad(np.minimum(steps, GAP * usual), 1, constant_values=usual)
+    return (steps > GAP * usual) & (beside[:-2] + steps + beside[2:] > (GAP + 2) * usual)
 
 
 def _bridged(time: np.ndarray, values: np.ndarray, lost: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
