@@ -132,8 +132,9 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
 
 
 def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion, ...]:
-    """The machine, and what 1 of the output is. Raises InputError for a stepper, which has no loop around its force."""
-    if any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values):
+    """The machine, and what 1 of the output is. Raises InputError for a stepper without an encoder: it has no loop."""
+    stepped = any(name.startswith("STEPGEN") or name in ("STEPLEN", "STEPSPACE") for name in axis.values)
+    if stepped and not any(name.startswith("ENCODER") for name in axis.values):
         raise InputError("", "a stepper: its steps are counted, not its position", "a servo axis, whose loop can hunt")
     kind = _kind(axis)
     asked: list[OpenQuestion] = []
