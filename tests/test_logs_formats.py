@@ -3,14 +3,18 @@
 import itertools
 import os
 import re
+import string
 import struct
+import subprocess
 import sys
+import time
 import zlib
 from contextlib import suppress
 from pathlib import Path
 
 import log_files
 import numpy as np
+import psutil
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -22,8 +26,10 @@ from friso.errors import InputError, LogError
 from friso.identification.logs import confined
 from friso.identification.logs import format as reading
 from friso.identification.logs.channel import Channel, ChannelTable
+from friso.identification.logs.preamble import preamble
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
-from friso.identification.logs.units import split_heading
+from friso.identification.logs.sniff import split_line
+from friso.identification.logs.units import is_unit, spelled, split_heading
 from friso.system import LIMITS_MEMORY
 
 M = log_files.motion()
@@ -585,18 +591,22 @@ def test_a_file_that_swells_is_an_error_of_its_own(
         read_table(tmp_path / "large.mat")
 
 
-def test_a_file_that_never_ends_is_an_error_of_its_own(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
-) -> None:
+def endless_mat(path: Path) -> None:
     """References to references, each level twice as many."""
     import h5py
 
-    monkeypatch.setattr(confined, "SECONDS", 3.0)
-    with h5py.File(tmp_path / "a.mat", "w") as file:
+    with h5py.File(path, "w") as file:
         below = file.create_dataset("#0", data=M["position"])
         for level in range(1, 60):
             below = file.create_dataset(f"#{level}", data=[below.ref, below.ref], dtype=h5py.ref_dtype)
         file.create_dataset("x", data=[below.ref], dtype=h5py.ref_dtype)
+
+
+def test_a_file_that_never_ends_is_an_error_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
+    monkeypatch.setattr(confined, "SECONDS", 3.0)
+    endless_mat(tmp_path / "a.mat")
     with refused("log"):
         read_table(tmp_path / "a.mat")
 
@@ -609,16 +619,37 @@ def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused
         read_table(tmp_path / "a.mat")
 
 
-@pytest.mark.skipif(not LIMITS_MEMORY, reason="this system does not hold a process to an amount of memory")
 def test_an_array_that_no_disk_holds(tmp_path: Path, refused: Refused) -> None:
-    """Two gigabytes that were never written take two kilobytes."""
+    """Numbers that were never written take two kilobytes: they are not read, though there would be room for them."""
     import h5py
 
     with h5py.File(tmp_path / "a.mat", "w") as file:
-        file.create_dataset("x", (1 << 28,), "f8", chunks=(1 << 20,), compression="gzip")
+        file.create_dataset("x", (10_000_000,), "f8", chunks=(1 << 20,), compression="gzip")
     assert (tmp_path / "a.mat").stat().st_size < 7_000
     with refused("log"):
         read_table(tmp_path / "a.mat")
+
+
+NEVER_ENDING = "import sys\nwhile True:\n    sys.stdout.buffer.write(bytes(1 << 20))\n"
+READING = """
+import sys
+from pathlib import Path
+from friso.identification.logs import confined
+
+confined.SECONDS = 300.0
+confined.content("MAT", Path(sys.argv[1]))
+"""
+
+
+def test_the_process_that_reads_ends_with_who_started_it(tmp_path: Path) -> None:
+    """However that ends: a killed process cannot stop it."""
+    endless_mat(tmp_path / "a.mat")
+    with subprocess.Popen([sys.executable, "-c", READING, tmp_path / "a.mat"]) as parent:
+        while not (children := psutil.Process(parent.pid).children()):
+            assert parent.poll() is None
+            time.sleep(0.01)
+        parent.kill()
+    children[0].wait(30)
 
 
 def test_a_group_that_contains_itself(tmp_path: Path, refused: Refused) -> None:
@@ -631,11 +662,12 @@ def test_a_group_that_contains_itself(tmp_path: Path, refused: Refused) -> None:
         read_table(tmp_path / "a.mat")
 
 
-def test_a_library_that_crashes_is_an_error_of_the_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+@pytest.mark.parametrize("text", ["import os\nos.abort()\n", NEVER_ENDING], ids=["crash", "endless"])
+def test_a_library_that_crashes_or_writes_for_ever_is_an_error_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused, text: str
 ) -> None:
     program = tmp_path / "crash.py"
-    program.write_text("import os\nos.abort()\n", encoding="utf-8")
+    program.write_text(text, encoding="utf-8")
     monkeypatch.setattr(confined.binary, "__file__", str(program))
     zeros_as_mat(tmp_path / "a.mat", 10)
     with refused("log"):
@@ -677,11 +709,17 @@ def test_a_column_of_forty_thousand_digits_is_left_out(tmp_path: Path, column: i
     assert all(np.array_equal(read[name], [float(row[k]) for row in rows]) for name, k in others.items())
 
 
-@pytest.mark.parametrize("filler", [" ", "\t", '"', ",", ";", "#", "/", "[", "(", "a("])
-def test_a_line_of_hundred_thousand_signs_takes_no_time(tmp_path: Path, filler: str) -> None:
-    """Which once took a time that grew with the square of their number: the file is read or refused."""
+LONG = 30_000
+SECONDS = 3.0
+"""Time of the processor [s] of which reading takes a tenth here, and which a reader whose time grows with the square of
+the length exceeds several times."""
+
+
+@pytest.mark.parametrize("filler", [" ", "\t", '"', ",", ";", "#", "/", "[", "(", "a(", "1", "*"])
+def test_a_long_line_takes_no_time(tmp_path: Path, filler: str) -> None:
+    """Which once took a time that grew with the square of its length: the file is read or refused."""
     rows = "".join(f"{k / 1000},{k % 7},{k % 5}\n" for k in range(50))
-    long = filler * 100_000
+    long, begin = filler * LONG, time.process_time()
     for text in (
         f"key: v{long}x\ntime [s],position [mm],force [N]\n{rows}",
         f"{long}\ntime [s],position [mm],force [N]\n{rows}",
@@ -692,6 +730,28 @@ def test_a_line_of_hundred_thousand_signs_takes_no_time(tmp_path: Path, filler: 
         (tmp_path / "log.csv").write_text(text)
         with suppress(LogError):
             read_table(tmp_path / "log.csv")
+    assert time.process_time() - begin < SECONDS
+
+
+def test_a_long_text_of_any_sign_takes_no_time() -> None:
+    """Above a table, in a heading and as a unit."""
+    names = ["time", "position", "force"]
+    for filler in (*string.punctuation, *string.whitespace, *"1aemsE"):
+        long, begin = filler * LONG, time.process_time()
+        for line in (
+            f"dt = {long} x y",
+            f"units: {long}",
+            f"{long} unit: mm",
+            f"position unit: {long}",
+            f"dt: 1{long}",
+        ):
+            preamble([line], names, ";")
+        for heading in (long, f"a{long}", f"a [{long}]", f"a_{long}", f"{long} in mm", f"{long} m/s"):
+            split_heading(heading)
+            split_line(heading, " ")
+        assert not is_unit(long)
+        assert spelled(f"µ{long}") == f"µ{long}"  # its parts are not looked at one by one
+        assert time.process_time() - begin < SECONDS
 
 
 @pytest.mark.parametrize("text", ["time [s],position{}\n0,1\n1,2\n", "0,1\n1,2\n2,{}\n", "Name,{}\n\nName,x\n0,1\n"])

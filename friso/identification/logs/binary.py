@@ -2,16 +2,19 @@
 runs it.
 
 It needs nothing of friso, so that it starts quickly: ``python binary.py KIND FILE MEMORY SECONDS``, the memory in bytes
-(0 for no limit), the seconds those of the processor, after which it ends though nobody waits for it any more. On
-standard output, pickled: what the file holds as plain dicts, lists, texts, numbers and NumPy arrays, and the message of
-the error.
+(0 for no limit). On standard output, pickled: what the file holds as plain dicts, lists, texts, numbers and NumPy
+arrays, and the message of the error. It ends after these seconds whatever the library is at, and at once when nobody
+holds its standard input open any more: who started it was killed.
 """
 
 from __future__ import annotations
 
+import faulthandler
 import logging
+import os
 import pickle
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +26,10 @@ OBJECT = "\0object"
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 """The first bytes of a file of HDF5."""
+
+
+MOST, PER_BYTE = 64 << 20, 16
+"""Bytes that what is read may take, besides a multiple of the size of the file."""
 
 
 def is_hdf5(head: bytes) -> bool:
@@ -109,6 +116,8 @@ def _from_hdf5(item: Any, file: Any) -> Any:
         return [_from_hdf5(file[reference], file) for reference in np.ravel(item[()], order="F")]
     if item.attrs.get("MATLAB_empty", 0):
         return "" if kind == "char" else np.empty(0)
+    if item.nbytes > most_bytes(file.id.get_filesize()):  # of which hardly anything is there
+        raise ValueError(_too_much(item.nbytes))
     values = np.asarray(item[()])
     if kind == "char":
         return "".join(map(chr, values.ravel(order="F")))
@@ -201,27 +210,45 @@ def _plain(node: Any) -> Any:
     return node if node is None or type(node) in (bool, int, float, str) else str(node)
 
 
-def main(kind: str, path: Path, memory: int, seconds: int) -> None:
-    """Read a file within so much memory [B] and time of the processor [s]."""
-    if sys.platform != "win32":
+def most_bytes(size: int) -> int:
+    """How many bytes a file of so many may hold, pickled."""
+    return MOST + PER_BYTE * size
+
+
+def _too_much(size: int) -> str:
+    return f"what it holds takes {size / 1e6:.0f} MB"
+
+
+def _end_with_parent() -> None:
+    """Wait until nobody holds standard input open any more, and end."""
+    while os.read(0, 1):
+        pass
+    os._exit(1)
+
+
+def main(kind: str, path: Path, memory: int, seconds: float) -> None:
+    """Read a file within so much memory [B] and time [s]."""
+    faulthandler.dump_traceback_later(seconds, exit=True)  # by a thread that needs no lock of the interpreter
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    if sys.platform != "win32" and memory:
         import resource
 
-        for what, wanted in ((resource.RLIMIT_CPU, seconds), (resource.RLIMIT_AS, memory)):
-            _, allowed = resource.getrlimit(what)
-            limit = wanted if allowed == resource.RLIM_INFINITY else min(wanted, allowed)
-            if wanted:
-                resource.setrlimit(what, (limit, limit))
-    content, message = None, ""
+        _, allowed = resource.getrlimit(resource.RLIMIT_AS)
+        limit = memory if allowed == resource.RLIM_INFINITY else min(memory, allowed)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+    message = ""
     try:
-        content = _plain(READERS[kind](path))
+        answer = pickle.dumps((_plain(READERS[kind](path)), ""), protocol=5)
+        if len(answer) > most_bytes(path.stat().st_size):
+            message = _too_much(len(answer))
     except MemoryError:
         message = "it needs too much memory"
     except RecursionError:
         message = "it is nested too deeply"
     except Exception as error:  # the libraries let through whatever a broken file makes them stumble over
         message = str(error)[:500] or type(error).__name__
-    pickle.dump((content, message), sys.stdout.buffer, protocol=5)
+    sys.stdout.buffer.write(pickle.dumps((None, message)) if message else answer)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4]))
+    main(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), float(sys.argv[4]))

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from functools import lru_cache
 from pathlib import Path
+from threading import Timer
 from typing import Any
 
 from friso.errors import LogError
@@ -34,19 +35,24 @@ def content(kind: str, path: Path) -> dict[str, Any]:
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
     seconds = SECONDS + size / BYTES_A_SECOND
-    bounds = [str(memory), str(round(2 * seconds) + 1)]  # the latter in case this process is killed
-    command = [sys.executable, "-P", binary.__file__, kind, str(path), *bounds]
+    command = [sys.executable, "-P", binary.__file__, kind, str(path), str(memory), str(2 * seconds)]
     environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
+    pipe, late = subprocess.PIPE, []
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environ) as process:
+        timer = Timer(seconds, lambda: (late.append(True), process.kill()))
+        timer.start()
+        try:
+            assert process.stdout is not None
+            answer = process.stdout.read(binary.most_bytes(size) + 1)
+        finally:
+            timer.cancel()
+            process.kill()
+    if late:
+        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path)
     try:
-        done = subprocess.run(command, capture_output=True, timeout=seconds, check=False, env=environ)
-    except subprocess.TimeoutExpired:
-        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path) from None
-    try:
-        read, message = _PlainUnpickler(io.BytesIO(done.stdout)).load()
+        read, message = _PlainUnpickler(io.BytesIO(answer)).load()
     except Exception:  # whatever is wrong with what came, it is not what the reader writes
-        errors = done.stderr.decode(errors="replace")
-        why = "it needs too much memory" if "MemoryError" in errors else "it makes the library crash"
-        raise broken(kind, why, path) from None
+        raise broken(kind, "it makes the library crash", path) from None
     if read is None:
         raise broken(kind, message, path)
     return read

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from importlib.util import find_spec
 from pathlib import Path
@@ -28,9 +29,9 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
 def cut_short(channels: Iterable[Channel], stated: Iterable[float | None]) -> list[str]:
     """Notes on channels that hold fewer samples than their file states, None for nothing: it was cut short."""
     return [
-        f"{channel.name} ends early: {channel.values.size} of {count:.4g} samples"
+        f"{channel.name} ends early: {channel.values.size} of {count:.15g} samples"
         for channel, count in zip(channels, stated, strict=True)
-        if count is not None and channel.values.size < count
+        if count is not None and channel.values.size < count < math.inf
     ]
 
 

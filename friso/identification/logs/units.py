@@ -28,6 +28,8 @@ OTHERS = {
 into these units."""
 FOREIGN = (*OTHERS["N"], "count")
 """Units in which a force may stand where estimates per such a unit are an answer."""
+LONGEST = 100
+"""Characters of a unit at most."""
 _SPELLINGS = {
     "sec": "s",
     "secs": "s",
@@ -85,7 +87,10 @@ def without_accents(name: str) -> str:
 
 
 def spelled(text: str) -> str:
-    """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none."""
+    """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none. A text too
+    long for a unit stays."""
+    if len(text) > LONGEST:
+        return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
     text = "" if text.lower() in ("none", "-", "n/a") else text
