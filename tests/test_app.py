@@ -150,12 +150,16 @@ def test_a_token_for_once_is_taken_once_and_whoever_was_faster_than_the_browser_
     assert served.request("GET", "/begin")[0] == 200
 
 
-def test_a_token_for_once_that_comes_again_later_ends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_token_for_once_is_taken_soon_or_never_and_the_browser_that_took_it_may_show_it_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     access = Access.at("127.0.0.1", 8000)
     query = f"token={access.token_for_once()}".encode()
     cookie = f"{access.cookie}={access.session_of(query)}"
-    monkeypatch.setattr(gate, "ALARM", 0.0)
-    assert (access.session_of(query), access.has_cookie(cookie)) == ("", True)
+    monkeypatch.setattr(gate, "FRESH", 0.0)
+    assert (access.session_of(query, cookie), access.has_cookie(cookie)) == ("", True)  # out of its history
+    assert access.session_of(f"token={access.token_for_once()}".encode()) == ""
+    assert (access.session_of(query), access.has_cookie(cookie)) == ("", False)  # however late another comes
 
 
 def test_the_port_takes_connections_before_the_browser_opens_and_is_free_again_at_once() -> None:

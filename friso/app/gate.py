@@ -40,9 +40,9 @@ TWICE = (
     "been first. That browser is shut out: open the address printed above"
 )
 
-ALARM = 60.0
-"""Time [s] after the first use of a token that is taken once in which a second one ends the session: the browser that
-friso started is slower only by seconds. Later it is someone who finds the address in a history."""
+FRESH = 60.0
+"""Time [s] for which a token that is taken once can be taken: the browser that friso started is slower only by
+seconds."""
 
 LOGGER = logging.getLogger("friso")
 
@@ -55,8 +55,8 @@ class Access:
     cookie: str
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
-    once: dict[str, tuple[str, float] | None] = field(default_factory=dict)
-    """Tokens that are taken once, with the session that each began, and when [s]; None before that."""
+    once: dict[str, tuple[float, str]] = field(default_factory=dict)
+    """Tokens that are taken once, with the time [s] when each was made, and the session that it began, "" before."""
     ended: set[str] = field(default_factory=set)
     """Sessions that are over."""
 
@@ -71,7 +71,7 @@ class Access:
     def token_for_once(self) -> str:
         """A token that is taken once: commands that are running, and the addresses in them, can be seen by others."""
         token = secrets.token_urlsafe(32)
-        self.once[token] = None
+        self.once[token] = time.monotonic(), ""
         return token
 
     def is_host(self, host: str) -> bool:
@@ -82,32 +82,35 @@ class Access:
         """Whether a request comes from a page of this server, or from no page at all."""
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
-    def session_of(self, query: bytes) -> str:
-        """The session that an address with a token begins, "" without one. A token that is taken once and soon comes
-        again was seen by two: what it began is over."""
+    def session_of(self, query: bytes, cookies: str = "") -> str:
+        """The session that an address with a token begins, "" without one. A token that is taken once and comes again
+        from another browser than the one with the session that it began, was seen by two: that session is over."""
         tokens = parse_qs(query.decode("latin-1")).get("token", [])
         if len(tokens) != 1:
             return ""
-        for token, begun in self.once.items():
+        for token, (made, session) in self.once.items():
             if not _same(tokens[0], token):
                 continue
-            if begun is None:
+            if not session and time.monotonic() - made < FRESH:
                 session = secrets.token_urlsafe(32)
-                self.once[token] = session, time.monotonic()
+                self.once[token] = made, session
                 return session
-            session, since = begun
-            if session not in self.ended and time.monotonic() - since < ALARM:
+            if session and session not in self.ended and not self._has(cookies, {session}):
                 self.ended.add(session)
                 LOGGER.warning(TWICE)
         return self.session if _same(tokens[0], self.token) else ""
 
     def has_cookie(self, header: str) -> bool:
         """Whether a request has the cookie."""
+        begun = {session for _, session in self.once.values() if session}
+        return self._has(header, {self.session, *begun} - self.ended)
+
+    def _has(self, header: str, sessions: set[str]) -> bool:
+        """Whether a header has the cookie of one of these sessions."""
         try:
             cookies = SimpleCookie(header)
         except CookieError:
             return False
-        sessions = {self.session, *(begun[0] for begun in self.once.values() if begun)} - self.ended
         return self.cookie in cookies and any(_same(cookies[self.cookie].value, session) for session in sessions)
 
 
@@ -144,11 +147,12 @@ class Gate:
             return PlainTextResponse(REFUSED, 403)
         if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and scope["path"] != "/":
             return PlainTextResponse(REFUSED, 403)
-        if scope["path"] == "/" and (session := access.session_of(scope["query_string"])):
+        cookies = headers.get("cookie", "")
+        if scope["path"] == "/" and (session := access.session_of(scope["query_string"], cookies)):
             response = RedirectResponse("/", 303)
             response.set_cookie(access.cookie, session, httponly=True, samesite="strict", path="/")
             return response
-        return None if access.has_cookie(headers.get("cookie", "")) else PlainTextResponse(REFUSED, 403)
+        return None if access.has_cookie(cookies) else PlainTextResponse(REFUSED, 403)
 
 
 def _same(one: str, other: str) -> bool:
