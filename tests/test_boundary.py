@@ -1,5 +1,6 @@
 """The boundary of hunting: branches of cycles in one key, curves in two, and multipliers on a grid."""
 
+from dataclasses import replace
 from itertools import pairwise
 from typing import Any
 
@@ -11,6 +12,7 @@ from variants import VARIANTS
 import friso
 from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
 from friso.hunting.boundary.branch import REACHED, Point, Tracer, continued
+from friso.hunting.boundary.diagram import each_once
 from friso.hunting.boundary.locate import changes, corrected
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
@@ -49,6 +51,20 @@ def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Di
     (fold,) = points["fold"]
     assert fold[0] == pytest.approx(16.22, abs=0.05)
     assert fold[1].point.multiplier == pytest.approx(1, abs=1e-3)
+
+
+def test_what_overlapping_branches_meet_is_listed_once(over_crossover: Diagram) -> None:
+    """It is as uncertain as they differ; at another place, or of another cycle, it is another point."""
+    (_, fold), *_ = special(over_crossover, symmetric=True)["fold"]
+
+    def moved(place: float, time: float = 0.0) -> LocatedPoint:
+        return replace(fold, point=replace(fold.point, place=fold.point.place + place, time=fold.point.time + time))
+
+    ((kept,), *others) = each_once([[fold], [moved(2e-4)], [moved(0.01)], [moved(0.0, 0.05)]])
+    assert [len(own) for own in others] == [0, 1, 1]
+    assert kept.point == fold.point
+    assert kept.error == pytest.approx(2e-4 + fold.error)
+    assert each_once([[fold, moved(2e-4)]]) == ((fold, moved(2e-4)),)  # round a cusp
 
 
 def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagram) -> None:

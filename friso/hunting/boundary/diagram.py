@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -23,6 +24,9 @@ again and again there is no end of them."""
 
 SAME = 0.02
 """Difference in the logarithm of distance up to which two cycles of one stage are the same."""
+
+CLOSE = 1e-3
+"""Difference in place up to which two branches meet one special point, where their cycles are the same there."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +84,30 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     attracts = surveyed.attracts | sought[0].attracting
     decided = surveyed.decided | sought[0].attracting
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    return Diagram(space, tuple(branches), tuple(special), places, sought[0], attracts, decided, unstable)
+    return Diagram(space, tuple(branches), each_once(special), places, sought[0], attracts, decided, unstable)
+
+
+def each_once(special: Sequence[Sequence[LocatedPoint]]) -> tuple[tuple[LocatedPoint, ...], ...]:
+    """The special points of branches, of what several meet that of the first alone: where a limiter chatters cycles are
+    followed over short ways, which overlap. What these differ by is part of its error."""
+    found: list[tuple[int, LocatedPoint]] = []
+    for number, own in enumerate(special):
+        for spot in own:
+            twin = next((k for k, (branch, other) in enumerate(found) if branch != number and _same(other, spot)), None)
+            if twin is None:
+                found.append((number, spot))
+                continue
+            branch, other = found[twin]
+            off = abs(other.point.place - spot.point.place) + spot.error
+            found[twin] = branch, replace(other, error=max(other.error, off))
+    return tuple(tuple(spot for branch, spot in found if branch == number) for number in range(len(special)))
+
+
+def _same(first: LocatedPoint, second: LocatedPoint) -> bool:
+    """Whether two special points are one: of the same kind, with the same cycle there."""
+    apart = np.abs(first.point.vector - second.point.vector)
+    kinds = [(spot.kind, spot.point.cycle.sign, spot.point.cycle.swings) for spot in (first, second)]
+    return bool(kinds[0] == kinds[1] and apart[0] < CLOSE and apart[1:].max() < SAME)
 
 
 def _passes(branch: Branch, point: Point) -> bool:
