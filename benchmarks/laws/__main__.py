@@ -13,6 +13,7 @@ import json
 import os
 import sys
 import time
+from dataclasses import astuple
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,7 @@ def _record(law: str, seed: int, number: int) -> dict[str, Any]:
     for claim in said.claims:
         if claim.surveyed is not None:
             for cycle in cycles_of(claim, claim.surveyed):
-                cycles.append([claim.case, cycle.amplitude, cycle.multiplier, cycle.gap, cycle.size, cycle.growth])
+                cycles.append(list(astuple(cycle)))
                 if cycle.wrong:
                     wrong.append(f"WRONG: {claim.case}, cycle of {cycle.amplitude:.4g} m: {cycle.wrong}")
         for refutation in refutations(claim, number):
@@ -80,11 +81,23 @@ def _summary(records: list[dict[str, Any]]) -> None:
         rows.append(
             [
                 law, len(own), f"{sum(sure)} of {len(sure)}", f"{sum(edges)} of {len(edges)}", len(cycles),
-                *(f"{max(values, default=0.0):.1g}" for values in ([c[3] for c in cycles], [c[4] for c in cycles])),
-                f"{max(apart, default=0.0):.1g}", f"{np.median([record['cpu'] for record in own]):.1f}",
+                *(f"{max((c[column] for c in cycles), default=0.0):.1g}" for column in (3, 4)),
+                f"{max(apart, default=0.0):.1g}", f"{max((c[6] for c in cycles), default=0.0):.1g}",
+                f"{np.median([record['cpu'] for record in own]):.1f}",
             ]
         )  # fmt: skip
-    heads = ("law", "stages", "sure verdicts", "sure edges", "cycles", "open by", "size", "multiplier", "CPU [s]")
+    heads = (
+        "law",
+        "stages",
+        "sure verdicts",
+        "sure edges",
+        "cycles",
+        "open by",
+        "size",
+        "multiplier",
+        "brute",
+        "CPU [s]",
+    )
     print_table(heads, rows)
     wrong = sum(line.startswith("WRONG") for record in records for line in record["wrong"])
     print_goals([Goal("wrong among the sure", "none", str(wrong), not wrong)], "Issue 26, section 4")

@@ -88,7 +88,8 @@ class ElastoPlastic(StribeckSection):
         """Purely elastic up to the break-away deflection."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
         displacement = virgin_displacements(static, stiffness)
-        return on_bristles(flat, virgin_force(static, stiffness, flat["friction.breakaway_deflection"], displacement))
+        force = virgin_force(static, stiffness, flat["friction.breakaway_deflection"], displacement)
+        return on_bristles(flat, displacement, force)
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:

@@ -152,7 +152,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         """From rest each element is drawn along until it bears its share of static friction."""
         levels, stiffness, strength = levels_of(flat), _elements(flat, STIFFNESS), _elements(flat, SHARE)
         strength = strength * levels.static
-        displacement = virgin_displacements(levels.static, float(stiffness.sum()))
+        displacement = virgin_displacements(levels.static, float(stiffness.sum()), strength / stiffness)
         force = np.minimum(stiffness * displacement[:, None], strength).sum(axis=1)
         damping = sum(flat[name] for name in element_keys(flat, DAMPING))
         return MeasuredFriction(levels, float(stiffness.sum()), float(damping), displacement, force)

@@ -47,8 +47,8 @@ class LuGre(StribeckSection):
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """From rest F = F_s (1 - exp(-sigma_0 x/F_s))."""
         static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        deflection = virgin_displacements(static, stiffness) * stiffness / static
-        return on_bristles(flat, -static * np.expm1(-deflection))
+        displacement = virgin_displacements(static, stiffness)
+        return on_bristles(flat, displacement, -static * np.expm1(-displacement * stiffness / static))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:

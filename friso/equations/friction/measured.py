@@ -3,7 +3,7 @@ sliding from rest (the virgin curve), and damping at rest. Laws declare theirs, 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
@@ -11,9 +11,12 @@ import numpy as np
 
 from friso.equations.conditions import LEVELS, level_under_conditions
 
-REACH, POINTS = 60.0, 2000
-"""How far the virgin curve goes, in units of the deflection that static friction would cause at the first stiffness;
-and its points, which lie the closer the nearer to rest."""
+REACH, POINTS, FURTHER = 60.0, 2000, 200
+"""How far virgin curves go, in units of the deflection that static friction would cause at the first stiffness; and
+their points, which lie the closer the nearer to rest, and in those that go on further."""
+
+NEAR = 1e-6
+"""Distance of points, as a share of the last, below which no slope can be told."""
 
 
 @dataclass(frozen=True)
@@ -60,9 +63,16 @@ class MeasuredFriction:
         return float(np.max(np.abs(force - self.force)) / self.levels.static)
 
 
-def virgin_displacements(static: float, stiffness: float) -> np.ndarray:
-    """Displacements [m] at which virgin curves are compared, shape (n,)."""
-    return static / stiffness * REACH * np.linspace(0.0, 1.0, POINTS) ** 2
+def virgin_displacements(static: float, stiffness: float, corners: Sequence[float] | np.ndarray = ()) -> np.ndarray:
+    """Displacements [m] at which virgin curves are compared, shape (n,), the `corners` of one among them: to the last
+    of these, if that is far away."""
+    usual, corners = static / stiffness * REACH, np.unique(np.append(0.0, corners))
+    places = usual * np.linspace(0.0, 1.0, POINTS) ** 2
+    if corners[-1] > usual:
+        places = np.append(places, np.geomspace(usual, corners[-1], FURTHER)[1:])
+    after = np.searchsorted(corners, places)
+    beside = [corners[np.clip(after - before, 0, len(corners) - 1)] for before in (0, 1)]
+    return np.union1d(places[np.abs(places - beside).min(axis=0) > NEAR * places[-1]], corners)
 
 
 def levels_of(flat: Mapping[str, Any]) -> Levels:
@@ -76,17 +86,11 @@ def levels_under_conditions(flat: Mapping[str, Any]) -> Levels:
     return replace(levels_of(flat), **{name: float(level_under_conditions(flat, name)) for name in LEVELS})
 
 
-def on_bristles(flat: Mapping[str, Any], force: np.ndarray) -> MeasuredFriction:
+def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
     """What is measured of a law with a Stribeck curve whose bristles, as stiff and damped as those of LuGre, give the
-    virgin curve `force` [N] at the `virgin_displacements` that belong to them."""
-    levels, stiffness = levels_of(flat), float(flat["friction.bristle_stiffness"])
-    return MeasuredFriction(
-        levels,
-        stiffness,
-        float(flat["friction.bristle_damping"]),
-        virgin_displacements(levels.static, stiffness),
-        force,
-    )
+    virgin curve `force` [N] over `displacement` [m]."""
+    stiffness, damping = (float(flat[f"friction.bristle_{name}"]) for name in ("stiffness", "damping"))
+    return MeasuredFriction(levels_of(flat), stiffness, damping, displacement, force)
 
 
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:

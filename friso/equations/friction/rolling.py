@@ -71,9 +71,12 @@ class Rolling(StribeckSection):
     @staticmethod
     def shown(flat: Mapping[str, Any]) -> MeasuredFriction:
         """From rest as Dahl's exponent has it."""
-        static, stiffness = flat["friction.static"], flat["friction.bristle_stiffness"]
-        displacement = virgin_displacements(static, stiffness)
-        return on_bristles(flat, power_law(static, stiffness, flat["friction.rolling_exponent"], displacement))
+        static, stiffness, i = (
+            flat[f"friction.{name}"] for name in ("static", "bristle_stiffness", "rolling_exponent")
+        )
+        far = static / stiffness * (LACKS ** (1 - i) - 1) / (i - 1) if i > 1 else 0.0
+        displacement = virgin_displacements(static, stiffness, [far])
+        return on_bristles(flat, displacement, power_law(static, stiffness, i, displacement))
 
     @staticmethod
     def keeping(measured: MeasuredFriction, elements: int) -> dict[str, Any]:
@@ -99,6 +102,9 @@ class Rolling(StribeckSection):
         softer = softening(levels.static / levels.coulomb - 1, exponent)
         return bristles_active(flat, softer, "" if exponent == 1 else f"^{exponent:g}")
 
+
+LACKS = 0.01
+"""Share of static friction that a virgin curve may lack at the end of what is shown of it."""
 
 ROUNDED = 1e-4
 """Share of the level that bristles lack below which they give way in proportion to it."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from friso.quantities import exactly
 from friso.stage import Stage
 from friso.stage.section import list_fields, nearest_name, numeric_fields
 from friso.stage.tables import FrictionSection, friction_law, friction_laws, passive_where
-from friso.studies.laws.virgin import read_virgin_curve, with_virgin_curve
+from friso.studies.laws.virgin import WITHIN, VirginPoints, read_virgin_curve, with_virgin_curve
 
 ELEMENTS = 6
 """Elements of a law that has several, unless told otherwise."""
@@ -55,7 +56,7 @@ class MeasuredChange:
 class LawConversion:
     """A stage with another friction law: what it was made from, what was compared, the keys that the measurements leave
     open, with their ranges [SI], the condition of passivity that the law does not meet ("" where it is passive), and
-    whether the virgin curve `before` is that of `points` that were measured, not of the law of the source."""
+    the `points` that were measured of the virgin curve, where it is not that of the law of the source."""
 
     stage: Stage
     source: Stage
@@ -64,7 +65,7 @@ class LawConversion:
     compared: tuple[MeasuredChange, ...]
     open: Mapping[str, tuple[float, float]]
     active: str
-    points: bool = False
+    points: VirginPoints | None = None
 
     @property
     def law(self) -> str:
@@ -109,14 +110,23 @@ def convert(
     if not before.stiffness and law != stage.flat()["friction.model"]:
         actual = f'"{stage.flat()["friction.model"]}", which does not stick: it has no stiffness before sliding to keep'
         raise InputError("friction.model", actual, "a law that sticks", 'model = "lugre"')
+    flat, made, points = stage.flat(), friction_law(law), None
     if virgin is not None:
-        before = with_virgin_curve(before, *read_virgin_curve(virgin, stage.axis_kind))
-    flat, keys = stage.flat(), friction_law(law).keeping(before, elements)
-    if law == flat["friction.model"] and virgin is None:  # nothing is left open
-        if _elements_of(law, flat) <= keys.keys() <= flat.keys():
+        before, points = with_virgin_curve(before, *read_virgin_curve(virgin, stage.axis_kind))
+    keys, left_open = made.keeping(before, elements), made.left_open(before)
+    if law == flat["friction.model"]:
+        if points is None and _elements_of(law, flat) <= keys.keys() <= flat.keys():
             return compared(stage, stage, before)
-        keys |= {key: flat[key] for key in friction_law(law).left_open(before)}
-    return compared(stage, with_friction(stage, law, keys), before, virgin is not None)
+        unseen = {key: flat[key] for key in left_open if _shows_the_same(stage, law, keys, keys | {key: flat[key]})}
+        keys |= unseen
+        left_open = {key: ends for key, ends in left_open.items() if key not in unseen}
+    return compared(stage, with_friction(stage, law, keys), before, left_open, points)
+
+
+def _shows_the_same(stage: Stage, law: str, keys: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    """Whether two sets of keys have the same virgin curve."""
+    one, two = (measure_friction(with_friction(stage, law, chosen).flat()) for chosen in (keys, other))
+    return bool(np.array_equal(one.force, two.force))
 
 
 def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
@@ -124,16 +134,22 @@ def with_friction(stage: Stage, law: str, keys: Mapping[str, Any]) -> Stage:
     return stage.replace({"friction": _table(stage, law, keys)})
 
 
-def compared(source: Stage, made: Stage, before: MeasuredFriction, points: bool = False) -> LawConversion:
-    """A stage `made` from another, whose friction was measured `before`; whether that is by `points`."""
+def compared(
+    source: Stage,
+    made: Stage,
+    before: MeasuredFriction,
+    left_open: Mapping[str, tuple[float, float]] = MappingProxyType({}),
+    points: VirginPoints | None = None,
+) -> LawConversion:
+    """A stage `made` from another, whose friction was measured `before`, if need be by `points`; and what that leaves
+    open in it."""
     flat = made.flat()
-    after, law = measure_friction(flat), friction_law(flat["friction.model"])
-    left_open = law.left_open(before) if points or law is not friction_law(source.flat()["friction.model"]) else {}
+    after = measure_friction(flat)
     items = (
         _curve(source, made, before),
         _number("static", "N", before.levels.static, after.levels.static),
         _number("stiffness", "N/m", before.stiffness, after.stiffness),
-        _virgin_change(before, after),
+        _virgin_change(before, after, points),
         _number("damping", "N*s/m", before.damping, after.damping),
         _number("viscous", "N*s/m", before.levels.viscous, after.levels.viscous),
     )
@@ -181,14 +197,17 @@ def _curve(source: Stage, made: Stage, before: MeasuredFriction) -> MeasuredChan
     return MeasuredChange("curve", "N", float(old[at]), float(new[at]), off)
 
 
-WITHIN = 0.02
-"""Share of static friction by which a virgin curve may be off and still be the same in a measurement."""
-
-
-def _virgin_change(before: MeasuredFriction, after: MeasuredFriction) -> MeasuredChange:
-    """The virgin curve, where the two are farthest apart."""
+def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: VirginPoints | None) -> MeasuredChange:
+    """The virgin curve, where the two are farthest apart; or the points, which scatter."""
     if not after.stiffness:
         return MeasuredChange("virgin", "N", before.levels.static, 0.0, float(before.stiffness > 0), WITHIN)
-    force = np.interp(before.displacement, after.displacement, after.force)
-    at = int(np.argmax(np.abs(force - before.force)))
-    return MeasuredChange("virgin", "N", float(before.force[at]), float(force[at]), before.misfit(force), WITHIN)
+    if points is None:
+        old, new = before.force, np.interp(before.displacement, after.displacement, after.force)
+        scatter = 0.0
+    else:
+        new = np.interp(points.displacement, after.displacement, after.force)
+        old, new = points.means(points.force), points.means(new)
+        scatter = points.usual / np.sqrt(points.together)
+    at, static = int(np.argmax(np.abs(new - old))), before.levels.static
+    off, allowed = float(abs(new - old)[at] / static), float(WITHIN + scatter / static)
+    return MeasuredChange("virgin", "N", float(old[at]), float(new[at]), off, allowed)

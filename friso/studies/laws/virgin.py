@@ -3,26 +3,66 @@
 from __future__ import annotations
 
 import os
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import isotonic_regression
 
 from friso.axis import AxisKind
 from friso.equations.friction.measured import MeasuredFriction, virgin_displacements
 from friso.errors import InputError
 from friso.identification.logs.read import read_table
 from friso.identification.logs.units import unit_factor
+from friso.studies.laws.concave import KNOTS, concave_fits
 
 EXAMPLE = "displacement [um],force [N]"
 """Heading of a file with such a curve."""
 
-LEAST, MOST, REACHES = 3, 2000, 0.9
-"""Points at least and at most, and the share of static friction up to which they have to go at least."""
+LEAST, MOST, REACHES, LATE = 3, 100_000, 0.9, 20
+"""Points at least and at most, and the share of static friction up to which the last one in so many goes at least."""
 
-NEAR = 1e-6
-"""Share of the last displacement within which there are no two points, so that slopes can be told."""
+BACK = 0.01
+"""Share of the way by which a displacement may go back: noise, not a turn."""
+
+WITHIN = 0.02
+"""Share of static friction by which a virgin curve may be off and still be the same in a measurement."""
+
+PLAIN = 4
+"""What a free number has to gain to be taken: twice as much as by Akaike's criterion."""
+
+AS_LIKELY = 4.0
+"""Difference of Akaike's criterion up to which a fit is taken to be as likely as the best."""
+
+FIRST = 1 / 3
+"""Share of static friction that the first point may bear, and still say how stiff the start is."""
+
+
+@dataclass(frozen=True)
+class VirginPoints:
+    """Points of a virgin curve: `displacement` [m] and `force` [N], both of shape (n,), the standard deviation by which
+    the force scatters [N], and the range of the first slope [N/m] that they allow, up to infinity where they lie too
+    far from rest to say."""
+
+    displacement: np.ndarray
+    force: np.ndarray
+    scatter: float
+    stiffness: tuple[float, float]
+
+    def means(self, force: np.ndarray) -> np.ndarray:
+        """Of so many neighbouring points that their scatter hardly counts, where there are many: of forces [N] at the
+        displacements, shape (n,)."""
+        return np.convolve(force, np.full(self.together, 1 / self.together), "valid")
+
+    @property
+    def together(self) -> int:
+        """How many points a mean is of."""
+        wanted = (self.usual / (WITHIN * max(self.force))) ** 2
+        return int(np.clip(np.ceil(wanted), 1, max(len(self.force) // KNOTS, 1)))
+
+    @property
+    def usual(self) -> float:
+        """How far the farthest of so many points is off by scatter alone [N]."""
+        return self.scatter * float(np.sqrt(2 * np.log(len(self.force))))
 
 
 def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.ndarray, np.ndarray]:
@@ -35,13 +75,16 @@ def read_virgin_curve(path: str | os.PathLike[str], kind: AxisKind) -> tuple[np.
     )
     if displacement.shape != force.shape or len(force) < LEAST:
         raise _refused(path, f"{len(displacement)} displacements and {len(force)} forces", f"{LEAST} points or more")
-    if not (np.isfinite(displacement).all() and np.isfinite(force).all()):
-        raise _refused(path, "a point that is no number", "numbers in every row")
-    if displacement[0] < 0 or np.any(np.diff(displacement) <= 0):
-        raise _refused(path, "displacements that do not increase", "displacements from rest (0) on, each larger")
     if len(force) > MOST:
         raise _refused(path, f"{len(force)} points", f"at most {MOST}: thin them out")
-    if force[-1] <= max(force[0], 0.0) or force.min() < 0:
+    if not (np.isfinite(displacement).all() and np.isfinite(force).all()):
+        raise _refused(path, "a point that is no number", "numbers in every row")
+    noise = BACK * displacement.max()
+    if np.count_nonzero(displacement > 0) < LEAST - 1 or displacement.min() < -noise:
+        raise _refused(path, "displacements at or below 0", "displacements from rest, positive")
+    if np.any(np.maximum.accumulate(displacement) - displacement > noise):
+        raise _refused(path, "displacements that do not increase", "displacements from rest (0) on, one way")
+    if force.max() <= 0 or force[-1] < force[0] or np.median(force) <= 0:
         raise _refused(path, "a force that does not rise", "the force that opposes the displacement, positive")
     return displacement, force
 
@@ -60,24 +103,34 @@ def _refused(path: str | os.PathLike[str], actual: str, expected: str) -> InputE
     return InputError("--virgin", f"{path}: {actual}", expected, f"a file that begins with: {EXAMPLE}")
 
 
-def with_virgin_curve(measured: MeasuredFriction, displacement: np.ndarray, force: np.ndarray) -> MeasuredFriction:
-    """The same with the points [m, N], both of shape (n,), as its virgin curve: straight between them, concave as
-    springs that slip one after the other are (the nearest such curve, by least squares of the slopes), and level where
-    it has reached static friction. Raises InputError for points that contradict static friction."""
+def with_virgin_curve(
+    measured: MeasuredFriction, displacement: np.ndarray, force: np.ndarray
+) -> tuple[MeasuredFriction, VirginPoints]:
+    """The same with the points [m, N], both of shape (n,), as its virgin curve, and what these tell. The curve is the
+    nearest that springs which slip one after the other can have: concave, from 0 to static friction, by least squares;
+    straight between few points, smooth through many. Raises InputError for points that contradict static friction."""
     static = measured.levels.static
-    if not REACHES * static <= force.max() <= static / REACHES:
-        actual = f"points up to {force.max():.4g}, where friction.static is {static:.4g} (SI)"
+    end = float(force[-max(len(force) // LATE, 1) :].mean())
+    if not REACHES * static <= end <= static / REACHES:
+        actual = f"points up to {end:.4g}, where friction.static is {static:.4g} (SI)"
         raise InputError("--virgin", actual, "points up to break-away", '--set friction.static="3 N"')
-    if displacement[0] > 0:
-        displacement, force = np.append(0.0, displacement), np.append(0.0, force)
-    way = np.diff(displacement)
-    slopes = np.maximum(isotonic_regression(np.diff(force) / way, weights=way, increasing=False).x, 0.0)
-    risen = np.append(0.0, np.cumsum(slopes * way))
-    stiffness, last = float(slopes[0]), float(slopes[slopes > 0][-1])
-    reach = displacement[-1] + max(static - risen[-1], 0.0) / last  # goes on as it ends
-    points, risen = np.append(displacement, reach), np.append(risen, max(static, risen[-1]))
-    between = virgin_displacements(static, stiffness)
-    near = np.abs(between[:, None] - points).min(axis=1) < NEAR * points[-1]
-    dense = np.union1d(between[~near], points)
-    curve = np.minimum(np.interp(dense, points, risen), static)
-    return replace(measured, stiffness=stiffness, displacement=dense, force=curve)
+    away = displacement > 0  # the others say what the sensor shows at rest
+    moved, rising = displacement[away], force[away]
+    fits = list(concave_fits(moved, rising, static))
+    fit, likeliest = min(fits, key=lambda fit: fit.misfit + PLAIN * fit.free), min(fit.akaike for fit in fits)
+    likely = [(a.slope, 2 * a.error) for a in fits if a is fit or a.akaike <= likeliest + AS_LIKELY]
+    low, high = min(slope - error for slope, error in likely), max(slope + error for slope, error in likely)
+    blind = np.count_nonzero(moved <= fit.corners[0]) < 2 or fit(moved[:1])[0] > FIRST * static
+    ends = max(low, 0.0), np.inf if blind else high
+    points = VirginPoints(displacement, force, _scatter(rising - fit(moved)), ends)
+    at_rest = force[~away]
+    if len(at_rest) and abs(at_rest.mean()) > WITHIN * static + points.usual:
+        actual = f"a force of {at_rest.mean():.4g} at displacement 0 (SI)"
+        raise InputError("--virgin", actual, "none there: less what the sensor shows at rest", f"{EXAMPLE}, then 0,0")
+    dense = virgin_displacements(static, fit.slope, fit.corners)
+    return replace(measured, stiffness=fit.slope, displacement=dense, force=fit(dense)), points
+
+
+def _scatter(residual: np.ndarray) -> float:
+    """The standard deviation of what is not smooth in it, shape (n,)."""
+    return float(np.sqrt(np.mean(np.diff(residual) ** 2) / 2))

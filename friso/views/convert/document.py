@@ -34,6 +34,8 @@ def convert_document(conversion: LawConversion) -> dict[str, Any]:
                 for item in conversion.compared
             ],
             "open": {key: list(ends) for key, ends in conversion.open.items()},
+            "stiffness_range_n_per_m": [*conversion.points.stiffness] if conversion.points else None,
+            "scatter_n": conversion.points.scatter if conversion.points else None,
             "passive": not conversion.active,
             "passive_where": conversion.active or None,
         }

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from friso.quantities import percent
 from friso.stage.stage import declared_keys
 from friso.views.drawing.prefixes import listed, with_unit
@@ -35,8 +37,20 @@ def conversion_sentences(conversion: LawConversion) -> list[str]:
         says = [f"{name} under {law}: {listed([_change(item) for item in lost], 'and')}."]
     else:
         says = [f"{name} under {law} fits the same measurements."]
+    if conversion.points:
+        says.append(_stiffness(conversion.points.stiffness, conversion.before.stiffness))
     says += [_open(key, ends, conversion) for key, ends in conversion.open.items()]
     return [*says, *activity_sentences(conversion.active)]
+
+
+def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
+    low, high, value = (with_unit(x, "N/m") for x in (*ends, stiffness))
+    if np.isinf(ends[1]):
+        return (
+            "The points lie too far from rest to show the stiffness before sliding: it is taken as "
+            f"{value}, and may be more. Measure closer to rest."
+        )
+    return f"The points show a stiffness before sliding between {low} and {high}; it is taken as {value}."
 
 
 def activity_sentences(condition: str) -> list[str]:

@@ -1,0 +1,118 @@
+"""The nearest curve to points that springs side by side can have which slip one after the other: from 0, concave and
+never falling, by least squares. Knots nearest to rest that the points do not bear out only follow their noise, and
+are left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+KNOTS, NEAR = 40, 1e-6
+"""Knots at most, and how far they are apart at least and the first is from rest, as a share of the last."""
+
+ROUNDED = 1e-6
+"""Share of the end by which points that are written in files are off."""
+
+SURE = 1e4
+"""Weight of the end of a curve, which it has to reach, in weights of all points together."""
+
+STEPS, HOPELESS = 10_000, 100.0
+"""Steps of the fit at most; and how much worse Akaike's criterion becomes before no knots are left out any more."""
+
+
+@dataclass(frozen=True)
+class ConcaveFit:
+    """A curve from 0 to its end over `knots`, increasing, of shape (n,): `strength` gives how much of it ends there,
+    of two kinds, shape (2, n): straight up to the knot, and bent so that its slope falls to 0. With the standard
+    error of its first slope, -2 times the logarithm of its likelihood, and how many numbers are free in it."""
+
+    knots: np.ndarray
+    strength: np.ndarray
+    error: float
+    misfit: float
+    free: int
+
+    @property
+    def corners(self) -> np.ndarray:
+        """The knots at which something ends, shape (at most n,)."""
+        return self.knots[self.strength.any(axis=0)]
+
+    @property
+    def akaike(self) -> float:
+        """Akaike's criterion: the likelier, the less."""
+        return self.misfit + 2 * self.free
+
+    @property
+    def slope(self) -> float:
+        """At the start."""
+        return float(np.sum(self.strength * _SLOPES[:, None] / self.knots))
+
+    def __call__(self, x: np.ndarray) -> np.ndarray:
+        """The curve at x >= 0, of its shape (m,): level from the last knot on."""
+        return _shapes(x, self.knots) @ self.strength.ravel()
+
+
+_SLOPES = np.array([1.0, 2.0])
+"""First slopes of both kinds, in units of their ends over their knots."""
+
+
+def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Both kinds of curves with ends of 1 at x >= 0, shape (m, 2 n)."""
+    reached = np.minimum(x[:, None] / knots, 1.0)
+    return np.hstack([reached, reached * (2 - reached)])
+
+
+def knots_of(x: np.ndarray) -> np.ndarray:
+    """Where points, of shape (m,), let a curve bend: at each of them, or at some, the closer the nearer to 0."""
+    places = np.unique(x)
+    places = places[np.append(places[0] >= NEAR * places[-1], np.diff(places) > NEAR * places[-1])]
+    if len(places) <= KNOTS:
+        return places
+    wanted = np.geomspace(places[0], places[-1], KNOTS)
+    return places[np.unique(np.searchsorted(places, wanted).clip(max=len(places) - 1))]
+
+
+def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
+    """The nearest curves to points x > 0 and y, both of shape (m,), that reach `end`: straight between their knots, or
+    bent too if there are many, and with the first few knots left out. Beyond the points they go on as these end, as far
+    again at most."""
+    knots = knots_of(x)
+    rows = _rows(x, y, knots)
+    straight, _ = nnls(rows[:, : len(knots)], rows[:, -1], maxiter=STEPS)
+    slope, lacks = straight[-1] / knots[-1], end - straight.sum()
+    further = min(lacks / slope, knots[-1]) if slope > 0 else knots[-1]
+    if further > NEAR * knots[-1] and lacks > 0:
+        knots = np.append(knots, knots[-1] + further)
+        rows = _rows(x, y, knots)
+    rows = np.vstack([rows, SURE * np.sqrt(len(x)) * np.append(np.ones(2 * len(knots)), end)])
+    best = np.inf
+    for bent in (False, True)[: 1 + (len(x) > KNOTS)]:
+        for first in range(len(knots)):
+            fit = _fit(rows, knots, first, bent, len(x), end)
+            best = min(best, fit.akaike)
+            if fit.akaike > best + HOPELESS:
+                break
+            yield fit
+
+
+def _rows(x: np.ndarray, y: np.ndarray, knots: np.ndarray) -> np.ndarray:
+    """Equations that say the same as those of the points, as few as they have unknowns: shape (2 n + 1, 2 n + 1) at
+    most, the right-hand side last."""
+    return np.asarray(np.linalg.qr(np.column_stack([_shapes(x, knots), y]), mode="r"))
+
+
+def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: int, end: float) -> ConcaveFit:
+    """One of them, from the equations `rows` of all."""
+    used = np.arange(2 * len(knots)).reshape(2, -1)[: 1 + bent, first:].ravel()
+    weights, away = nnls(rows[:, used], rows[:, -1], maxiter=STEPS)
+    strength = np.zeros((2, len(knots)))
+    strength.flat[used] = weights
+    free = used[weights > 0]
+    misfit = float(points * np.log(away**2 / points + (ROUNDED * end) ** 2))
+    gain = (_SLOPES[:, None] / knots).ravel()[free]
+    spread = np.linalg.pinv(rows[:, free]).T @ gain
+    error = float(away * np.linalg.norm(spread) / np.sqrt(max(points - len(free), 1)))
+    return ConcaveFit(knots[first:], strength[:, first:], error, misfit, len(free))
