@@ -59,6 +59,9 @@ def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.Mon
         (r"D:\Profiles\Anna", r"D:\Profiles\Anna"),
         ("/scratch/ann/friso", "/scratch/USER/friso"),
         ("/scratch/annual/friso", "/scratch/annual/friso"),
+        ("cannot use /home/bea because it is full, as /var/tmp is", "cannot use ~ because it is full, as /var/tmp is"),
+        (r"C:\Users\Bea Miller\AppData is full", r"~\AppData is full"),
+        ("/scratch/friso_ann/x and /data/Ann: full", "/scratch/friso_USER/x and /data/USER: full"),
     ],
 )
 def test_no_user_is_named(text: str, shown: str, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 from pathlib import Path
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from inside import friso_inside
 
+from friso.answers.output_folder import OutputFolder
 from friso.identification.contents import log_content
 from friso.identification.logs.mapping import Mapping, from_options
 from friso.views.logs.words import next_command, sparkline
@@ -103,12 +105,23 @@ def test_the_command(bare: Path, tmp_path: Path) -> None:
     assert {gap["about"] for gap in log["open"]} == {"position", "force", "time"}
 
 
-def test_one_bad_file_does_not_hide_the_others(bare: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("full", [False, True])
+def test_one_bad_file_does_not_hide_the_others(
+    bare: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, full: bool
+) -> None:
+    """Nor is it hidden where the disk is full."""
+
+    def no_space(*_: object) -> list[Path]:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    if full:
+        monkeypatch.setattr(OutputFolder, "write", no_space)
     (tmp_path / "empty.csv").write_text("")
-    done = friso_inside(tmp_path, "logs", "empty.csv", "bare.csv")
+    done = friso_inside(tmp_path, "logs", "empty.csv", "bare.csv", "--out", "out")
     assert done.returncode == 2
     assert "bare.csv" in done.stdout
     assert "empty.csv" in done.stderr
+    assert ("No space left" in done.stderr) == full
 
 
 def test_a_channel_of_times_is_proposed_for_its_unit(tmp_path: Path) -> None:

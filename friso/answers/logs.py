@@ -26,9 +26,15 @@ class LogsAnswer(Answer):
     """What files hold: `result` has a `LogContent` for each that could be read, `wrong` what is wrong with others."""
 
     command = "logs"
+    status = 2
 
     def __init__(self, contents: Sequence[LogContent], errors: Sequence[InputError]) -> None:
         self.result, self.errors = list(contents), list(errors)
+
+    @property
+    def failure(self) -> str:
+        """What is wrong with the files that cannot be read."""
+        return str(unreadable(self.errors)) if self.errors else ""
 
     def sentences(self) -> Sequence[str]:
         """What each file is, and what is open."""

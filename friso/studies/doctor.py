@@ -163,6 +163,8 @@ def _without_names(text: str, full_paths: bool) -> str:
     with suppress(OSError, KeyError, ImportError):  # without a name
         user = getpass.getuser()
     written = (home, repr(home)[1:-1]) if len(home) > 3 else ()  # not a root; errors double backslashes
-    homes = [*map(re.escape, written), r"""(?<!\w)([a-z]:)?[\\/]+(home|users)[\\/]+[^\\/'"]+"""]  # such as ANNMIL~1
+    word = r"""[^\s\\/'":;,]+"""
+    name = rf"""(?:{word}(?: {word})*(?=[\\/'"])|{word})"""  # such as ANNMIL~1, or Ann Miller before what is below
+    homes = [*map(re.escape, written), rf"(?<!\w)([a-z]:)?[\\/]+(home|users)[\\/]+{name}"]
     text = re.sub(rf"({'|'.join(homes)})(?!\w)", "~", text, flags=re.IGNORECASE)
-    return re.sub(rf"(?<=[\\/]){re.escape(user)}(?=[\\/'\"]|$)", "USER", text) if user else text
+    return re.sub(rf"(?<=[\\/._-]){re.escape(user)}(?![^\W_])", "USER", text, flags=re.IGNORECASE) if user else text

@@ -26,7 +26,6 @@ def logs(
     Example: friso logs log.csv --out logs
     """
     from friso.answers.logs import logs as question
-    from friso.answers.logs import unreadable
     from friso.answers.output_folder import output_folder
 
     target = output_folder("logs", out, overwrite, logs)
@@ -37,8 +36,6 @@ def logs(
         if target is not None and answer.result:
             files, unwritten = tried(lambda: target.write(answer.files(), progress))
     show(answer, files, as_json and not answer.errors, unwritten=unwritten)
-    if answer.errors:
-        raise unreadable(answer.errors)
 
 
 def listed_formats() -> list[tuple[str, str]]:
