@@ -206,10 +206,12 @@ else:
         """Give a file a name and place where there is nothing. Raises OSError, FileExistsError where there is."""
         try:
             os.link(draft, path)
-        except OSError as error:  # or a disk without links
+        except OSError as error:
             if os.path.lexists(path):
                 raise FileExistsError(errno.EEXIST, "it was not there before", str(path)) from error
-            draft.replace(path)
+            draft.replace(path)  # a disk without links
+        else:
+            draft.unlink()
 
     def rename_folder(folder: Path, path: Path) -> None:
         """Give a folder another's name and place. Raises OSError, where there is something but an empty folder too."""

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from friso.system import delete_file, replace_file
+from friso.system import delete_file, name_new_file, replace_file
 
 PARTIAL = ".partial"
 """How the names of files end that are being written, these and Zarr's, after 32 digits."""
@@ -20,9 +20,10 @@ FOR_ALL, FOR_USER = 0o666, 0o600
 
 
 @contextmanager
-def whole_file(path: Path, mode: int = FOR_ALL) -> Iterator[BinaryIO]:
+def whole_file(path: Path, mode: int = FOR_ALL, new: bool = False) -> Iterator[BinaryIO]:
     """A stream whose content takes the place of a file when the block ends; of a block that fails nothing is left. A
-    new file is for whom the user lets read files, or with `FOR_USER` for this user alone. Raises OSError."""
+    new file is for whom the user lets read files, or with `FOR_USER` for this user alone. Raises OSError,
+    FileExistsError where it has to be `new` and something is there by then."""
     draft = path.with_name(f"{path.name}.{uuid.uuid4().hex}{PARTIAL}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
     try:
@@ -30,7 +31,7 @@ def whole_file(path: Path, mode: int = FOR_ALL) -> Iterator[BinaryIO]:
             yield stream
             stream.flush()
             os.fsync(stream.fileno())
-        replace_file(draft, path)
+        (name_new_file if new else replace_file)(draft, path)
     except BaseException:
         with suppress(OSError):  # what was raised is told
             delete_file(draft)

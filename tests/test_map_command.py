@@ -214,6 +214,8 @@ def test_a_store_is_checked(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
     done = friso_inside(tmp_path, "map", "a.zarr", "--check")
     assert done.returncode == 0
+    for name, hint in (("a.zarr", "or friso map a.zarr"), ("b.zarr", "or a store made by friso map")):
+        assert hint in " ".join(friso_inside(tmp_path, "check", name).stderr.split())
     (chunk, *_) = (tmp_path / "a.zarr" / "peaks").glob("[0-9]*")
     content = chunk.read_bytes()
     chunk.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))

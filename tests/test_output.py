@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import shutil
 import signal
 import sys
@@ -121,7 +122,7 @@ def test_a_file_that_is_there_is_refused(command: str, tmp_path: Path) -> None:
     assert len(load(tmp_path / "a.toml").name) > 0
 
 
-def test_the_folder_of_a_map_is_its_store(tmp_path: Path) -> None:
+def test_the_folder_of_a_map_is_its_store(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Another command takes it for one that friso map made; beside files of others, no store is made."""
     (tmp_path / "a.zarr").mkdir()
     (tmp_path / "a.zarr" / ".zattrs").write_text('{"equations": "1", "friso": "1"}')
@@ -129,6 +130,15 @@ def test_the_folder_of_a_map_is_its_store(tmp_path: Path) -> None:
         place(tmp_path / "a.zarr")
     check_store_folder(tmp_path / "a.zarr")
     check_store_folder(tmp_path / "new.zarr")
+    with monkeypatch.context() as patch:  # a folder that is write-protected: a store in it may be written all the same
+
+        def protected(*arguments: object) -> None:
+            raise PermissionError(errno.EACCES, "Permission denied")
+
+        patch.setattr("friso.answers.output_folder._try_draft", protected)
+        check_store_folder(tmp_path / "a.zarr")
+        with pytest.raises(InputError, match=rf"new\.zarr[\s\S]*Permission denied: {re.escape(str(tmp_path))}\)"):
+            check_store_folder(tmp_path / "new.zarr")
     (tmp_path / "mine.txt").write_text("mine")
     with pytest.raises(InputError, match="--overwrite"):
         check_store_folder(tmp_path)

@@ -62,11 +62,29 @@ def test_a_table_of_countless_keys_is_refused_at_once() -> None:
 
 @posix
 def test_a_file_whose_name_is_no_text_is_answered(tmp_path: Path) -> None:
-    file = tmp_path / os.fsdecode(b"r\xffg.toml")
-    file.write_bytes((EXAMPLES / "lugre_stick_slip.toml").read_bytes())
-    done = friso_inside(tmp_path, "convert", file, "--friction", "gms", "--out", tmp_path / os.fsdecode(b"o\xff"))
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / os.fsdecode(b"o\xff") / "r_g_gms.toml").exists()
+    """Nor one that is so long that there is no room for what follows it."""
+    out = tmp_path / os.fsdecode(b"o\xff")
+    for name, stem in ((b"r\xffg", "r_g"), ("ä".encode() * 120, "ä" * 75)):
+        file = tmp_path / os.fsdecode(name + b".toml")
+        file.write_bytes((EXAMPLES / "lugre_stick_slip.toml").read_bytes())
+        done = friso_inside(tmp_path, "convert", file, "--friction", "gms", "--out", out)
+        assert done.returncode == 0, done.stderr
+        assert (out / f"{stem}_gms.toml").exists()
+
+
+def test_a_stage_is_not_saved_over_a_file_that_appears_meanwhile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place, stage = tmp_path / "a.toml", friso.load(EXAMPLES / "thesis_rig.toml")
+
+    def text(stage: friso.Stage) -> str:
+        place.write_text("mine")
+        return ""
+
+    monkeypatch.setattr(friso.Stage, "to_toml", text)
+    with pytest.raises(InputError):
+        friso.save(stage, place)
+    assert ([*tmp_path.iterdir()], place.read_text()) == ([place], "mine")
 
 
 @posix

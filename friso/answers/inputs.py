@@ -101,9 +101,16 @@ def correlations_of(source: StageLike, stage: Stage) -> Correlations:
     return correlations.among(stage.uncertain())
 
 
+_LONGEST_STEM = 150
+"""Bytes of the part of a name that is taken from another file."""
+
+
 def stem_of(source: StageLike, usual: str = "stage") -> str:
-    """What files about a stage are called: the name of its file without the suffix, "_" for bytes that are no text."""
-    return usual if isinstance(source, Stage | Mapping) else re.sub("[\ud800-\udfff]", "_", Path(source).stem)
+    """What files about a stage are called: the name of its file without the suffix, "_" for bytes that are no text; the
+    beginning of a long one, with room for what follows it."""
+    if isinstance(source, Stage | Mapping):
+        return usual
+    return re.sub("[\ud800-\udfff]", "_", Path(source).stem).encode()[:_LONGEST_STEM].decode(errors="ignore")
 
 
 def tolerance_of(value: str | float) -> float:

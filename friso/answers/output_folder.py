@@ -119,14 +119,16 @@ def refuse_place(option: str, path: Path) -> None:
 
 def check_store_folder(folder: Path) -> None:
     """Raises InputError where a folder that is to be a store holds anything but a store of friso map: a store is the
-    whole folder, so that --overwrite does not put one beside files of others. Or where it cannot be written."""
+    whole folder, so that --overwrite does not put one beside files of others. Or where a new one cannot be made."""
     maker, _ = marked(folder)
-    if _entries(folder) and maker != STORE_MAKER:
-        raise _of_others(folder, maker, f"or one that friso {STORE_MAKER} made; {OVERWRITE} replaces stores alone")
+    if _entries(folder):
+        if maker != STORE_MAKER:
+            raise _of_others(folder, maker, f"or one that friso {STORE_MAKER} made; {OVERWRITE} replaces stores alone")
+        return
     try:
         _try_draft(folder.parent / MARKER)
     except OSError as error:
-        expected = f"a folder that can be written ({cause_of(error)})"
+        expected = f"a place in a folder that can be written ({cause_of(error)}: {folder.parent})"
         raise InputError("--out", str(folder), expected, "--out study.zarr") from None
 
 

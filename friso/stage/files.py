@@ -31,7 +31,7 @@ _HINTS = {
     ".csv": "friso logs {}",
     ".mat": "friso logs {}",
     ".tdms": "friso logs {}",
-    ".zarr": "a store made by friso map; there is none at {}",
+    ".zarr": "friso map {}",
 }
 """What a file is for that is no stage file, by its suffix."""
 
@@ -63,7 +63,8 @@ def _hinted(path: str | os.PathLike[str], read: Callable[[str], Read]) -> Read:
         return read(text_of(Path(path), _EXPECTED))
     except InputError as error:
         error = error.found_in(str(path))
-        hint = _HINTS.get(Path(path).suffix.lower(), "").format(shell_word(str(path)))
+        hints = _HINTS if os.path.lexists(path) else {".zarr": "a store made by friso map"}
+        hint = hints.get(Path(path).suffix.lower(), "").format(shell_word(str(path)))
         if hint:
             error = InputError(error.key, error.actual, f"{error.expected}; or {hint}", "", str(path))
         raise StageError.of(error) from None
@@ -121,7 +122,7 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     if os.path.lexists(place) and not (overwrite and place.is_file()):
         raise InputError("", "a file that already exists", "a new file, or overwrite=True", origin=str(place))
     try:
-        with whole_file(place) as file:
+        with whole_file(place, new=not overwrite) as file:
             file.write(stage.to_toml().encode())
     except OSError as error:
         raise InputError("", _reason(error), "a writable location", origin=str(place)) from error

@@ -161,7 +161,7 @@ def load_mapping(log: Path, folder: Path | None = None) -> Mapping | None:
     """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises LogError
     for a file that is not one."""
     for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
-        if place.is_file():
+        if os.path.isfile(place):  # nor is there one whose name would be too long
             return _parsed(place)
     return None
 
