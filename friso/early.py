@@ -1,6 +1,7 @@
-"""A signal that comes while friso starts is noted from here on: the first module of it, which needs next to nothing.
+"""What comes first where friso is a command, in a module that needs next to nothing: a signal that comes while the rest
+is imported is noted, and nothing of that is looked for in the current folder, which may be someone else's.
 
-Nothing is installed where friso is used as a library.
+Nothing is done where friso is used as a library.
 """
 
 import atexit
@@ -12,9 +13,8 @@ from types import FrameType
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 """The signals that end a command."""
 
-IS_COMMAND = ("-m", "friso") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or (
-    os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
-)
+_IS_MODULE = ("-m", "friso") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
+IS_COMMAND = _IS_MODULE or os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
 """Whether this process was started as friso, or as python -m friso."""
 
 came: list[int] = []
@@ -30,6 +30,10 @@ def _ignore() -> None:
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
+
+_HOME = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+if _IS_MODULE and sys.path[:1] == [os.getcwd()] != [_HOME]:  # python -m puts it there, but for -P
+    del sys.path[0]
 
 if IS_COMMAND:
     for number in SIGNALS:

@@ -168,3 +168,11 @@ def test_a_failed_rename_names_its_target(capsys: pytest.CaptureFixture[str]) ->
 def test_a_library_that_cannot_be_loaded_names_the_remedy(error: Exception, capsys: pytest.CaptureFixture[str]) -> None:
     assert _failed(error) == 1
     assert LIBRARIES in " ".join(capsys.readouterr().err.split())
+
+
+def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Path) -> None:
+    for name in ("typer", "logging", "numpy"):
+        (tmp_path / f"{name}.py").write_text("open('run', 'w').close()\n")
+    done = subprocess.run([sys.executable, "-m", "friso", "--version"], cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert not (tmp_path / "run").exists()
