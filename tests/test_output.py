@@ -153,12 +153,29 @@ def test_a_place_may_be_new_empty_or_its_own(tmp_path: Path) -> None:
     new = place(out)
     assert not (tmp_path / "a").exists()  # looking leaves nothing
     assert new.write({"page.html": "1", "logs/a.csv": b"2"}) == [out / "page.html", out / "logs" / "a.csv"]
-    place(out).write({"page.html": "3", "logs/a.csv": None})
+    new.write({"more.txt": ""})  # as a command may do twice
+    place(out).write({"page.html": "3", "logs/a.csv": None, "more.txt": None})
     assert {name for name, content in tree(out).items() if content is not None} == {"page.html", MARKER}
     assert (out / "page.html").read_text() == "3"
     empty = tmp_path / "empty"
     (empty / UNFINISHED).mkdir(parents=True)
     place(empty).write({"page.html": ""})
+
+
+def test_a_folder_in_which_a_killed_process_was_writing_is_gone_on_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+
+        def killed(*arguments: object) -> None:
+            raise OSError("killed")
+
+        patch.setattr(drafts_module, "name_new_file", failing(drafts_module.name_new_file, 3, OSError("killed")))
+        patch.setattr(drafts_module, "delete_file", killed)  # by which it would be undone
+        with pytest.raises(OSError, match="killed"):
+            place(tmp_path / "out").write({"a.txt": "1", "b.txt": "2"})
+    assert {*tree(tmp_path / "out")} == {MARKER, "a.txt"}
+    assert len(place(tmp_path / "out").write({"a.txt": "1", "b.txt": "2"})) == 2
 
 
 def test_a_file_that_friso_has_not_written_stays(

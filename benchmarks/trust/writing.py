@@ -52,7 +52,7 @@ def files(rng: random.Random, folder: Path) -> None:
     assert not strange, f"{fault}: neither as before nor as after: {strange}"
     lost = {name for name in before if name in whole} - {*after}
     assert not lost, f"{fault}: lost {lost}"
-    OutputFolder("check", out, True).write(new)
+    OutputFolder("check", out, False).write(new)
     left = [name for name in _contents(folder) if ".friso-draft" in name]
     assert not left, f"{fault}: left {left}"
 

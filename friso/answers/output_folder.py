@@ -97,18 +97,24 @@ class OutputFolder:
         self.check(files)
         others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
         contents = {self.folder / name: content for name, content in files.items()}
-        marker = {self.folder / MARKER: self._marker(files)} if self.is_own else {}
         own = contents if self.overwrite else [self.folder / name for name in self.files]
-        own = [*own, *(beside or ()), *(marker if self.is_marked else ())]
-        write({**contents, **(beside or {}), **marker}, own, progress)
-        if others:
-            LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
-        return [path for path, content in contents.items() if content is not None]
-
-    def _marker(self, files: Files) -> str:
+        own = [*own, *(beside or ()), *([self.folder / MARKER] if self.is_marked else ())]
         gone = {name for name, content in files.items() if content is None}
         names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
-        return marker(self.command, names)
+        leaving = [name for name in gone if os.path.lexists(self.folder / name)]
+        # The marker first: where the process is killed on the way, the next knows what is there for its own.
+        write({**self._marker([*names, *leaving]), **contents, **(beside or {})}, own, progress)
+        if self.is_own:
+            self.is_marked, self.files = True, tuple(names)
+        if leaving:
+            write(self._marker(names), [self.folder / MARKER])
+        if others:
+            LOGGER.warning(f"replaced (--overwrite): {', '.join(others)}")
+        return written(contents)
+
+    def _marker(self, names: Iterable[str]) -> dict[Path, Content]:
+        """The marker with names of files, if the folder is the command's own."""
+        return {self.folder / MARKER: marker(self.command, names)} if self.is_own else {}
 
 
 def refuse_place(option: str, path: Path) -> None:

@@ -140,8 +140,7 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
     into what is deleted here."""
     draft = _free_name(path)
     try:
-        draft.parent.mkdir(parents=True, exist_ok=True)
-        draft.mkdir(mode=0o700)
+        draft.mkdir(mode=0o700, parents=True)
         with FileLock(draft / LOCK):  # locked, it is no leftover
             new = draft / "store"
             with hold_interrupts():
