@@ -13,6 +13,7 @@ from friso.errors import InputError
 from friso.identification.logs import mapping
 from friso.identification.logs.read import read_frequency_response
 from friso.stage import Stage, loads, numeric_keys, parse_set
+from friso.stage.files import parsed
 from friso.stage.plausible import implausible_values
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -187,6 +188,18 @@ def test_a_value_that_is_hardly_meant_is_questioned(stage: str, key: str, value:
     assert key in doubt
     assert value in doubt
     assert doubt.endswith(f"was {meant} meant?")
+
+
+def test_what_no_machine_has_is_questioned_of_any_key() -> None:
+    (doubt,) = implausible_values(loads(RIG).replace({"friction.viscous": "1e300 N*s/m"}))
+    assert doubt.startswith("friction.viscous = 1e300 N*s/m ")
+
+
+def test_rows_of_an_array_are_no_tables() -> None:
+    rows = "  [0.5, 'a'],\n" * 1100
+    assert len(parsed(f"rows = [\n{rows}]\n", "a stage")["rows"]) == 1100
+    with pytest.raises(InputError, match="tables"):
+        parsed("".join(f'[ a . "b {k}" ] # a, b\n' for k in range(1100)), "a stage")
 
 
 def test_an_element_of_an_array_is_questioned() -> None:

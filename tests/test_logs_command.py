@@ -138,3 +138,9 @@ def test_a_german_clock_is_known_by_its_name(tmp_path: Path) -> None:
     content = log_content(path, Mapping())
     assert content.kind == "moves"
     assert content.channels[0].role == "time"
+
+
+def test_what_of_a_file_is_not_there_is_told(tmp_path: Path) -> None:
+    nothing = np.full(1200, np.nan)
+    log_files.write_text(tmp_path / "a.csv", ["t", "x", "u", "load"], [M["time"], M["position"], M["force"], nothing])
+    assert "left out: column 4 (load)" in friso_inside(tmp_path, "logs", "a.csv").stdout

@@ -489,6 +489,7 @@ def test_bad_frequency_responses(tmp_path: Path, text: str, refused: Refused) ->
         b"t [s],x [m]\n1,2\n2,3\n3,4,5\n4,5\n",
         b"t [s],x [m]\n1,2\n2,3\n3\n4,5\n",
         b"t [s],x [m]\n" + b"1,2\n" * 300 + b"2,oops\n" + b"3,4\n" * 300,
+        b't [s];"x [m];F [N]\n1;2;3\n2;3;4\n3;4;5\n',
         b"note\n\nt;x\n1,0;2,5\n2,0;3,5\n\n3,0;bad\n4,0;1,5\n",
         b"TDSm" + bytes(200),
         b"MATLAB 5.0 MAT-file" + bytes(300),
@@ -503,6 +504,12 @@ def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes, refused: R
     with refused("log") as caught:
         read_table(tmp_path / "a.log")
     assert str(tmp_path / "a.log") in str(caught.value)
+
+
+def test_a_line_that_does_not_end_is_a_text(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text('"' * 300_000)
+    with pytest.raises(InputError, match="no row of numbers"):
+        read_table(tmp_path / "a.csv")
 
 
 def test_missing_files_and_folders(tmp_path: Path, refused: Refused) -> None:

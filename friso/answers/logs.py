@@ -44,7 +44,7 @@ class LogsAnswer(Answer):
         for content in self.result:
             lines += [sentence for _, sentence in conclusions(content)]
             lines += [f"open: {line}" for line in open_questions(content)]
-            lines += [f"note: {line}" for line in content.warnings]
+            lines += [f"note: {line}" for line in (*content.lost, *content.warnings)]
         return lines
 
     def tables(self) -> Sequence[AnswerTable]:

@@ -78,6 +78,11 @@ class LogContent:
     warnings: tuple[str, ...] = ()
     gaps: tuple[LogError, ...] = ()
 
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """The lines of `read` that tell what of the file is not there."""
+        return tuple(line for line in self.read if line.startswith("left out") or " ends early: " in line)
+
 
 def log_content(path: Path, options: Mapping, folder: Path | None = None) -> LogContent:
     """What a file holds, mapped as the options say or as kept beside it or in `folder`. Raises LogError for what cannot

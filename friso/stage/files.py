@@ -203,7 +203,8 @@ _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_PARTS}}}", re.MULTILINE)
 """Keys of more parts than any table has; the time that thousands of them take grows with the square of their number."""
 
-_TABLE = re.compile(r"^[ \t]*\[", re.MULTILINE)
+_TABLE = re.compile(rf"^[ \t]*\[\[?[ \t]*{_PART}(?:[ \t]*\.[ \t]*{_PART})*[ \t]*\](?!.*,[ \t]*$)", re.MULTILINE)
+"""The heading of a table; a row of an array ends with a comma."""
 
 MOST_TABLES, MOST_LINES = 1000, 20_000
 """How many tables and lines a text has at most: those of a megabyte take seconds."""

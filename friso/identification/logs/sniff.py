@@ -6,6 +6,7 @@ import codecs
 import csv
 import re
 from collections import Counter
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,7 +78,8 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
     if odd > 0.02 * len(text):
         raise _no_text(path)
     lines = re.split(r"\r\n|\n|\r", text)
-    return encoding, lines[:-1] if len(head) == HEAD_BYTES or not lines[-1] else lines
+    is_cut = len(head) == HEAD_BYTES and len(lines) > 1
+    return encoding, lines[:-1] if is_cut or not lines[-1] else lines
 
 
 def _no_text(path: Path) -> LogError:
@@ -133,10 +135,21 @@ def layout(path: Path) -> TextLayout:
             if best.columns > MOST_COLUMNS:
                 expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
                 raise LogError("log", f"{best.columns} columns", expected, "", str(path))
+            _no_open_quote(lines[: best.first], best.delimiter, path)
             return best
     actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
     expected = "a heading and rows of numbers" + ("; a stage file is for friso check" if path.suffix == ".toml" else "")
     raise LogError("log", actual, expected, "time [s];position [mm];force [N]", str(path))
+
+
+def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
+    """Raises LogError for a heading with a quotation mark that is not closed: the cells behind it would be one."""
+    number, heading = next(((n, line) for n, line in reversed([*enumerate(above, 1)]) if line.strip()), (0, ""))
+    with suppress(csv.Error):
+        lines = [f"{heading.strip()}\n", "below"]
+        if len([*csv.reader(lines, delimiter=delimiter, skipinitialspace=True)]) == 1:
+            actual = f"a quotation mark in line {number} that is not closed"
+            raise LogError("log", actual, "a heading with its quotation marks closed", "", str(path))
 
 
 def _fit(
