@@ -209,13 +209,16 @@ def test_what_windows_alone_calls_otherwise(axis: Path) -> None:
 
 
 WORDS = r"""
+import errno, os, shutil
 from pathlib import Path
+from unittest.mock import patch
 
 from friso.app.names import plain_name
 from friso.bounded_file import content_of
 from friso.engine import building
 from friso.engine.private import read_private
-from friso.system import cause_of, check_free, delete_file, name_refused, path_of, replace_file, shell_word
+from friso.system import cause_of, check_free, delete_file, name_new_file, name_refused, path_of, remove_folder
+from friso.system import replace_file, shell_word
 
 assert [plain_name(name, "log") for name in ("nul", "Con.csv", "a. ", "x.csv")] == ["_nul", "_Con.csv", "a", "x.csv"]
 assert shell_word("position=Act Pos") == 'position="Act Pos"'
@@ -250,6 +253,35 @@ with open("busy-1") as held:
         else:
             raise AssertionError(refused)
 assert not Path("busy-4").exists()
+
+def raises(kind, use, *arguments):
+    try:
+        use(*arguments)
+    except OSError as error:
+        return isinstance(error, kind)
+    return False
+
+Path("draft").write_bytes(b"new")
+assert raises(FileExistsError, name_new_file, Path("draft"), Path("busy-3"))
+assert Path("busy-3").read_bytes() == b"draft"
+name_new_file(Path("draft"), Path("new"))
+assert (Path("new").read_bytes(), Path("draft").exists()) == (b"new", False)
+
+Path("folder").mkdir()
+with patch.object(os, "open", side_effect=PermissionError(13, "Permission denied", "folder")):
+    assert raises(IsADirectoryError, content_of, Path("folder"), 100)  # no file that another program holds
+with patch.object(os, "access", return_value=False):  # the attribute of a file that may not be written
+    assert raises(OSError, check_free, Path("busy-3"))
+
+def in_deletion(folder, ignore_errors=False, calls=[1, 2]):
+    if not ignore_errors and not calls:
+        os.rmdir(folder)
+    elif not ignore_errors and calls.pop():
+        raise OSError(errno.ENOTEMPTY, "Directory not empty", folder)
+
+with patch.object(shutil, "rmtree", in_deletion):  # a file of it that another program reads is not gone yet
+    remove_folder(Path("folder"))
+assert not Path("folder").exists()
 
 builder = building._Builder(building._Surroundings(0, ".", (), ""))
 builder.kill()  # as one does that has waited long enough

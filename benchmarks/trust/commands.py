@@ -13,11 +13,10 @@ from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
 from pathlib import Path
-from tempfile import mkdtemp
 
 import psutil
 
-from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC, STICK_SLIP
+from benchmarks.trust.inputs import ANSWERS, AXIS, DRIVE, LEAVES, RIG, SPEC, STICK_SLIP, folder_until_the_end
 from friso.answers.drafts import DRAFTS
 from friso.answers.output_folder import MARKER, UNFINISHED, marked, write
 
@@ -270,7 +269,7 @@ def _prepare(name: str, folder: Path) -> None:
 @cache
 def _undisturbed(name: str) -> Path:
     """A folder with what a command writes that nothing happened to."""
-    folder = Path(mkdtemp(prefix="friso-trust-"))
+    folder = folder_until_the_end(name)
     _prepare(name, folder)
     done = _finished(folder, WRITING[name])
     assert done.returncode == 0, done.stderr

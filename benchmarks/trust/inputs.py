@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
+from multiprocessing.util import Finalize
 from pathlib import Path
+
+from friso.leftovers import temporary_folder
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))
@@ -18,6 +21,15 @@ ANSWERS = ("force_per_output=10 N", "masses.stage=3 kg", "friction.model=none", 
 """What the parameter file does not tell."""
 
 LOG = "time [s],position [m],force [N]\n" + "".join(f"{k / 1000},{(k % 50) * 1e-6},{k % 7}\n" for k in range(200))
+
+
+def folder_until_the_end(name: str) -> Path:
+    """A folder that goes with this process; what killed ones left of theirs goes now."""
+    held = ExitStack()
+    folder = held.enter_context(temporary_folder("friso-undisturbed-")) / name
+    Finalize(None, held.close, exitpriority=1)  # processes of a pool end without what atexit knows
+    folder.mkdir()
+    return folder
 
 
 @contextmanager

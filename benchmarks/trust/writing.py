@@ -8,7 +8,6 @@ from __future__ import annotations
 import json
 import random
 import shutil
-import tempfile
 import warnings
 from functools import cache
 from pathlib import Path
@@ -18,6 +17,7 @@ import numpy as np
 import friso
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.faults import struck
+from benchmarks.trust.inputs import folder_until_the_end
 from friso.answers.output_folder import MARKER, OutputFolder
 from friso.errors import InputError
 from friso.studies import metadata
@@ -157,7 +157,7 @@ def _study() -> Study:
 @cache
 def _undisturbed() -> Path:
     """The store that nothing happened to."""
-    path = Path(tempfile.mkdtemp(prefix="friso-trust-store-")) / "a.zarr"
+    path = folder_until_the_end("stores") / "a.zarr"
     sweep(friso.load(RIG), AXES, metrics=["peaks"], store=path)
     return path
 

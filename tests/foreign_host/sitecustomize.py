@@ -194,10 +194,22 @@ def _windows_open(real):
     return opened
 
 
+def _wakeup(real):
+    """Windows takes a pipe that blocks."""
+
+    def set_wakeup_fd(fd, **named):
+        if fd >= 0:
+            os.set_blocking(fd, False)
+        return real(fd, **named)
+
+    return set_wakeup_fd
+
+
 os.mkdir = _making(os.mkdir)
 if HOST == "win32":
     _rename = os.rename
     os.rename, os.replace = _renaming(os.rename), _renaming(os.replace)
+    signal.set_wakeup_fd = _wakeup(signal.set_wakeup_fd)
     os.unlink = os.remove = _deleting(os.unlink)
     os.open, os.mkdir = _within_reach(os.open), _within_reach(os.mkdir)
     builtins.open = io.open = _windows_open(_within_reach(io.open))
