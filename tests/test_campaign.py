@@ -2,6 +2,7 @@
 
 import inspect
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,26 @@ def test_a_crash_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     assert failure("crash", crash, 1, 1) == "ZeroDivisionError: of case"
     monkeypatch.setitem(campaign.CASES, "crash", crash)
     assert [number for number, _ in campaign.run_part("crash", 1, range(3)).failures] == [0, 1, 2]
+
+
+def test_a_case_that_cannot_be_run_here_is_counted_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(commands.shutil, "which", lambda name: None)
+    part = campaign.run_part("small-disk", 1, range(3))
+    assert (part.count, part.failures, len(part.left_out)) == (0, [], 3)
+
+
+@pytest.mark.parametrize("name", ["logs", "stores"])
+def test_who_refuses_everything_fails(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
+    def refused(path: Path) -> None:
+        raise friso.InputError("", "this", "that")
+
+    if name == "stores":
+        monkeypatch.setattr("benchmarks.trust.writing.check_store", refused)
+        assert campaign.run_part(name, 3, range(20)).failures
+    else:
+        monkeypatch.setitem(READERS, name, replace(READERS[name], read=refused))
+        with pytest.raises(friso.InputError):
+            campaign.reading(name)
 
 
 def test_every_function_and_command_is_tried() -> None:

@@ -35,13 +35,14 @@ def main() -> int:
     rows, failed = [], 0
     shares = [1 if name in HEAVY else SHARE for name in names]
     for k, name in enumerate(names):
-        start, wrong, count = time.monotonic(), 0, 0
+        start, wrong, count, left = time.monotonic(), 0, 0, []
         cases = max(2, arguments.cases // HEAVY.get(name, 1))
         numbers = range(cases) if arguments.number is None else range(arguments.number, arguments.number + 1)
         until = start + (end - start) * shares[k] / sum(shares[k:])
         for part in _parts(name, arguments.seed, numbers, arguments.jobs, until):
             count += part.count
             wrong += len(part.failures)
+            left += part.left_out
             for number, why in part.failures:
                 print(f"FAILED {name} {number}: {why}")
                 print(
@@ -50,7 +51,8 @@ def main() -> int:
         failed += wrong
         seconds = time.monotonic() - start
         rows.append((name, str(count), str(wrong), f"{seconds:.0f}", f"{count / seconds:.3g}"))
-        print(f"{name}: {count} cases, {wrong} failed, {seconds:.0f} s", flush=True)
+        reasons = f", {len(left)} left out ({', '.join({*left})})" if left else ""
+        print(f"{name}: {count} cases, {wrong} failed{reasons}, {seconds:.0f} s", flush=True)
     print_table(("campaign", "cases", "failed", "time [s]", "cases per s"), rows)
     print(f"seed {arguments.seed}, {sum(int(row[1]) for row in rows)} cases, {failed} failed")
     return 1 if failed else 0

@@ -11,14 +11,14 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.trust.arguments import ARGUMENTS
-from benchmarks.trust.commands import COMMANDS
+from benchmarks.trust.commands import COMMANDS, LeftOut
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.questions import questions
 from benchmarks.trust.readers import READERS
@@ -45,22 +45,28 @@ HEAVY = {"binary-logs": 8, "arguments": 8, "options": 32, "app": 8, "stores": 16
 
 @dataclass(frozen=True)
 class Part:
-    """How many cases were run, and the numbers of those that failed, and why."""
+    """How many cases were run, the numbers of those that failed, and why, and why others could not be run here."""
 
     count: int
     failures: list[tuple[int, str]]
+    left_out: list[str] = field(default_factory=list)
 
 
 def run_part(name: str, seed: int, numbers: range, end: float = float("inf")) -> Part:
     """Run cases of a campaign, until a time of the monotonic clock [s]."""
-    case, count, wrong = case_of(name), 0, []
+    case, count, wrong, left = case_of(name), 0, [], []
     for number in numbers:
-        if count and time.monotonic() > end:
+        if (count or left) and time.monotonic() > end:
             break
+        try:
+            why = failure(name, case, seed, number)
+        except LeftOut as reason:
+            left.append(str(reason))
+            continue
         count += 1
-        if (why := failure(name, case, seed, number)) is not None:
+        if why is not None:
             wrong.append((number, why))
-    return Part(count, wrong)
+    return Part(count, wrong, left)
 
 
 @cache
@@ -70,12 +76,14 @@ def case_of(name: str) -> Case:
 
 
 def failure(campaign: str, case: Case, seed: int, number: int) -> str | None:
-    """What went wrong in a case, None for nothing."""
+    """What went wrong in a case, None for nothing. Raises LeftOut where it cannot be run here."""
     rng = random.Random(f"{seed} {campaign} {number}")
     with tempfile.TemporaryDirectory(prefix="friso-trust-") as folder:
         try:
             with redirect_stderr(io.StringIO()), _silent_log():
                 case(rng, Path(folder))
+        except LeftOut:
+            raise
         except Exception as error:
             return f"{type(error).__name__}: {str(error)[:300]}"
     return None
@@ -92,9 +100,15 @@ def _silent_log() -> Iterator[None]:
 
 
 def reading(name: str) -> Case:
-    """Damaged files of a kind are read, or refused."""
+    """Damaged files of a kind are read, or refused; the sound ones that they are made of are read."""
     reader = READERS[name]
     contents = reader.contents()
+    for content in contents:
+        with tempfile.TemporaryDirectory(prefix="friso-trust-") as folder, _silent_log(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            path = Path(folder) / reader.file
+            path.write_bytes(content)
+            reader.read(path)
 
     def case(rng: random.Random, folder: Path) -> None:
         path = folder / reader.file

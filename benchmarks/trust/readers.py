@@ -5,14 +5,13 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 from unittest import mock
 
@@ -23,6 +22,7 @@ import friso
 from friso.design_method.spec import load_spec
 from friso.identification.logs import binary, confined, mapping
 from friso.identification.logs.assemble import read_log
+from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.read import is_frequency_response, read_frequency_response
 from friso.stage import Stage
 from friso.stage.correlations import read_correlations
@@ -65,35 +65,42 @@ def _mapping(path: Path) -> None:
 def _log(path: Path) -> None:
     if is_frequency_response(path):
         read_frequency_response(path)
-    else:
+        return
+    with suppress(GapsError):  # a MAT file without units is read, and asks for them
         read_log(path, mapping.Mapping(), strict=False, needed=("position", "force"))
 
 
 def _binary_log(path: Path) -> None:
     """As it is read, but for the start of Python: what reads is a copy of this process."""
-    with mock.patch.object(confined.subprocess, "run", _forked):
+    with mock.patch.object(confined, "_answer", _forked):
         _log(path)
 
 
-def _forked(command: list[str], **_: Any) -> SimpleNamespace:
+def _forked(command: list[str], seconds: float, most: int) -> bytes:
     """Run the program that reads a binary log, within its bounds of memory and time."""
-    kind, file, memory, seconds = command[-4:]
+    kind, file, memory, longest = command[-4:]
+    held, holds = os.pipe()
     with tempfile.TemporaryFile() as out:
         child = os.fork()
         if not child:
             try:
+                os.dup2(held, 0)
+                os.close(holds)
                 sys.stdout = open(out.fileno(), "w", closefd=False)  # noqa: SIM115
-                signal.alarm(int(confined.SECONDS))
+                signal.signal(signal.SIGALRM, signal.SIG_DFL)
+                signal.alarm(int(seconds))
                 used = psutil.Process().memory_info().vms
-                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0, int(seconds))
+                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0, float(longest))
                 sys.stdout.flush()
             finally:
                 os._exit(0)
         status = os.waitpid(child, 0)[1]
+        os.close(held)
+        os.close(holds)
         if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM:
-            raise subprocess.TimeoutExpired(command, confined.SECONDS)
+            raise TimeoutError
         out.seek(0)
-        return SimpleNamespace(stdout=out.read(), stderr=b"")
+        return out.read(most + 1)
 
 
 def _texts() -> list[bytes]:

@@ -36,19 +36,10 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
     seconds = SECONDS + size / BYTES_A_SECOND
     command = [sys.executable, "-P", binary.__file__, kind, str(path), str(memory), str(2 * seconds)]
-    environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
-    pipe, late = subprocess.PIPE, []
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environ) as process:
-        timer = Timer(seconds, lambda: (late.append(True), process.kill()))
-        timer.start()
-        try:
-            assert process.stdout is not None
-            answer = process.stdout.read(binary.most_bytes(size) + 1)
-        finally:
-            timer.cancel()
-            process.kill()
-    if late:
-        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path)
+    try:
+        answer = _answer(command, seconds, binary.most_bytes(size))
+    except TimeoutError:
+        raise broken(kind, f"reading it takes more than {seconds:.0f} s", path) from None
     try:
         read, message = _PlainUnpickler(io.BytesIO(answer)).load()
     except Exception:  # whatever is wrong with what came, it is not what the reader writes
@@ -56,6 +47,24 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     if read is None:
         raise broken(kind, message, path)
     return read
+
+
+def _answer(command: list[str], seconds: float, most: int) -> bytes:
+    """What a program says, of more than `most` bytes the first. Raises TimeoutError where it takes longer."""
+    environ = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each of its threads reserves memory
+    pipe, late = subprocess.PIPE, []
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL, env=environ) as process:
+        timer = Timer(seconds, lambda: (late.append(True), process.kill()))
+        timer.start()
+        try:
+            assert process.stdout is not None
+            answer = process.stdout.read(most + 1)
+        finally:
+            timer.cancel()
+            process.kill()
+    if late:
+        raise TimeoutError
+    return answer
 
 
 class _PlainUnpickler(pickle.Unpickler):
