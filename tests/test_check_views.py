@@ -317,6 +317,7 @@ def said_by_name() -> dict[str, str]:
         "hunts, grows": sentence(growing("unstable", "hunts")),
         "hunts, may grow": sentence(growing("unknown", "hunts")),
         "bistable, grows": sentence(growing("unstable", "bistable")),
+        "bistable, may die out": sentence(growing("stable", "bistable")),
         "settles, may run away": sentence(growing("unstable", "settles")),
         "settles, not known whether it may": sentence(growing("unknown", "settles")),
         "transient": sentence(transient, peak_to_peak=6.9e-4, period=1.33),

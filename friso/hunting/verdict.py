@@ -211,8 +211,8 @@ def _with_a_target(
         doubt = own.doubt or doubt
         if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
             doubt = RUNS_AWAY
-        begin(STARTS)  # what swings less than a growing swing at its end may grow as well
-        starts, started = ((None, None, None), ()) if attraction.grows else _starts(stage, target, KICKS * work)
+        begin(STARTS)  # what swings less than a passing swing at its end may be one as well
+        starts, started = ((None, None, None), ()) if attraction.passing else _starts(stage, target, KICKS * work)
     begin(BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
@@ -319,7 +319,7 @@ def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> S
         if not (end.certain and attraction.certain):
             return False
         beyond = end.outside * (DISTANCE if end.outside > end.inside else 1 / DISTANCE)
-        return far_beyond_a_limit(Ensemble.held(faster(stage.flat(), np.array([beyond])), 1)) == "stable"
+        return far_beyond_a_limit(Ensemble.held(faster(stage.flat(), np.array([beyond])), 1)) in (None, "stable")
 
     def as_sure(end: AttractionEnd | None) -> AttractionEnd | None:
         return end and replace(end, certain=sure(end))

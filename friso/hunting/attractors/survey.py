@@ -326,7 +326,8 @@ class Survey:
 
     def _observe(self, owners: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         repeats = ends.repeats
-        steady = (repeats.mean > 0) & ~(repeats.mean < STEADY * before)  # there is nothing before the first round
+        begun = (before == 0) & ~(repeats.deviation < CONVERGED)  # it has swung for a few times by now
+        steady = (repeats.mean > 0) & ~begun & ~(repeats.mean < STEADY * before)  # or in the first round alone
         self.unknown[owners[~steady]] = True
         for k in np.flatnonzero(steady):
             if self._known_to_attract(owners[k : k + 1], ends.take(np.array([k])))[0]:

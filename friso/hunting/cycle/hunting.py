@@ -68,6 +68,9 @@ GROWS = "with this force limit and no anti-windup swings may grow without bound:
 MAY_GROW = "without anti-windup it is not known whether large swings grow: a size is where a run was stopped"
 """The same where it is not known whether it is."""
 
+MAY_DIE_OUT = "without anti-windup large swings die out the slower the larger they are: what was observed may be one"
+"""The same where the loop is stable at lower gains."""
+
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
 
@@ -137,8 +140,8 @@ class Hunting:
     return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
     `observed` and are none of the cycles; what motions end in that do not come to rest, the `target` (None where
     nothing attracts); all of this as it was `surveyed`; and the loop as motions far beyond a force limit without
-    anti-windup see it, at `lower_gains`: unless it is stable there, large motions may run away, and an observed swing
-    may be one that grows, its size only that at which its run was stopped."""
+    anti-windup see it, at `lower_gains` (None: there is no such limit): unless it is stable there, large motions may
+    run away. What was observed is `passing` then, or may be."""
 
     cycles: tuple[Cycle, ...]
     reason: str
@@ -147,7 +150,7 @@ class Hunting:
     observed: tuple[Swing, ...] = ()
     target: Target | None = None
     surveyed: Attractors | None = None
-    lower_gains: LowerGains = "stable"
+    lower_gains: LowerGains | None = None
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
@@ -155,9 +158,10 @@ class Hunting:
         return tuple(cycle for cycle in self.cycles if cycle.attracts)
 
     @property
-    def grows(self) -> bool:
-        """Whether what attracts was observed, and may be a swing that grows without bound."""
-        return self.lower_gains != "stable" and bool(self.observed)
+    def passing(self) -> bool:
+        """Whether what attracts was observed, and may be a swing that grows without bound, or dies out slowly: its size
+        is only that at which its run was stopped."""
+        return self.lower_gains is not None and bool(self.observed)
 
     @property
     def possible(self) -> bool:
@@ -201,8 +205,8 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
     far = far_beyond_a_limit(stages)
     unclosed = any(m.cycles is None for m in survey.motions)
-    grows = {"stable": "", "unstable": GROWS, "unknown": MAY_GROW}[far] if unclosed else ""
-    beyond = grows or ("" if survey.motions else _beyond_the_search(stages))
+    passing = {"stable": MAY_DIE_OUT, "unstable": GROWS, "unknown": MAY_GROW}[far] if far and unclosed else ""
+    beyond = passing or ("" if survey.motions else _beyond_the_search(stages))
     certain = bool(survey.decided[0]) and not beyond
     doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
     reason = survey.families[0].reasons[0] if certain else doubt
@@ -220,16 +224,16 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     )
 
 
-def far_beyond_a_limit(stages: Ensemble) -> LowerGains:
+def far_beyond_a_limit(stages: Ensemble) -> LowerGains | None:
     """The loop of the first stage as swings far beyond a force limit without anti-windup see it: where it is unstable
-    they grow, where it is stable, or there is no such limit, they shrink."""
+    they grow, where it is stable they shrink. None: there is no such limit."""
     controller = stages.structure.controller
-    return at_lower_gains(stages.flat) if controller and controller.anti_windup == "none" else "stable"
+    return at_lower_gains(stages.flat) if controller and controller.anti_windup == "none" else None
 
 
 def _beyond_the_search(stages: Ensemble) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    if far_beyond_a_limit(stages) != "stable":
+    if far_beyond_a_limit(stages) not in (None, "stable"):
         return "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
     if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
         return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"

@@ -77,7 +77,7 @@ def _hunting(case: Case) -> str:
     if not case.judgement.observed:
         return f"hunts, {_swing(case)}."
     seen = "This rests on long simulations: no attracting orbit could be closed."
-    if case.judgement.hunting.grows:
+    if case.judgement.hunting.passing:
         return f"hunts, {_swing(case)} when its run was stopped. {seen}"
     if case.judgement.swing:
         return f"hunts, {_swing(case)}. {seen}"
@@ -94,8 +94,9 @@ def _bistable(case: Case) -> str:
     first = _unmoved(case) if case.unmoved else "settles after this move"
     if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
-    if case.judgement.hunting.grows:
-        return f"{first}, but another move or a kick may start a swing that grows."
+    if case.judgement.hunting.passing:
+        after = "dies out slowly, if at all" if case.judgement.hunting.lower_gains == "stable" else "grows"
+        return f"{first}, but another move or a kick may start a swing that {after}."
     if not starts:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
     seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
@@ -164,6 +165,7 @@ def _doubts(case: Case) -> list[str]:
 def _running_away(case: Case) -> list[str]:
     """That large motions may grow without bound, or that this is not known, and what keeps them from it."""
     return {
+        None: [],
         "stable": [],
         "unstable": ["Large motions may run away, as the force limit has no anti-windup: set controller.anti_windup."],
         "unknown": ["Whether large motions run away is not known: the force limit has no controller.anti_windup."],
@@ -246,7 +248,8 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     if judgement.hunting.target is None:
         return says
     lower = [f"{_too_much('Whether it hunts at lower bandwidths')}."] if LOWER in judgement.given_up else []
-    return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says, *lower]
+    still = "is still possible" if judgement.hunting.certain else "was still found"
+    return [f"Hunting {still} at {FARTHEST:g} times this bandwidth.", *says, *lower]
 
 
 def _slower(case: Case, end: AttractionEnd) -> str:
