@@ -93,7 +93,7 @@ class GeneralisedMaxwellSlip(StribeckSection):
         Rule(
             (SHARE,),
             lambda flat: abs(sum(flat[name] for name in element_keys(flat, SHARE)) - 1) < 1e-9,
-            "shares that add up to 1",
+            "shares that add up to 1, to nine digits",
             "element_share = [0.4, 0.6]",
         ),
         STEADY_LOAD,
