@@ -41,6 +41,18 @@ def test_a_law_that_is_fitted_shows_the_friction_and_the_stiffness_it_is_made_wi
     assert shown.force[-1] == pytest.approx(shown.levels.static, rel=2e-3)  # a power law gets there slowly
 
 
+def test_a_record_may_begin_in_motion(lugre: MeasuredFriction) -> None:
+    """Bristles that do not slip are a spring and a damper, from wherever the record begins."""
+    time = np.arange(1000) * STEP
+    place = 5e-6 * np.sin(2 * np.pi * 3 * time)
+    drag = DraggedRecord("made", place, LowPass(time, 1 / STEP), np.zeros(len(time) - 4), np.zeros(0))
+    keys = friction_law("elasto_plastic").shaped(lugre, {"elastic_share": 0.6})
+    friction = drag.friction({**keys, "friction.model": "elasto_plastic"}, 1)[0]
+    speed = np.gradient(place, STEP)
+    expected = lugre.stiffness * place + (lugre.damping + lugre.levels.viscous) * speed
+    assert friction == pytest.approx(expected[2:-2], abs=0.01 * lugre.stiffness * 5e-6)
+
+
 def test_a_law_finds_its_own_numbers_in_a_record(lugre: MeasuredFriction) -> None:
     """Elasto-plastic friction under loops of several amplitudes and a slow stroke, from other numbers."""
     law, time = "elasto_plastic", np.arange(3000) * STEP

@@ -30,13 +30,18 @@ class Inputs:
     held: bool = True
 
     @property
+    def velocity(self) -> np.ndarray:
+        """Of the reference at the samples [m/s], shape (n,)."""
+        return np.gradient(self.reference, self.sample_time)
+
+    @property
     def segments(self) -> np.ndarray:
         """The pieces of the engine, shape (1, n + 1, 6): a piece per sample, and the end."""
         n = len(self.reference)
         rows = np.zeros((1, n + 1, 6))
         rows[0, :, 0] = np.arange(n + 1) * self.sample_time
         rows[0, :-1, 1], rows[0, :-1, 4] = self.reference, self.force
-        rows[0, :-1, 2] = np.gradient(self.reference, self.sample_time)
+        rows[0, :-1, 2] = self.velocity
         rows[0, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
         if not self.held:
             rows[0, :-2, 5] = np.diff(self.force) / self.sample_time

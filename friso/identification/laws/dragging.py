@@ -57,6 +57,7 @@ class DraggedRecord:
         inputs = Inputs(self.position, np.zeros(len(self.position)), self.interval)
         starts = np.zeros((runs, shape.initial_size))
         starts[:, shape.position] = self.position[0]
+        starts[:, shape.velocity] = inputs.velocity[0]  # a record may begin in motion
         forces = np.full((runs, len(self.force)), np.nan)
         for part in run_driven(shape, {**flat, "motion.duration": 1.0}, runs, inputs, starts, RTOL):
             impulse = part.states[:, :, -1]
