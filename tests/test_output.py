@@ -100,14 +100,23 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(
     assert "can be written (" in " ".join(done.stderr.split())
 
 
-def test_an_answer_whose_files_cannot_be_written_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (OSError(errno.ENOSPC, "No space left on device", "gains.html"), "No space left on device: gains.html"),
+        (InputError("--out", "out, with notes in it", "another folder"), "out, with notes in it; expected: another"),
+    ],
+)
+def test_an_answer_whose_files_cannot_be_written_is_told(
+    error: Exception, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(*arguments: object) -> None:
-        raise OSError(errno.ENOSPC, "No space left on device", "gains.html")
+        raise error
 
     monkeypatch.setattr(Drafts, "put_in_place", full)
     done = friso_inside(tmp_path, *("export", "gains", RIG, "--json", "--out", "out"))
     assert (done.returncode, json.loads(done.stdout)["files"]) == (1, [])
-    assert "no file was written: No space left on device: gains.html" in done.stderr
+    assert f"no file was written: {told}" in " ".join(done.stderr.split())
     assert tree(tmp_path) == {}
 
 

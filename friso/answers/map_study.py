@@ -255,7 +255,8 @@ def _own_views(store: Path) -> list[Path]:
     except StoreError:
         return []
     digests = noted if isinstance(noted, dict) else {}
-    return [view for view in _views(store) if _digest(view) in (digests.get(view.name) or [])]
+    lists = {name: digest for name, digest in digests.items() if isinstance(digest, list)}  # a store may be of others
+    return [view for view in _views(store) if _digest(view) in lists.get(view.name, [])]
 
 
 def _digest(view: Path) -> str | None:
@@ -268,7 +269,7 @@ def _digest(view: Path) -> str | None:
 
 
 _MOST_OF_A_VIEW = 1 << 30
-"""Bytes of a page at most that is known again: those of ten million cells have fewer."""
+"""Bytes of a figure or a page at most that is known again."""
 
 
 def _path_beside(store: Path, form: str) -> Path:

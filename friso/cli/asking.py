@@ -66,6 +66,8 @@ def tried(write: Callable[[], list[Path]], nothing: str = "no file was written")
         return write(), ""
     except OSError as error:
         return [], f"{nothing}: {cause_of(error)}: {path_of(error)}".removesuffix(": ")
+    except InputError as error:  # what came in the way since it was looked
+        return [], f"{nothing}: {error.actual}; expected: {error.expected}"
 
 
 def show(
