@@ -236,7 +236,7 @@ def main(kind: str, path: Path, memory: int, seconds: float) -> None:
         _, allowed = resource.getrlimit(resource.RLIMIT_AS)
         limit = memory if allowed == resource.RLIM_INFINITY else min(memory, allowed)
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
-    message = ""
+    answer, message = b"", ""
     try:
         answer = pickle.dumps((_plain(READERS[kind](path)), ""), protocol=5)
         if len(answer) > most_bytes(path.stat().st_size):
