@@ -29,6 +29,7 @@ PATIENCE = 10.0
 """How long [s] after a signal a command may take to end."""
 
 _raising = _said = False
+_bounded = True
 _held = 0
 """Blocks in which signals wait for the end (`hold_interrupts`), one within another."""
 
@@ -46,6 +47,12 @@ def last_word(number: int) -> str:
     global _said
     _said = True
     return "interrupted" if number in (0, signal.SIGINT) else "terminated"
+
+
+def answers_interrupts() -> None:
+    """Let this command take as long as it needs to end: it answers Ctrl-C with what it has so far."""
+    global _bounded
+    _bounded = False
 
 
 @contextmanager
@@ -126,8 +133,10 @@ def _end_in_time(told: int) -> None:
     while number not in SIGNALS:
         number = os.read(told, 1)[0]
     time.sleep(PATIENCE)
-    while not _whole.acquire(blocking=False):
+    while _bounded and not _whole.acquire(blocking=False):
         time.sleep(PATIENCE)
+    if not _bounded:
+        return
     if not _said:
         os.write(2, f"friso: {last_word(number)}\n".encode())
     os._exit(128 + number)

@@ -152,6 +152,14 @@ def write():
     except KeyboardInterrupt:
         swallow()
 
+def answer():
+    interrupts.answers_interrupts()
+    try:
+        time.sleep(60)
+    except KeyboardInterrupt:
+        time.sleep(1)
+        print("the best so far")
+
 interrupts.PATIENCE = 0.2
 Timer(0.3, os.kill, (os.getpid(), signal.SIGTERM)).start()
 open("endless.py", "w").write("import time\\ntime.sleep(60)\\n")
@@ -171,6 +179,12 @@ def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str)
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
     assert (done.returncode, done.stderr) == (128 + signal.SIGTERM, "friso: terminated\n")
     assert (tmp_path / "whole").exists() == (way == "write()")
+
+
+def test_a_command_that_answers_an_interrupt_has_the_time_for_it(tmp_path: Path) -> None:
+    program = [sys.executable, "-c", STUCK.replace("WAY", "answer()")]
+    done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "the best so far\n", "")
 
 
 class Going:

@@ -10,6 +10,7 @@ from friso.cli.asking import Details, ask
 from friso.cli.command import STOPS, Command
 from friso.cli.common import AsJson, Overrides, StageFile
 from friso.cli.output import OutFolder, Overwrite
+from friso.interrupts import answers_interrupts
 from friso.remedies import Changeable
 
 WithinOption = Annotated[
@@ -57,6 +58,7 @@ def tune(
     """
     from friso.answers.tune import tune as question
 
+    answers_interrupts()
     options = {"set": overrides, "within": within, "settle": settle, "force_limit": force_limit}
     options |= {"bandwidth_limit": bandwidth_limit, "only": only, "keep": keep, "seed": seed}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
