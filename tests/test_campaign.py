@@ -23,6 +23,7 @@ CASES = {
     "logs": 40,
     "stores": 20,
     "store-faults": 8,
+    "store-views": 10,
     "store-exchanges": 10,
     "store-versions": 20,
 }

@@ -39,7 +39,7 @@ NAMES = (*READERS, *CASES)
 """All campaigns."""
 
 HEAVY = {"binary-logs": 8, "arguments": 8, "options": 32, "app": 8, "stores": 16, "store-faults": 32,
-         "store-exchanges": 32, "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
+         "store-views": 16, "store-exchanges": 32, "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """By how much fewer the cases of a campaign are whose cases take long."""
 
 

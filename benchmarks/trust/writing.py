@@ -9,6 +9,7 @@ import json
 import random
 import shutil
 import warnings
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -18,8 +19,10 @@ import friso
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.faults import struck
 from benchmarks.trust.inputs import folder_until_the_end
+from friso.answers.map_study import write_beside
 from friso.answers.output_folder import MARKER, OutputFolder
 from friso.errors import InputError
+from friso.progress import silent
 from friso.studies import metadata
 from friso.studies.request import Request
 from friso.studies.store import Store, check_store, read_store
@@ -87,6 +90,35 @@ def store_faults(rng: random.Random, folder: Path) -> None:
     _assert_same(path, f"{said}: another store")
     state = check_store(path)
     assert (state.damaged, state.files, state.done) == ([], [], state.blocks), f"{said}: {state}"
+
+
+def store_views(rng: random.Random, folder: Path) -> None:
+    """Figures and page beside a store, drawn again and again under faults: those of friso give way, whole, and those of
+    the user do not, however far an earlier run came."""
+    path, said = Path(shutil.copytree(_undisturbed(), folder / "a.zarr")), []
+    forms = ("html", "pdf", "png", "svg")
+    mine = {folder / f"a.{form}": "mine" for form in forms if rng.random() < 0.1}
+
+    def draw(number: int = 0) -> None:
+        write_beside({folder / f"a.{form}": f"{form} {number}" * 1000 for form in forms}, path, False, silent)
+
+    for number in range(rng.randrange(1, 4)):
+        said.append(struck(lambda number=number: draw(number), folder, rng, 30))
+    for file, text in mine.items():
+        file.write_text(text)
+    if mine:
+        with suppress(FileExistsError):
+            draw()
+            raise AssertionError(f"{said}: replaced {[*mine]}")
+    assert all(file.read_text() == text for file, text in mine.items()), f"{said}: changed {[*mine]}"
+    for file in mine:
+        file.unlink()
+    draw()
+    for form in forms:
+        assert (folder / f"a.{form}").read_text() == f"{form} 0" * 1000, f"{said}: {form}"
+    left = {item.name for item in folder.iterdir()} - {"a.zarr", *(f"a.{form}" for form in forms)}
+    assert not left, f"{said}: left {left}"
+    _assert_same(path, f"{said}: another store")
 
 
 def store_exchanges(rng: random.Random, folder: Path) -> None:
@@ -199,6 +231,7 @@ WRITING = {
     "files": files,
     "stores": stores,
     "store-faults": store_faults,
+    "store-views": store_views,
     "store-exchanges": store_exchanges,
     "store-versions": store_versions,
 }
