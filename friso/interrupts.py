@@ -124,14 +124,14 @@ def _arrived(number: int, frame: FrameType | None) -> None:
     raise KeyboardInterrupt
 
 
-def _end_in_time(told: int) -> None:
+def _end_in_time(pipe: int) -> None:
     """End the process some time after a signal, whatever its main thread is at: an import that does not return, a
     library that leaves the interpreter for minutes or swallows the exception. What must be whole, becomes so before.
 
-    `told`: the descriptor from which the signals can be read, a byte each, while the main thread hears none."""
+    `pipe`: the descriptor from which signals can be read, a byte each, also while the main thread hears none."""
     number = came()
     while number not in SIGNALS:
-        number = os.read(told, 1)[0]
+        number = os.read(pipe, 1)[0]
     time.sleep(PATIENCE)
     while _bounded and not _whole.acquire(blocking=False):
         time.sleep(PATIENCE)

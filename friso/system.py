@@ -76,9 +76,9 @@ if sys.platform == "win32":
 
     def signals_told() -> int:
         """A descriptor from which the numbers of signals can be read as they come, a byte each."""
-        told, tell = os.pipe()
-        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
-        return told
+        outlet, inlet = os.pipe()
+        signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
+        return outlet
 
     def once_free(use: Callable[[], _T]) -> _T:
         """What `use` returns: where another program holds the file open, it is tried again for as long as `PATIENCE`.
@@ -190,10 +190,10 @@ else:
 
     def signals_told() -> int:
         """A descriptor from which the numbers of signals can be read as they come, a byte each."""
-        told, tell = os.pipe()
-        os.set_blocking(tell, False)
-        signal.set_wakeup_fd(tell, warn_on_full_buffer=False)
-        return told
+        outlet, inlet = os.pipe()
+        os.set_blocking(inlet, False)
+        signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
+        return outlet
 
     def once_free(use: Callable[[], _T]) -> _T:
         """What `use` returns: no program keeps others from a file. Raises what `use` raises."""
