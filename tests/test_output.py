@@ -101,14 +101,14 @@ def test_a_folder_that_cannot_be_written_is_refused_before_anything_is_computed(
 
 
 @pytest.mark.parametrize(
-    ("error", "told"),
+    ("error", "words"),
     [
         (OSError(errno.ENOSPC, "No space left on device", "gains.html"), "No space left on device: gains.html"),
         (InputError("--out", "out, with notes in it", "another folder"), "out, with notes in it; expected: another"),
     ],
 )
 def test_an_answer_whose_files_cannot_be_written_is_told(
-    error: Exception, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    error: Exception, words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def full(*arguments: object) -> None:
         raise error
@@ -116,7 +116,7 @@ def test_an_answer_whose_files_cannot_be_written_is_told(
     monkeypatch.setattr(Drafts, "put_in_place", full)
     done = friso_inside(tmp_path, *("export", "gains", RIG, "--json", "--out", "out"))
     assert (done.returncode, json.loads(done.stdout)["files"]) == (1, [])
-    assert f"no file was written: {told}" in " ".join(done.stderr.split())
+    assert f"no file was written: {words}" in " ".join(done.stderr.split())
     assert tree(tmp_path) == {}
 
 

@@ -56,8 +56,8 @@ def kept_arrays(file: Path, about: str = "", most: int = MOST_EXPANDED) -> dict[
             arrays = dict(archive)
     except (OSError, ValueError, EOFError, KeyError, NotImplementedError, MemoryError, zipfile.BadZipFile, zlib.error):
         return None
-    said = arrays.pop(_ABOUT, None)
-    return arrays if said is not None and str(said) == _name(file, about) else None
+    name = arrays.pop(_ABOUT, None)
+    return arrays if name is not None and str(name) == _name(file, about) else None
 
 
 def keep_arrays(file: Path, arrays: Mapping[str, Any], about: str = "") -> None:
