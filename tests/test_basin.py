@@ -29,7 +29,7 @@ from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.margin import FARTHEST, margin
-from friso.hunting.verdict import own_motion
+from friso.hunting.verdict import BY_CHANCE, own_motion
 from friso.stage import Stage
 
 RIGID = pytest.mark.xdist_group("rigid")
@@ -85,8 +85,8 @@ def test_a_motion_that_a_hair_turns_is_not_certain() -> None:
         ends, _, _ = ends_in({**released(high).flat(), "motion.displacement": kicks}, len(kicks), target())
         first = int(np.flatnonzero(~ends)[0])
         low, high = float(kicks[first - 1]), float(kicks[first])
-    turned = [own_motion(released(kick), target(), np.inf).by_chance for kick in (low, 0.99 * low, 1.01 * high)]
-    assert turned == [True, False, False]
+    turned = [own_motion(released(kick), target(), np.inf).doubt for kick in (low, 0.99 * low, 1.01 * high)]
+    assert turned == [BY_CHANCE, "", ""]
 
 
 def released(displacement: float) -> Stage:

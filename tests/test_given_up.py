@@ -42,15 +42,15 @@ HUNTING = Kick(((2e-3, 1e-2),), (1e-5, 0.1))
 NONE = replace(HUNTING, windows=())
 
 
-def displaced(hunts: Any, completed: Any) -> Kick:
+def displaced(hunts: Any, completed: Any, swing: float = 0.0) -> Kick:
     """What is made of kicks that hunt, and of which runs were completed, by functions of their size [m]."""
 
     def ends_in(flat: Any, count: int, *_: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         kicks = flat["motion.displacement"]
-        return hunts(kicks) & completed(kicks), completed(kicks), np.zeros(count)
+        return hunts(kicks) & completed(kicks), completed(kicks), swing * kicks
 
     with patched({basin: {"ends_in": ends_in}}):
-        return displacements_that_hunt(STAGE, TARGET)
+        return displacements_that_hunt(STAGE, TARGET, widest=4e-3)
 
 
 def beyond(size: float) -> Any:
@@ -66,6 +66,13 @@ def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
     assert gap.windows == whole.windows
     assert len(whole.windows) == 1
     assert 2e-3 < whole.windows[0][0] < 1.01 * 2e-3
+
+
+def test_kicks_after_which_swings_are_far_larger_than_what_attracts_make_no_window() -> None:
+    """They may grow, or die out: without anti-windup that takes long."""
+    known = displaced(beyond(2e-3), beyond(0), swing=0.5)
+    assert known.unknown > 0
+    assert known.searched[1] == known.windows[-1][1] < 8e-3
 
 
 def test_kicks_of_which_none_is_completed_are_unknown() -> None:

@@ -128,24 +128,33 @@ def _last_swing(
     return swing, completed
 
 
-def displacements_that_hunt(stage: Stage, target: Target) -> Kick:
-    """The displacements that start hunting."""
+def _caught(
+    flat: Mapping[str, Any], count: int, target: Target, widest: float, starts: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which runs end in what attracts, and of which that is known: one that swings by more than the `widest` at its
+    end, peak to peak [m], may grow or die out."""
+    ends, completed, swing = ends_in(flat, count, target, starts)
+    return ends, completed & ~(swing > widest)
+
+
+def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
+    """The displacements that start hunting, as far as that is known of swings up to the `widest`, peak to peak [m]."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return ends_in({**flat, "motion.displacement": kicks}, len(kicks), target)[:2]
+        return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest)
 
     return _kick(hunts, target.amplitude)
 
 
-def pushes_that_hunt(stage: Stage, target: Target) -> Kick:
-    """The velocities that start hunting."""
+def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:
+    """The velocities that start hunting, in the same way."""
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         several = stages.take(np.zeros(len(kicks), np.int64))
         released = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return ends_in(released, len(kicks), target, pushed(several, kicks))[:2]
+        return _caught(released, len(kicks), target, widest, pushed(several, kicks))
 
     return _kick(hunts, target.amplitude * float(stages.number("rate")[0]))
 
@@ -173,8 +182,9 @@ def _kick(hunts: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], unit: fl
     return Kick(windows, (float(kicks[0]), float(kicks[-1])), unknown)
 
 
-def moves_that_hunt(stage: Stage, target: Target) -> MoveShare | None:
-    """The share of moves that end in hunting; None for motions that have no acceleration, or if every run fails."""
+def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> MoveShare | None:
+    """The share of moves that end in hunting, in the same way; None for motions that have no acceleration, or if every
+    run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
@@ -188,8 +198,8 @@ def moves_that_hunt(stage: Stage, target: Target) -> MoveShare | None:
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    hunts, completed, _ = ends_in(moved, MOVES, target)
-    return MoveShare(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None
+    hunts, known = _caught(moved, MOVES, target, widest)
+    return MoveShare(int(known.sum()), int(hunts[known].sum()), accelerations, times) if known.any() else None
 
 
 def evenly(count: int) -> np.ndarray:

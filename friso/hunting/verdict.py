@@ -211,8 +211,8 @@ def _with_a_target(
         doubt = own.doubt or doubt
         if own.ends and own.swing > RUNNING_AWAY * _widest(attraction):
             doubt = RUNS_AWAY
-        begin(STARTS)  # what swings less than a passing swing at its end may be one as well
-        starts, started = ((None, None, None), ()) if attraction.passing else _starts(stage, target, KICKS * work)
+        begin(STARTS)
+        starts, started = _starts(stage, attraction, target, KICKS * work)
     begin(BANDWIDTHS)
     sought, given_up = _sought(stage, attraction, work - spent.used)
     sought = _as_sure(stage, sought, attraction)
@@ -270,16 +270,19 @@ def _resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
 
 
 def _starts(
-    stage: Stage, target: Target, work: float
+    stage: Stage, attraction: Hunting, target: Target, work: float
 ) -> tuple[tuple[Kick | None, Kick | None, MoveShare | None], tuple[str, ...]]:
     """Which kicks and moves start hunting, as far as so much work shows, and what of that had to be given up."""
     starts: tuple[Kick | None, Kick | None, MoveShare | None] = (None, None, None)
+    if attraction.passing:  # what swings less at its end may be passing as well
+        return starts, ()
+    widest = np.inf if attraction.lower_gains is None else RUNNING_AWAY * _widest(attraction)
     try:
         with allowance(work):
             starts = (
-                displacements_that_hunt(stage, target),
-                pushes_that_hunt(stage, target),
-                moves_that_hunt(stage, target),
+                displacements_that_hunt(stage, target, widest),
+                pushes_that_hunt(stage, target, widest),
+                moves_that_hunt(stage, target, widest),
             )
     except Exhausted:
         return starts, (STARTS,)
