@@ -62,6 +62,7 @@ def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
     assert together is not None
     assert moves is not None
     assert together(courses)
+    assert together([Course(replace(one.log, units={"force": "A"})) for one in courses])
     assert not together(courses[:2])
     assert not alone(courses[0])
     assert moves(courses[0])

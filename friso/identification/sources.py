@@ -102,8 +102,7 @@ def per_unit_of_force(file: LogFile, beside: AxisKind | None) -> LogFile:
         raise InputError(
             "force", f"a channel in {unit}, beside a stage", f"its factor to {newtons}", example, str(file.path)
         )
-    units = {role: text for role, text in file.source.units.items() if role != "force"}
-    return replace(file, source=replace(file.source, axis=file.source.axis.per(unit), units=units))
+    return replace(file, source=file.source.per_unit_of_force())
 
 
 def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:

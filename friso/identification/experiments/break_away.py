@@ -66,8 +66,9 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
     """Break-away forces of the ramps in a log, each from rest of the body on the bearing, and static friction.
 
     With the `mass` [kg] that moves, it is the greatest friction, force less inertia, as motion begins (the published
-    definition); without, the force where motion begins to be visible, which contains inertia. See `rate_effect` for the
-    static friction. Raises InputError for a missing channel.
+    definition); without, the force where motion begins to be visible, which contains inertia: the interval allows for
+    that of the heaviest mass that can have moved so fast. See `rate_effect` for the static friction. Raises InputError
+    for a missing channel.
     """
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
@@ -78,8 +79,8 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
         breaks = slips(body[part], log.sample_time, CUTOFF)
         threshold = max(threshold, breaks.threshold)
         pushed = low_pass(force[part], log.sample_time, CUTOFF)
-        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.directions, strict=True)
-        for onset, start, rest, direction in marks:
+        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
+        for onset, start, rest, fastest, direction in marks:
             push = direction * force[part][rest : start + 1]
             if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
                 stops += 1
@@ -89,14 +90,20 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
                 quick += 1
                 continue
             rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
-            at, level, unsure = onset, float(direction * pushed[onset]), 0.0
-            if mass and rising > 0:
+            at, level, unsure, late = onset, float(direction * pushed[onset]), 0.0, 0.0
+            if rising > 0:
+                # friction opposes the motion: the impulse of the force gives the mass its speed at least
+                heaviest = direction * float(pushed[onset:fastest].sum()) * log.sample_time / abs(breaks.speed[fastest])
                 signals = direction * force[part], direction * body[part]
-                top = peak(*signals, mass, log.sample_time, rising, (begin, start), CUTOFF)
-                at, level, unsure = top.at, top.level, top.unsure
+                top = peak(*signals, mass or heaviest, log.sample_time, rising, (begin, start), CUTOFF)
+                if mass:
+                    at, level, unsure = top.at, top.level, top.unsure
+                else:
+                    late = max(level - top.level + top.unsure, 0.0)
             first = part.start + at
-            rows.append((float(log.time[first]), float(body[first]), float(direction), level, float(rising), unsure))
-    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 6).T
+            place = float(log.time[first]), float(body[first]), float(direction)
+            rows.append((*place, level, float(rising), unsure, late))
+    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 7).T
     notes = []
     if quick:
         notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
@@ -119,11 +126,11 @@ def _half(push: np.ndarray) -> int:
 
 
 def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: list[str]) -> BreakAway:
-    times, places, directions, forces, rates, unsure = table
+    times, places, directions, forces, rates, unsure, late = table
 
     def static(chosen: np.ndarray) -> Estimate:
-        estimate = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
-        off = float(unsure[chosen].mean()) if chosen.any() else 0.0
+        off, high = (float(part[chosen].mean()) if chosen.any() else 0.0 for part in (unsure, late))
+        estimate = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate, late=high)
         ends = {"low": max(estimate.low - off, 0.0), "high": estimate.high + off}
         estimate = replace(estimate, **ends, systematic=estimate.systematic + off)
         return (

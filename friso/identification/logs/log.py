@@ -80,6 +80,14 @@ class Log:
         bridged = None if self.bridged is None else self.bridged[chosen]
         return replace(self, time=self.time[chosen], signals=signals, segments=(slice(0, count),), bridged=bridged)
 
+    def per_unit_of_force(self) -> Log:
+        """The log on an axis with forces in the unit of its own, where that is none of the axis."""
+        unit = self.units.get("force")
+        if unit is None:
+            return self
+        units = {role: text for role, text in self.units.items() if role != "force"}
+        return replace(self, axis=self.axis.per(unit), units=units)
+
     def unit(self, role: str) -> str:
         """The unit in which a role stands, that of a linear axis where it is the role's."""
         return self.units.get(role, ROLES[role])

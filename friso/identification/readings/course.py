@@ -68,10 +68,10 @@ class Course:
     @cached_property
     def speeds(self) -> np.ndarray:
         """The constant speeds [m/s], shape (n,), where most of the way goes at such, which no reference tells; none
-        where force or position has no SI unit."""
+        where the position has no SI unit."""
         part, position = self.log.longest, self.log["position"]
         try:
-            steady = [] if self.reference_moves else [stretch for stretch in passes(self.log) if stretch.steady]
+            steady = [] if self.reference_moves else [one for one in passes(self.log.per_unit_of_force()) if one.steady]
         except InputError:
             return np.zeros(0)
         way = float(np.abs(np.diff(uniform_filter1d(position[part], BLUR))).sum())
