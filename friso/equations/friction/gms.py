@@ -47,6 +47,9 @@ AT = 1 - 1e-9
 MOST = 12
 """Elements at most."""
 
+FITTED, EVEN = 4, 1.5
+"""Elements that are fitted to a record, and how closely their tangents lie towards the end of the virgin curve."""
+
 
 class Elements(NamedTuple):
     """What the equations depend on: the Stribeck curve, the number of elements, and whether they are damped."""
@@ -166,20 +169,24 @@ class GeneralisedMaxwellSlip(StribeckSection):
         }
 
     shape: ClassVar[Mapping[str, tuple[float, float, float]]] = {
-        "rolling_exponent": (1.0, 1.5, 4.0),
+        "rolling_exponent": (0.1, 1.0, 4.0),
+        **{f"stiffer_{n}": (0.1, 1.0, 10.0) for n in range(2, FITTED + 1)},
         "lag": (0.01, 1.0, 100.0),
     }
 
     @staticmethod
     def shaped(measured: MeasuredFriction, shape: Mapping[str, float]) -> dict[str, Any]:
-        """`FITTED` elements on the virgin curve of rolling friction, at even slopes; friction that lags so many times
-        as long as LuGre's does at the Stribeck velocity."""
+        """`FITTED` elements on the virgin curve of rolling friction, at even slopes, all but the first so many times
+        stiffer beside it; friction that lags so many times as long as LuGre's does at the Stribeck velocity."""
         levels, stiffness = measured.levels, measured.stiffness
         way = virgin_displacements(levels.static, stiffness)
         curve = power_law(levels.static, stiffness, shape["rolling_exponent"], way)
         whole = MeasuredFriction(levels, stiffness, measured.damping, way, curve)
-        parts = _tangents(whole, (1 - np.arange(FITTED + 1) / FITTED) ** EVEN)
-        return _elements_with(whole, *parts) | {
+        springs, slips = _tangents(whole, (1 - np.arange(FITTED + 1) / FITTED) ** EVEN)
+        springs = springs * [1.0, *(shape[f"stiffer_{n}"] for n in range(2, FITTED + 1))]
+        springs *= stiffness / springs.sum()
+        slips *= levels.static / (springs @ slips)
+        return _elements_with(whole, springs, slips) | {
             "friction.attraction": stiffness * levels.stribeck_velocity / shape["lag"]
         }
 
@@ -216,9 +223,6 @@ def _elements(flat: Mapping[str, Any], key: str) -> np.ndarray:
     """The values of a list, shape (elements,)."""
     return np.array([flat[name] for name in element_keys(flat, key)])
 
-
-FITTED, EVEN = 4, 1.5
-"""Elements that are fitted to a record, and how closely their tangents lie towards the end of the virgin curve."""
 
 SAME = 1e-6
 """Difference of slopes, as a share of the first, below which a virgin curve is straight there."""

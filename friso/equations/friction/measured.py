@@ -95,9 +95,9 @@ def on_bristles(flat: Mapping[str, Any], displacement: np.ndarray, force: np.nda
 
 def power_law(static: float, stiffness: float, exponent: float, displacement: np.ndarray) -> np.ndarray:
     """A virgin curve whose slope falls by a power of the force that is lacking, Dahl's exponent: force [N] over
-    displacement [m] from rest, both of shape (n,)."""
+    displacement [m] from rest, both of shape (n,). Below 1 it ends at static friction, at 0 straight."""
     way, more = stiffness * displacement / static, exponent - 1
-    lacking = np.exp(-way) if more == 0 else (1 + more * way) ** (-1 / more)
+    lacking = np.exp(-way) if more == 0 else np.maximum(1 + more * way, 0.0) ** (-1 / more)
     return static * (1 - lacking)
 
 
