@@ -4,16 +4,33 @@ is imported is noted, and nothing of that is looked for in the current folder, w
 Nothing is done where friso is used as a library.
 """
 
-import atexit
 import os
-import signal
 import sys
-from types import FrameType
+
+
+def _module() -> str:
+    """What Python was started with by -m, in whatever way that was written; empty without."""
+    if sys.argv[:1] != ["-m"]:  # as it is until the module itself runs
+        return ""
+    for word, following in zip(sys.orig_argv[1:], [*sys.orig_argv[2:], ""], strict=True):
+        flags, option, name = word.partition("m")
+        if option and word.startswith("-") and not flags.strip("-bBdEhiIOPqsSuvVx"):
+            return name or following
+    return ""
+
+
+_IS_MODULE = _module() == "friso"
+_HOME = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+if _IS_MODULE and sys.path[:1] == [os.getcwd()] != [_HOME]:  # python -m puts it there, but for -P
+    del sys.path[0]  # before anything is imported that Python has not had until now
+
+import atexit  # noqa: E402
+import signal  # noqa: E402
+from types import FrameType  # noqa: E402
 
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, name)]
 """The signals that end a command."""
 
-_IS_MODULE = ("-m", "friso") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False)
 IS_COMMAND = _IS_MODULE or os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
 """Whether this process was started as friso, or as python -m friso."""
 
@@ -30,10 +47,6 @@ def _ignore() -> None:
     for number in SIGNALS:
         signal.signal(number, signal.SIG_IGN)
 
-
-_HOME = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-if _IS_MODULE and sys.path[:1] == [os.getcwd()] != [_HOME]:  # python -m puts it there, but for -P
-    del sys.path[0]
 
 if IS_COMMAND:
     for number in SIGNALS:

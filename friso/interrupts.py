@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from types import FrameType
 from typing import Any
@@ -63,7 +63,7 @@ def raising() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    before, ignored = _install(), sys.unraisablehook
+    before, ignored = _take(_arrived), sys.unraisablehook
     if early.IS_COMMAND:
         threading.Thread(target=_end_in_time, args=(signals_told(),), daemon=True).start()
     sys.unraisablehook = partial(_lost, ignored)
@@ -91,7 +91,7 @@ def hold_interrupts() -> Iterator[None]:
         return
     global _held
     arrived: list[int] = []
-    before = {number: signal.signal(number, lambda number, frame: arrived.append(number)) for number in SIGNALS}
+    before = _take(lambda number, frame: arrived.append(number))
     _held += 1
     try:
         with _whole:
@@ -99,18 +99,18 @@ def hold_interrupts() -> Iterator[None]:
     finally:
         _held -= 1
         for number, handler in before.items():
-            if handler is not None:  # not Python's
-                signal.signal(number, handler)
+            signal.signal(number, handler)
         if arrived:
             signal.raise_signal(arrived[0])
 
 
-def _install() -> dict[int, Any]:
-    """Take the signals, but those that are ignored (nohup); what was done with them before."""
+def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:
+    """Handle the signals so, but those that are ignored (nohup); what Python did with them before."""
     before = {number: signal.getsignal(number) for number in SIGNALS}
-    for number in (number for number, handler in before.items() if handler is not signal.SIG_IGN):
-        signal.signal(number, _arrived)
-    return {number: handler for number, handler in before.items() if handler is not None}
+    taken = {number: earlier for number, earlier in before.items() if earlier is not signal.SIG_IGN}
+    for number in taken:
+        signal.signal(number, handler)
+    return {number: earlier for number, earlier in taken.items() if earlier is not None}
 
 
 def _arrived(number: int, frame: FrameType | None) -> None:
@@ -137,8 +137,10 @@ def _end_in_time(pipe: int) -> None:
         time.sleep(PATIENCE)
     if not _bounded:
         return
+    threading.Timer(1.0, os._exit, (128 + number,)).start()  # a pipe that nobody reads takes no last word
     if not _said:
-        os.write(2, f"friso: {last_word(number)}\n".encode())
+        with suppress(OSError):  # nor does a terminal that is closed
+            os.write(2, f"friso: {last_word(number)}\n".encode())
     os._exit(128 + number)
 
 

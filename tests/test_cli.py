@@ -170,9 +170,10 @@ def test_a_library_that_cannot_be_loaded_names_the_remedy(error: Exception, caps
     assert LIBRARIES in " ".join(capsys.readouterr().err.split())
 
 
-def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Path) -> None:
-    for name in ("typer", "logging", "numpy"):
+@pytest.mark.parametrize("module", [["-m", "friso"], ["-mfriso"], ["-W", "ignore", "-Bum", "friso"]])
+def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Path, module: list[str]) -> None:
+    for name in ("typer", "logging", "numpy", "signal", "enum", "atexit", "types"):
         (tmp_path / f"{name}.py").write_text("open('run', 'w').close()\n")
-    done = subprocess.run([sys.executable, "-m", "friso", "--version"], cwd=tmp_path, capture_output=True, text=True)
+    done = subprocess.run([sys.executable, *module, "--version"], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
     assert not (tmp_path / "run").exists()

@@ -181,6 +181,26 @@ def test_a_command_that_cannot_be_interrupted_is_ended(tmp_path: Path, way: str)
     assert (tmp_path / "whole").exists() == (way == "write()")
 
 
+@pytest.mark.parametrize(
+    "closed", ["os.close(2)", "end, full = os.pipe(); os.dup2(full, 2); os.write(2, bytes(2**16))"]
+)
+def test_a_command_whose_last_word_nobody_takes_is_ended(tmp_path: Path, closed: str) -> None:
+    """On a terminal that is gone, and into a pipe that is full."""
+    program = [sys.executable, "-c", STUCK.replace("    WAY", f"    {closed}; swallow()")]
+    assert subprocess.run(program, cwd=tmp_path, timeout=50).returncode == 128 + signal.SIGTERM
+
+
+def test_a_signal_that_is_ignored_is_so_where_others_wait() -> None:
+    """As friso under nohup ignores a closed terminal."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with interrupts.hold_interrupts():
+            assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
+
+
 def test_a_command_that_answers_an_interrupt_has_the_time_for_it(tmp_path: Path) -> None:
     program = [sys.executable, "-c", STUCK.replace("WAY", "answer()")]
     done = subprocess.run(program, cwd=tmp_path, capture_output=True, text=True, timeout=50)

@@ -154,7 +154,7 @@ def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: 
 
 
 def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
-    """With an output in machine units per second, as FF1 = 1 says; steps whose position an encoder tells are a servo."""
+    """With an output in machine units per second, as FF1 = 1 says; steps and an encoder are a servo axis too."""
     gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001, "BIAS": 0.5}
     gains |= {"STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0}
     loop = {"controller.kp": "900 N*s/m", "controller.velocity_integral_time": "8 ms"}
