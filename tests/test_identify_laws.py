@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from variants import VARIANTS
 
+import friso
 from friso.equations.friction.measured import MeasuredFriction
+from friso.errors import InputError
 from friso.identification.laws.comparison import LawComparison, LawPrediction, comparable
 from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
 from friso.identification.laws.fit import LawFit, LawProblem
@@ -102,3 +104,8 @@ def test_every_sample_is_left_out_once() -> None:
         masks = blocks(records, 5)
         assert len(masks) == parts
         assert all(np.sum([part[i] for part in masks], axis=0).tolist() == [1] * 11 for i in range(len(records)))
+
+
+def test_laws_without_a_stage_are_refused_before_any_work() -> None:
+    with pytest.raises(InputError, match="--stage"):
+        friso.identify("that_is_not_read.csv", laws=True)

@@ -177,6 +177,9 @@ def identify(
     if stage is None and set:
         first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
         raise InputError("set", str(first), "a stage whose keys to override", "stage=stage.toml")
+    if stage is None and laws:
+        wanted = "the stage, for its masses and what lies before its guide"
+        raise InputError("--laws", "no stage", wanted, "--stage stage.toml")
     tables = {} if stage is None else tables_of(stage)
     lacking = [name for name in TOLD_BY_LOGS if name not in tables] if "controller" in tables else []
     assumed = None if stage is None or lacking else stage_of(stage, set)
@@ -203,7 +206,7 @@ def identify(
     from friso.identification.method import with_laws
 
     result = identification(sources, assumed, settings, progress, made_up)
-    if laws:
+    if laws and assumed is not None:
         result = with_laws(result, [source for source, _ in sources], assumed, progress)
     reused = tuple(file.reused for file in inputs if file.reused)
     result = replace(result, warnings=(*reused, *_taken_from_logs(made_up), *result.warnings))

@@ -113,14 +113,10 @@ def identify(
 
 
 def with_laws(
-    identification: Identification, logs: Sequence[Source], base: Stage | None, progress: Progress = silent
+    identification: Identification, logs: Sequence[Source], base: Stage, progress: Progress = silent
 ) -> Identification:
     """The same with the friction laws that its logs support, begun from `base` where its law allows that. Raises
-    InputError without a base, and as `compare_laws`."""
-    if base is None:
-        raise InputError(
-            "--laws", "no stage", "the stage, for its masses and what lies before its guide", "--stage stage.toml"
-        )
+    InputError as `compare_laws`."""
     estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
     laws = compare_laws(times, identification.stage or base, Prior(base, True, estimates), progress)
