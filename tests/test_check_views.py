@@ -289,8 +289,8 @@ def growing(lower_gains: LowerGains, verdict: Verdict) -> Judgement:
     if verdict == "settles":
         return settles(hunting=replace(fake_hunting(), lower_gains=lower_gains))
     swings = (Swing(8.9, 52.0, regular=True, swings=2),)
-    found = replace(fake_hunting(reason="not closed", certain=False), observed=swings, lower_gains=lower_gains)
-    return hunts(verdict=verdict, hunting=found, displacement=None, push=None, moves=None, observed=True)
+    hunting = replace(fake_hunting(reason="not closed", certain=False), observed=swings, lower_gains=lower_gains)
+    return hunts(verdict=verdict, hunting=hunting, displacement=None, push=None, moves=None, observed=True)
 
 
 def said_by_name() -> dict[str, str]:

@@ -70,9 +70,9 @@ def test_kicks_whose_runs_were_given_up_make_no_window() -> None:
 
 def test_kicks_after_which_swings_are_far_larger_than_what_attracts_make_no_window() -> None:
     """They may grow, or die out: without anti-windup that takes long."""
-    known = displaced(beyond(2e-3), beyond(0), swing=0.5)
-    assert known.unknown > 0
-    assert known.searched[1] == known.windows[-1][1] < 8e-3
+    kick = displaced(beyond(2e-3), beyond(0), swing=0.5)
+    assert kick.unknown > 0
+    assert kick.searched[1] == kick.windows[-1][1] < 8e-3
 
 
 def test_kicks_of_which_none_is_completed_are_unknown() -> None:
@@ -168,8 +168,8 @@ def test_no_edge_is_more_certain_than_the_verdict_or_than_large_motions_are_boun
 ) -> None:
     """The viscous friction of this stage is too small to bound them without anti-windup."""
     lower, again = AttractionEnd(0.5, 0.4, True), AttractionEnd(4.0, 3.9, True)
-    found = SearchedBandwidths(Margin(2.0, 16.0, True, 2.1), (BandwidthWindow(again, None),), lower)
-    judgement = judged(sought=lambda: found, stage=STAGE.replace(changes), certain=certain)
+    bandwidths = SearchedBandwidths(Margin(2.0, 16.0, True, 2.1), (BandwidthWindow(again, None),), lower)
+    judgement = judged(sought=lambda: bandwidths, stage=STAGE.replace(changes), certain=certain)
     edges = judgement.margin, judgement.lower, judgement.windows[0].low
     assert [edge is not None and edge.certain for edge in edges] == [sure] * 3
     assert judgement.windows[0].high is None

@@ -120,14 +120,14 @@ def test_a_stage_file_may_leave_out_what_the_log_tells(
 
     monkeypatch.setattr(method, "identify", instead)
     controller = {"controller": friso.load(inputs[1]).as_written()["controller"]}
-    before, told = deepcopy(controller), {"friction.stribeck_velocity": "2 mm/s", "controller.kind": "pid"}
+    before, settings = deepcopy(controller), {"friction.stribeck_velocity": "2 mm/s", "controller.kind": "pid"}
     with pytest.raises(InputError, match="enough"):
-        friso.identify(inputs[0], stage=controller, set=told, map={"force": "Force"})
+        friso.identify(inputs[0], stage=controller, set=settings, map={"force": "Force"})
     base, made_up = taken
     assert controller == before
     assert {key.partition(".")[0] for key in made_up} == {"masses", "friction", "motion"}
     assert "friction.coulomb" in made_up
-    assert not {*told} & {*made_up}
+    assert not {*settings} & {*made_up}
     log, around = SimpleNamespace(setup={}), Prior(base, True, made_up=made_up)
     assert around.user_told("friction.stribeck_velocity", log)  # type: ignore[arg-type]
     assert not around.user_told("friction.viscous", log)  # type: ignore[arg-type]

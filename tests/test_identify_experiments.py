@@ -441,10 +441,10 @@ def test_a_mass_that_is_not_told_stays_in_the_interval() -> None:
     """Of 4 kg on bristles that bend far: where motion begins to be visible, the force has passed static friction."""
     friction = np.array([4.6, 3.1, 4e-3, 4e5, 550.0, 7.0])
     log = ramps(friction, [3.0] * 4, 4.0, np.random.default_rng(5), 1.15, (5e-8, 1e-2))
-    told, not_told = (static_from_ramps(log, mass).static for mass in (4.0, 0.0))
-    assert told.holds(4.6)
-    assert not_told.holds(4.6)
-    assert not_told.low < told.low
+    of_mass, of_none = (static_from_ramps(log, mass).static for mass in (4.0, 0.0))
+    assert of_mass.holds(4.6)
+    assert of_none.holds(4.6)
+    assert of_none.low < of_mass.low
 
 
 def test_rates_that_are_too_high_are_told(wording: Wording) -> None:

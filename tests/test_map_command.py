@@ -17,7 +17,10 @@ from refusals import Refused, Wording
 from systems import posix
 
 import friso as friso_api
+from friso.answers.map_study import refuse_overwriting
+from friso.errors import InputError
 from friso.studies.cells import USUAL
+from friso.studies.metadata import annotate_metadata
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
@@ -240,6 +243,11 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, 
     assert friso_inside(tmp_path, "map", "b.zarr").returncode == 0  # they are its own from then on
     (tmp_path / "b.html").write_text("mine, under a name that was friso's")
     assert friso_inside(tmp_path, "map", "b.zarr").returncode == 2
+    (tmp_path / "b.html").unlink()
+    (tmp_path / "b.html").symlink_to("b.png")  # which has no digest
+    annotate_metadata(tmp_path / "b.zarr", notes={"views": {"b.html": [None]}})
+    with pytest.raises(InputError, match="--overwrite"):
+        refuse_overwriting(tmp_path / "b.zarr", [], overwrite=False)
 
 
 def test_a_file_beside_a_store_that_appears_while_it_runs_stays(

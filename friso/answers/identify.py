@@ -224,9 +224,9 @@ def _whole(source: StageLike, tables: Keyed[str, Any], made: Stage, changes: Cha
 
 def _made_up(lacking: Sequence[str], made: Stage, changes: Changes) -> list[str]:
     """The keys of tables that a stage file lacks, of a stage `made` up around a log, but for those that are set."""
-    told = changes_of(changes)
+    keys_set = changes_of(changes)
     keys = [f"{name}.{key}" for name in lacking for key in made.as_written()[name]]
-    return [key for key in keys if key not in told]
+    return [key for key in keys if key not in keys_set]
 
 
 def _taken_from_logs(made_up: Sequence[str]) -> list[str]:

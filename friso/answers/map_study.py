@@ -256,7 +256,8 @@ def _own_views(store: Path) -> list[Path]:
         return []
     digests = noted if isinstance(noted, dict) else {}
     lists = {name: digest for name, digest in digests.items() if isinstance(digest, list)}  # a store may be of others
-    return [view for view in _views(store) if _digest(view) in lists.get(view.name, [])]
+    present = {view: digest for view in _views(store) if (digest := _digest(view)) is not None}
+    return [view for view, digest in present.items() if digest in lists.get(view.name, [])]
 
 
 def _digest(view: Path) -> str | None:

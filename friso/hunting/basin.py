@@ -198,8 +198,8 @@ def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Mov
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    hunts, known = _caught(moved, MOVES, target, widest)
-    return MoveShare(int(known.sum()), int(hunts[known].sum()), accelerations, times) if known.any() else None
+    hunts, completed = _caught(moved, MOVES, target, widest)
+    return MoveShare(int(completed.sum()), int(hunts[completed].sum()), accelerations, times) if completed.any() else None
 
 
 def evenly(count: int) -> np.ndarray:

@@ -362,17 +362,17 @@ def _smoothed(tracer: Tracer, flip: Point) -> tuple[float, float]:
     """The place of a flip, and up to what share of its bandwidth it is known, from a curve through the multipliers of
     orbits about a first guess: where a limiter chatters these scatter, and may pass -1 several times. Not finite: it is
     not known."""
-    found: list[Point] = []
+    orbits: list[Point] = []
     for way in (-1.0, 1.0):
         near: Point | None = flip
         for away in way * np.linspace(0, np.log(ABOUT), SPREAD // 2 + 1)[1:]:
             target = flip.vector + np.array([away, 0.0, 0.0])
             near = near and tracer.solve(near, target, np.array([1.0, 0.0, 0.0]))
-            found += [near] if near else []
-    if len(found) < ENOUGH:
+            orbits += [near] if near else []
+    if len(orbits) < ENOUGH:
         return np.nan, np.nan
-    places = np.array([point.place for point in found])
-    place, uncertainty = _crossing(places, np.array([-point.multiplier - 1 for point in found]))
+    places = np.array([point.place for point in orbits])
+    place, uncertainty = _crossing(places, np.array([-point.multiplier - 1 for point in orbits]))
     return place, float(max(uncertainty, abs(place - flip.place)))
 
 

@@ -90,17 +90,17 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
 def each_once(special: Sequence[Sequence[LocatedPoint]]) -> tuple[tuple[LocatedPoint, ...], ...]:
     """The special points of branches, of what several meet that of the first alone: where a limiter chatters cycles are
     followed over short ways, which overlap. What these differ by is part of its error."""
-    found: list[tuple[int, LocatedPoint]] = []
+    once: list[tuple[int, LocatedPoint]] = []
     for number, own in enumerate(special):
         for spot in own:
-            twin = next((k for k, (branch, other) in enumerate(found) if branch != number and _same(other, spot)), None)
+            twin = next((k for k, (branch, other) in enumerate(once) if branch != number and _same(other, spot)), None)
             if twin is None:
-                found.append((number, spot))
+                once.append((number, spot))
                 continue
-            branch, other = found[twin]
+            branch, other = once[twin]
             off = abs(other.point.place - spot.point.place) + spot.error
-            found[twin] = branch, replace(other, error=max(other.error, off))
-    return tuple(tuple(spot for branch, spot in found if branch == number) for number in range(len(special)))
+            once[twin] = branch, replace(other, error=max(other.error, off))
+    return tuple(tuple(spot for branch, spot in once if branch == number) for number in range(len(special)))
 
 
 def _same(first: LocatedPoint, second: LocatedPoint) -> bool:
