@@ -11,10 +11,11 @@ import signal
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import pytest
@@ -237,6 +238,12 @@ def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, mo
     same(sweep(rig, AXES, refine=True, store=path), sweep(rig, AXES, refine=True))
 
 
+def unreadable_archive(stream: BinaryIO) -> None:
+    """An archive with the header of an array that ends within a bracket, of which NumPy raises a TokenError."""
+    with zipfile.ZipFile(stream, "w") as archive:
+        archive.writestr("peaks.npy", b"\x93NUMPY\x01\x00\x0a\x00{'descr': \n")
+
+
 def test_answers_are_those_of_their_study_and_no_larger(
     rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -260,6 +267,14 @@ def test_answers_are_those_of_their_study_and_no_larger(
         keep_arrays(tmp_path / "0.npz", {**whole, **change}, "a study")
         before = len(asked)
         assert keeping() == before + 1, change
+    content = (tmp_path / "0.npz").read_bytes()
+    for place in range(len(content)):
+        (tmp_path / "0.npz").write_bytes(content[:place] + bytes([content[place] ^ 8]) + content[place + 1 :])
+        assert kept_arrays(tmp_path / "0.npz", "a study") is None
+    with monkeypatch.context() as patch:  # what others write, with a sound digest
+        patch.setattr(np, "savez_compressed", unreadable_archive)
+        keep_arrays(tmp_path / "0.npz", {}, "a study")
+    assert kept_arrays(tmp_path / "0.npz", "a study") is None
     keep_arrays(tmp_path / "0.npz", {**whole, "more": np.zeros(10**6)}, "a study")
     monkeypatch.setattr(np, "load", lambda *arguments, **named: pytest.fail("it was expanded"))
     keeping()

@@ -198,8 +198,8 @@ def moves_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Mov
         "motion.acceleration": low + across * (high - low),
         "motion.acceleration_time": shortest + along * (longest - shortest),
     }
-    hunts, completed = _caught(moved, MOVES, target, widest)
-    return MoveShare(int(completed.sum()), int(hunts[completed].sum()), accelerations, times) if completed.any() else None
+    hunts, ended = _caught(moved, MOVES, target, widest)
+    return MoveShare(int(ended.sum()), int(hunts[ended].sum()), accelerations, times) if ended.any() else None
 
 
 def evenly(count: int) -> np.ndarray:
