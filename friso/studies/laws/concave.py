@@ -19,6 +19,12 @@ ROUNDED = 1e-6
 SURE = 1e4
 """Weight of the end of a curve, which it has to reach, in weights of all points together."""
 
+BLURRED = 10.0
+"""Scatters of x, as its steps back show it, from 0 up to which no curve is told to bend."""
+
+LEAST_NOISE = 0.01
+"""Share of the end by which points are taken to be off, at least, where they are too few to show it."""
+
 STEPS, HOPELESS = 10_000, 100.0
 """Steps of the fit at most; and how much worse Akaike's criterion becomes before no knots are left out any more."""
 
@@ -51,7 +57,7 @@ class ConcaveFit:
         return float(np.sum(self.strength * _SLOPES[:, None] / self.knots))
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
-        """The curve at x >= 0, of its shape (m,): level from the last knot on."""
+        """The curve at x, of its shape (m,): level from the last knot on."""
         return _shapes(x, self.knots) @ self.strength.ravel()
 
 
@@ -60,14 +66,16 @@ _SLOPES = np.array([1.0, 2.0])
 
 
 def _shapes(x: np.ndarray, knots: np.ndarray) -> np.ndarray:
-    """Both kinds of curves with ends of 1 at x >= 0, shape (m, 2 n)."""
+    """Both kinds of curves with ends of 1 at x, shape (m, 2 n): below 0, where noise leads, straight on."""
     reached = np.minimum(x[:, None] / knots, 1.0)
-    return np.hstack([reached, reached * (2 - reached)])
+    return np.hstack([reached, reached * (2 - np.maximum(reached, 0.0))])
 
 
 def knots_of(x: np.ndarray) -> np.ndarray:
-    """Where points, of shape (m,), let a curve bend: at each of them, or at some, the closer the nearer to 0."""
-    places = np.unique(x)
+    """Where points, of shape (m,), let a curve bend: at each of them but 0, or at some, the closer the nearer to 0, but
+    not as near as x itself scatters."""
+    back = np.minimum(np.diff(x), 0.0)
+    places = np.unique(x[x > BLURRED * np.sqrt(np.mean(back**2))])
     places = places[np.append(places[0] >= NEAR * places[-1], np.diff(places) > NEAR * places[-1])]
     if len(places) <= KNOTS:
         return places
@@ -76,7 +84,7 @@ def knots_of(x: np.ndarray) -> np.ndarray:
 
 
 def concave_fits(x: np.ndarray, y: np.ndarray, end: float) -> Iterator[ConcaveFit]:
-    """The nearest curves to points x > 0 and y, both of shape (m,), that reach `end`: straight between their knots, or
+    """The nearest curves to points x and y, both of shape (m,), that reach `end`: straight between their knots, or
     bent too if there are many, and with the first few knots left out. Beyond the points they go on as these end, as far
     again at most."""
     knots = knots_of(x)
@@ -114,5 +122,8 @@ def _fit(rows: np.ndarray, knots: np.ndarray, first: int, bent: bool, points: in
     misfit = float(points * np.log(away**2 / points + (ROUNDED * end) ** 2))
     gain = (_SLOPES[:, None] / knots).ravel()[free]
     spread = np.linalg.pinv(rows[:, free]).T @ gain
-    error = float(away * np.linalg.norm(spread) / np.sqrt(max(points - len(free), 1)))
+    noise = away / np.sqrt(max(points - len(free), 1))
+    if points <= KNOTS:
+        noise = max(noise, LEAST_NOISE * end)
+    error = float(noise * np.linalg.norm(spread))
     return ConcaveFit(knots[first:], strength[:, first:], error, misfit, len(free))

@@ -207,7 +207,7 @@ def _virgin_change(before: MeasuredFriction, after: MeasuredFriction, points: Vi
     else:
         new = np.interp(points.displacement, after.displacement, after.force)
         old, new = points.means(points.force), points.means(new)
-        scatter = points.usual / np.sqrt(points.together)
+        scatter = min(points.usual / np.sqrt(points.together), 2 * WITHIN * before.levels.static)
     at, static = int(np.argmax(np.abs(new - old))), before.levels.static
     off, allowed = float(abs(new - old)[at] / static), float(WITHIN + scatter / static)
     return MeasuredChange("virgin", "N", float(old[at]), float(new[at]), off, allowed)

@@ -30,8 +30,9 @@ WITHIN = 0.02
 PLAIN = 4
 """What a free number has to gain to be taken: twice as much as by Akaike's criterion."""
 
-AS_LIKELY = 4.0
-"""Difference of Akaike's criterion up to which a fit is taken to be as likely as the best."""
+AS_LIKELY, ERRORS = 8.0, 3.0
+"""Difference of Akaike's criterion up to which a fit is taken to be as likely as the best, and standard errors to which
+its first slope is: the range of these held the truth of 97 of 100 curves drawn at random."""
 
 FIRST = 1 / 3
 """Share of static friction that the first point may bear, and still say how stiff the start is."""
@@ -114,13 +115,15 @@ def with_virgin_curve(
     if not REACHES * static <= end <= static / REACHES:
         actual = f"points up to {end:.4g}, where friction.static is {static:.4g} (SI)"
         raise InputError("--virgin", actual, "points up to break-away", '--set friction.static="3 N"')
-    away = displacement > 0  # the others say what the sensor shows at rest
+    away = displacement != 0  # at rest a point says what the sensor shows there
     moved, rising = displacement[away], force[away]
     fits = list(concave_fits(moved, rising, static))
     fit, likeliest = min(fits, key=lambda fit: fit.misfit + PLAIN * fit.free), min(fit.akaike for fit in fits)
-    likely = [(a.slope, 2 * a.error) for a in fits if a is fit or a.akaike <= likeliest + AS_LIKELY]
+    likely = [(a.slope, ERRORS * a.error) for a in fits if a is fit or a.akaike <= likeliest + AS_LIKELY]
     low, high = min(slope - error for slope, error in likely), max(slope + error for slope, error in likely)
-    blind = np.count_nonzero(moved <= fit.corners[0]) < 2 or fit(moved[:1])[0] > FIRST * static
+    first = moved > 0
+    blind = np.count_nonzero(moved[first] <= fit.corners[0]) < 2 or fit(moved[first][:1])[0] > FIRST * static
+    high += high - fit.slope  # what is left out near rest makes curves softer, never stiffer
     ends = max(low, 0.0), np.inf if blind else high
     points = VirginPoints(displacement, force, _scatter(rising - fit(moved)), ends)
     at_rest = force[~away]

@@ -47,10 +47,14 @@ def _stiffness(ends: tuple[float, float], stiffness: float) -> str:
     low, high, value = (with_unit(x, "N/m") for x in (*ends, stiffness))
     if np.isinf(ends[1]):
         return (
-            "The points lie too far from rest to show the stiffness before sliding: it is taken as "
-            f"{value}, and may be more. Measure closer to rest."
+            f"The points do not show the stiffness before sliding, which is taken as {value}: too few lie close to "
+            "rest. Measure closer to rest, and see that displacement 0 is where the force begins."
         )
-    return f"The points show a stiffness before sliding between {low} and {high}; it is taken as {value}."
+    between = f"between {low} and {high}" if ends[0] else f"up to {high}"
+    return (
+        f"The points show a stiffness before sliding {between}, if displacement 0 is where the force begins; "
+        f"it is taken as {value}."
+    )
 
 
 def activity_sentences(condition: str) -> list[str]:
