@@ -20,7 +20,7 @@ from typing import Any
 
 from friso import early
 from friso.early import SIGNALS
-from friso.system import no_signal_later, signal_later, signals_told
+from friso.system import interrupts_held, no_signal_later, signal_later, signals_told
 
 _AGAIN = 0.02
 """After how long [s] it is looked again whether an import has ended."""
@@ -65,7 +65,8 @@ def raising() -> Iterator[None]:
         return
     before, ignored = _take(_arrived), sys.unraisablehook
     if early.IS_COMMAND:
-        threading.Thread(target=_end_in_time, args=(signals_told(),), daemon=True).start()
+        with interrupts_held():  # Ctrl-C is for the main thread, where it may wait
+            threading.Thread(target=_end_in_time, args=(signals_told(),), daemon=True).start()
     sys.unraisablehook = partial(_lost, ignored)
     _raising = True
     try:

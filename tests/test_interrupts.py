@@ -2,6 +2,7 @@
 
 import os
 import random
+import re
 import signal
 import subprocess
 import sys
@@ -12,6 +13,8 @@ from importlib import import_module
 from pathlib import Path
 from threading import Event, Timer
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
@@ -207,6 +210,31 @@ def test_a_command_that_answers_an_interrupt_has_the_time_for_it(tmp_path: Path)
     assert (done.returncode, done.stdout, done.stderr) == (0, "the best so far\n", "")
 
 
+WAITING = """
+import os, signal, sys, time
+
+sys.argv[0] = "friso"
+from friso import interrupts
+from friso.system import interrupts_held
+
+with interrupts.raising():
+    try:
+        with interrupts_held():
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.5)
+            print("whole")
+        time.sleep(10)
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+def test_ctrl_c_that_the_main_thread_does_not_take_waits() -> None:
+    """The thread that watches for signals takes none for it."""
+    done = subprocess.run([sys.executable, "-c", WAITING], capture_output=True, text=True, timeout=50)
+    assert (done.stdout, done.stderr) == ("whole\ninterrupted\n", "")
+
+
 class Going:
     """Is struck by Ctrl-C while it goes, where Python ignores what is raised."""
 
@@ -373,3 +401,25 @@ def test_who_waits_for_another_that_compiles_can_be_interrupted(
     interrupts.signal_later(0.3, lambda *_: os.kill(os.getpid(), signal.SIGINT))
     with FileLock(tmp_path / "0.lock"), pytest.raises(KeyboardInterrupt), interrupts.raising():
         building._Work().finish(requests(tmp_path, 1))
+
+
+@pytest.mark.parametrize("signals", [[signal.SIGHUP], [signal.SIGINT, signal.SIGINT]])
+def test_the_app_ends_in_one_line(signals: list[signal.Signals]) -> None:
+    """Also for a terminal that is closed, and for an impatient user."""
+    command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        address = re.search(r"http://[^/]+", process.stdout.readline())
+        assert address is not None
+        for _ in range(300):
+            try:
+                urlopen(address[0], timeout=5)
+            except HTTPError:  # it answers, though not to one without a token
+                break
+            except OSError:
+                time.sleep(0.1)
+        for number in signals:
+            process.send_signal(number)
+        assert process.wait(30) == 128 + signals[0]
+        assert process.stderr is not None
+        assert process.stderr.read() == f"friso: {'interrupted' if signals[0] == signal.SIGINT else 'terminated'}\n"

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 import uvicorn
 
@@ -13,6 +17,7 @@ from friso.answers.starting import example
 from friso.app.gate import LOOPBACK, Access
 from friso.app.server import application
 from friso.app.work import Workshop
+from friso.early import SIGNALS
 from friso.errors import InputError
 from friso.stage.files import load, text_of
 
@@ -49,15 +54,37 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
     workshop = Workshop()
     app = application(access, begin, workshop)
     config = uvicorn.Config(app, log_level="warning", ws="none", lifespan="on", timeout_graceful_shutdown=GRACE)
-    _Server(config, workshop).run([listener])
+    server = _Server(config, workshop)
+    server.run([listener])
+    if server.ended_by:
+        signal.raise_signal(server.ended_by)
 
 
 class _Server(uvicorn.Server):
-    """Ends the questions at work before it waits for their answers."""
+    """Ends the questions at work before it waits for their answers, and itself in good order for any signal, which is
+    the command's own once the server has ended."""
 
     def __init__(self, config: uvicorn.Config, workshop: Workshop) -> None:
         super().__init__(config)
         self.workshop = workshop
+        self.ended_by = 0
+
+    @contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """Take the signals, but those that are ignored (nohup), while the server runs."""
+        taken = {number: handler for number in SIGNALS if (handler := signal.getsignal(number)) is not signal.SIG_IGN}
+        for number in taken:
+            signal.signal(number, self.handle_exit)
+        try:
+            yield
+        finally:
+            for number, handler in taken.items():
+                signal.signal(number, handler)
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Note that the server is to end."""
+        self.ended_by = self.ended_by or sig
+        self.should_exit = True
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End what is asked, and then the connections."""

@@ -28,7 +28,7 @@ HDF5 = b"\x89HDF\r\n\x1a\n"
 """The first bytes of a file of HDF5."""
 
 
-MOST, PER_BYTE = 64 << 20, 16
+MOST, PER_BYTE = 256 << 20, 16
 """Bytes that what is read may take, besides a multiple of the size of the file."""
 
 
@@ -116,8 +116,9 @@ def _from_hdf5(item: Any, file: Any) -> Any:
         return [_from_hdf5(file[reference], file) for reference in np.ravel(item[()], order="F")]
     if item.attrs.get("MATLAB_empty", 0):
         return "" if kind == "char" else np.empty(0)
-    if item.nbytes > most_bytes(file.id.get_filesize()):  # of which hardly anything is there
-        raise ValueError(_too_much(item.nbytes))
+    most = most_bytes(file.id.get_filesize())
+    if item.nbytes > most:  # of which hardly anything is there
+        raise ValueError(_too_much(item.nbytes, most))
     values = np.asarray(item[()])
     if kind == "char":
         return "".join(map(chr, values.ravel(order="F")))
@@ -215,8 +216,8 @@ def most_bytes(size: int) -> int:
     return MOST + PER_BYTE * size
 
 
-def _too_much(size: int) -> str:
-    return f"what it holds takes {size / 1e6:.0f} MB"
+def _too_much(size: int, most: int) -> str:
+    return f"it would take {size / 1e6:.0f} MB of memory, and a file of its size has at most {most / 1e6:.0f} MB"
 
 
 def _end_with_parent() -> None:
@@ -239,8 +240,8 @@ def main(kind: str, path: Path, memory: int, seconds: float) -> None:
     answer, message = b"", ""
     try:
         answer = pickle.dumps((_plain(READERS[kind](path)), ""), protocol=5)
-        if len(answer) > most_bytes(path.stat().st_size):
-            message = _too_much(len(answer))
+        if len(answer) > (most := most_bytes(path.stat().st_size)):
+            message = _too_much(len(answer), most)
     except MemoryError:
         message = "it needs too much memory"
     except RecursionError:
