@@ -14,6 +14,7 @@ import time
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -516,6 +517,36 @@ def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: s
     for read in (read_store, check_store):
         with pytest.raises(StoreError, match=re.escape(name)):
             read(stored)
+
+
+def test_a_folder_in_place_of_a_file_and_a_file_in_place_of_a_folder_are_refused(
+    stored: Path, finished: Path, rig: Stage
+) -> None:
+    """By whoever checks the store, goes on with it or would replace it; once they are removed, it is written again."""
+    study, other = Request(rig, AXES).study(), Request(rig, AXES).study(rtol=1e-4)
+    files = [stored / name for name in (".zgroup", "peaks/.zarray", ".blocks/0.0", "peaks/0.0", ".answers/0.npz")]
+    for path in [*files, *(stored / name for name in (".blocks", "peaks", ".answers"))]:
+        if path.is_dir():
+            shutil.rmtree(path)
+        path.unlink(missing_ok=True)
+        mine = path / "mine" if path in files else path
+        mine.parent.mkdir(parents=True, exist_ok=True)
+        mine.write_text("mine")
+        uses = (
+            partial(check_store, stored),
+            partial(sweep, rig, AXES, store=stored),
+            lambda: Store.opened(stored, other, overwrite=True).__enter__(),
+        )
+        for use in uses:
+            with pytest.raises(StoreError, match=re.escape(path.relative_to(stored).as_posix())):
+                use()
+        assert mine.read_text() == "mine"
+        shutil.rmtree(path) if path in files else path.unlink()
+        with Store.opened(stored, study):
+            assert check_store(stored).files == []
+    sweep(rig, AXES, store=stored, verify=0.3)
+    xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+    assert check_store(stored).damaged == []
 
 
 @posix

@@ -10,7 +10,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from friso.studies.store_files import digest_of, put, stored
+from friso.studies.store_files import BLOCKS, digest_of, put, stored
 
 
 @dataclass(frozen=True)
@@ -48,4 +48,4 @@ class Ledger:
         return json.dumps({"study": self.study, "block": number, "sha256": digests}, indent=1).encode()
 
     def _file(self, number: str) -> Path:
-        return self.path / ".blocks" / number
+        return self.path / BLOCKS / number

@@ -75,6 +75,7 @@ class Metadata:
     def mend(self, path: Path) -> None:
         """Write the files beside the arrays anew that do not say the same. Raises OSError."""
         for name in self.damaged_files(path):
+            (path / name).parent.mkdir(exist_ok=True)
             put(path / name, json.dumps(self.files[name], indent=1).encode())
 
 

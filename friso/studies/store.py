@@ -28,7 +28,7 @@ from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
 from friso.studies.ledger import Ledger
 from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
-from friso.studies.store_files import refuse_foreign
+from friso.studies.store_files import ANSWERS, refuse_foreign
 from friso.studies.store_folder import (
     exchange,
     lock_store,
@@ -207,7 +207,7 @@ class Store:
     @property
     def answers(self) -> KeptCells:
         """What a refined study keeps until it is done."""
-        return KeptCells(self.path / ".answers", self.study, checked_metadata(self.path).study)
+        return KeptCells(self.path / ANSWERS, self.study, checked_metadata(self.path).study)
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
         """Add attributes to the study."""
@@ -244,7 +244,7 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     from friso.studies.sealed_store import SealedStore
 
     metadata = checked_metadata(Path(path))
-    refuse_foreign(Path(path))
+    refuse_foreign(Path(path), metadata.all_files)
     try:
         if metadata.damaged_axes(Path(path)):
             raise ValueError("other axes than were written")

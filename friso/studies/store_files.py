@@ -6,9 +6,10 @@ from __future__ import annotations
 import hashlib
 import io
 import os
+import re
 import stat
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 
 from friso.bounded_file import content_of
 from friso.errors import StoreError
-from friso.whole_file import whole_file
+from friso.whole_file import PARTIAL, whole_file
 
 MOST_BYTES = 64 << 20
 """Size of a file of a store at most: the largest chunk, of texts that nothing compresses, has a sixth of it."""
@@ -83,29 +84,50 @@ def put(file: Path, content: bytes) -> None:
         stream.write(content)
 
 
-def refuse_foreign(path: Path) -> None:
-    """Raises StoreError for a store with anything in it that Zarr must not read, nor friso write to: a link, which may
-    lead elsewhere, a device, a pipe, a huge file."""
+BLOCKS, ANSWERS = ".blocks", ".answers"
+"""Folders of a store besides those of its arrays: what was written of each block, what is kept of a refined study."""
+
+_OF_ARRAY = re.compile(rf"\.z[a-z]+|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
+"""Whether a name is one that Zarr gives, or of a file that was being written."""
+
+
+def is_of_store(name: str) -> bool:
+    """Whether a file of this name within a store is one that friso or Zarr writes."""
+    folder, _, own = name.rpartition("/")
+    return _OF_ARRAY(own.removesuffix(".npz") if folder == ANSWERS else own) is not None
+
+
+def refuse_foreign(path: Path, files: Collection[str]) -> None:
+    """Raises StoreError for a store with such `files` of metadata and anything in it that Zarr must not read, nor friso
+    write to: a link, which may lead elsewhere, a device, a pipe, a huge file, a folder in place of a file or a file in
+    place of a folder."""
+    folders = {BLOCKS, ANSWERS, *(name.partition("/")[0] for name in files if "/" in name)}
     for entry in _entries(path):
         status = entry.stat(follow_symlinks=False)
+        name = Path(entry.path).relative_to(path).as_posix()
+        remove = "rm"
         if stat.S_ISLNK(status.st_mode):
             actual = "is a link"
+        elif stat.S_ISDIR(status.st_mode):
+            if name not in files and not (name.rpartition("/")[0] in folders and is_of_store(name)):
+                continue
+            actual, remove = "is a folder", "rm -r"
         elif not stat.S_ISREG(status.st_mode):
             actual = "is a device or a pipe"
         elif status.st_size > MOST_BYTES:
             actual = f"has {status.st_size / 1e6:.3g} MB"
+        elif name in folders:
+            actual = "is no folder"
         else:
             continue
-        name = Path(entry.path).relative_to(path).as_posix()
         expected = f"files of the store alone, of at most {MOST_BYTES / 1e6:.3g} MB: remove that one"
-        raise StoreError("", f"a store whose {name} {actual}", expected, f"rm {name}", str(path))
+        raise StoreError("", f"a store whose {name} {actual}", expected, f"{remove} {name}", str(path))
 
 
 def _entries(folder: Path | str) -> Iterator[os.DirEntry[str]]:
-    """All that is in a folder and those below it, but for the folders; no link is followed."""
+    """All that is in a folder and those below it, which come before what is in them; no link is followed."""
     with os.scandir(folder) as entries:
         for entry in entries:
+            yield entry
             if entry.is_dir(follow_symlinks=False):
                 yield from _entries(entry.path)
-            else:
-                yield entry

@@ -8,7 +8,6 @@ Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a f
 from __future__ import annotations
 
 import os
-import re
 import uuid
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -20,6 +19,7 @@ from filelock import FileLock, Timeout
 from friso.errors import StoreError
 from friso.interrupts import hold_interrupts
 from friso.leftovers import is_leftover, remove_leftover
+from friso.studies.store_files import is_of_store
 from friso.system import MOVES_OPEN_FOLDERS, cause_of, delete_file, remove_folder, rename_folder
 from friso.whole_file import PARTIAL, is_partial
 
@@ -60,21 +60,15 @@ def refuse_others_files(path: Path) -> None:
     """
     others = []
     for item in sorted(path.iterdir()):
-        if item.is_dir() and not item.is_symlink() and item.name not in _FOLDERS:
-            others += [f"{item.name}/{part.name}" for part in sorted(item.iterdir()) if not _OF_ARRAY(part.name)]
-        elif item.is_file() and not (_OF_ARRAY(item.name) or item.name == LOCK or is_partial(item)):
+        if item.is_dir() and not item.is_symlink():
+            names = {f"{item.name}/{part.name}": part for part in sorted(item.iterdir())}
+            others += [name for name, part in names.items() if part.is_dir() or not is_of_store(name)]
+        elif item.is_file() and not (is_of_store(item.name) or item.name == LOCK):
             others.append(item.name)
     if others:
         more = f" and {len(others) - 1} more" if len(others) > 1 else ""
         actual = f"a store with {others[0]}{more} in it, which friso did not write"
         raise StoreError("", actual, "nothing else in it: move that away, or another --out", origin=str(path))
-
-
-_FOLDERS = (".blocks", ".answers")
-"""Folders of a store besides those of its arrays."""
-
-_OF_ARRAY = re.compile(rf"\.z[a-z]+|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
-"""Whether a name is one that Zarr gives, or of a file that was being written."""
 
 
 def exchange(path: Path, fill: Callable[[Path], object], lock: FileLock) -> None:
@@ -111,7 +105,7 @@ def remove_partial_files(path: Path) -> None:
     """Remove files that were being written when their process was killed, from a store that is locked: whoever writes
     into it holds the lock."""
     for file in path.rglob(f"*{PARTIAL}"):
-        if is_partial(file):
+        if is_partial(file) and file.is_file():
             delete_file(file)
 
 
