@@ -317,6 +317,7 @@ def said_by_name() -> dict[str, str]:
         "hunts, grows": sentence(growing("unstable", "hunts")),
         "hunts, may grow": sentence(growing("unknown", "hunts")),
         "bistable, grows": sentence(growing("unstable", "bistable")),
+        "bistable, may grow": sentence(growing("unknown", "bistable")),
         "bistable, may die out": sentence(growing("stable", "bistable")),
         "settles, may run away": sentence(growing("unstable", "settles")),
         "settles, not known whether it may": sentence(growing("unknown", "settles")),
@@ -352,12 +353,19 @@ def test_sentences(snapshots: Snapshots) -> None:
         ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
         ("hunts, grows", ["was stopped", "may run away", "controller.anti_windup"]),
-        ("settles, not known whether it may", ["not known", "controller.anti_windup"]),
+        ("settles, not known whether it may", ["not known", 'controller.anti_windup is "none"']),
+        ("bistable, may grow", ["may last", "not known", "11.8 Hz"]),
     ],
 )
 def test_numbers_in_sentences(name: str, facts: list[str]) -> None:
     text = said_by_name()[name]
     assert [fact for fact in facts if fact not in text] == []
+
+
+def test_no_higher_bandwidth_is_advised_for_a_swing_that_grows_beyond_the_force_limit() -> None:
+    """There the loop is unstable (Hurwitz, docs/hunting.md): a faster one all the more."""
+    texts = said_by_name()
+    assert not any("Hz" in texts[name] for name in ("hunts, grows", "bistable, grows"))
 
 
 def test_an_unstable_loop_is_named_before_what_friction_makes_of_it():

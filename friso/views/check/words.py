@@ -22,6 +22,13 @@ if TYPE_CHECKING:
 
 _MICRON, _TEN_MICRON = BANDS
 
+_AFTERWARDS = {
+    "stable": "dies out slowly, if at all",
+    "unstable": "grows",
+    "unknown": "may last, grow or die out",
+}
+"""What becomes of a swing that was observed beyond a force limit without anti-windup, by the loop at lower gains."""
+
 _UNFINISHED = "this run was completed, but not the longer one that shows whether it ends in the hunting that was found"
 
 ROUGH = 5e-4
@@ -95,7 +102,7 @@ def _bistable(case: Case) -> str:
     if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if case.judgement.hunting.passing:
-        after = "dies out slowly, if at all" if case.judgement.hunting.lower_gains == "stable" else "grows"
+        after = _AFTERWARDS[case.judgement.hunting.lower_gains]
         return f"{first}, but another move or a kick may start a swing that {after}."
     if not starts:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
@@ -164,11 +171,12 @@ def _doubts(case: Case) -> list[str]:
 
 def _running_away(case: Case) -> list[str]:
     """That large motions may grow without bound, or that this is not known, and what keeps them from it."""
+    unwound = 'controller.anti_windup is "none". Set it to "clamp".'
     return {
         None: [],
         "stable": [],
-        "unstable": ["Large motions may run away, as the force limit has no anti-windup: set controller.anti_windup."],
-        "unknown": ["Whether large motions run away is not known: the force limit has no controller.anti_windup."],
+        "unstable": [f"Large motions may run away, because {unwound}"],
+        "unknown": [f"It is not known whether large motions run away: {unwound}"],
     }[case.judgement.hunting.lower_gains]
 
 
@@ -239,7 +247,8 @@ def _windows(case: Case) -> list[str]:
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """What keeps a case from hunting."""
     judgement = item.case.judgement
-    ways = [_faster(item.case, judgement.margin)] if judgement.margin else []
+    grows = judgement.hunting.passing and judgement.hunting.lower_gains == "unstable"  # the faster the loop, the sooner
+    ways = [_faster(item.case, judgement.margin)] if judgement.margin and not grows else []
     ways += [_slower(item.case, judgement.lower)] if judgement.lower else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
