@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -17,8 +18,8 @@ from refusals import Refused, Wording
 from systems import posix
 
 import friso as friso_api
-from friso.answers.map_study import refuse_overwriting
-from friso.errors import InputError
+from friso.answers.map_study import refuse_overwriting, stored_study
+from friso.errors import InputError, StoreError
 from friso.studies.cells import USUAL
 from friso.studies.metadata import annotate_metadata
 
@@ -246,8 +247,11 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, 
     (tmp_path / "b.html").unlink()
     (tmp_path / "b.html").symlink_to("b.png")  # which has no digest
     annotate_metadata(tmp_path / "b.zarr", notes={"views": {"b.html": [None]}})
+    study, _ = stored_study(tmp_path / "b.zarr", None, None)
     with pytest.raises(InputError, match="--overwrite"):
-        refuse_overwriting(tmp_path / "b.zarr", [], overwrite=False)
+        refuse_overwriting(study, tmp_path / "b.zarr", [], overwrite=False)
+    with pytest.raises(StoreError, match="another study"):  # before the figure, which is not all that would be lost
+        refuse_overwriting(replace(study, rtol=1e-7), tmp_path / "b.zarr", [], overwrite=False)
 
 
 def test_a_file_beside_a_store_that_appears_while_it_runs_stays(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.answers.inputs import Changes, axes_of, pairs_of, wrong
-from friso.answers.output_folder import check_file, check_store_folder, drafts_of, refuse_place, written
+from friso.answers.output_folder import OVERWRITE, check_file, check_store_folder, drafts_of, refuse_place, written
 from friso.errors import InputError, StoreError
 from friso.progress import Progress, silent
 from friso.quantities import quoted
@@ -202,14 +202,20 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
     return dict.fromkeys(paths, partial(export, runs))
 
 
-def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> None:
-    """Refuse to write over files that are no earlier result of this study. Raises InputError."""
+def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool) -> None:
+    """Refuse to write over what is no earlier result of this study. Raises InputError, StoreError where another study
+    is in its store."""
+    from friso.studies.metadata import is_store
+    from friso.studies.store import refuse_other
+
     if store in exports:
         raise wrong("export", f"{store}, which is the store", "another name", "map.nc")
     check_store_folder(store)
+    if not overwrite and is_store(store):
+        refuse_other(store, study)
     own = _own_views(store)
     for view in _views(store):
-        check_file("--out", view, overwrite, [store], is_own=view in own)
+        check_file("--out", view, overwrite, [store], is_own=view in own, example=OVERWRITE)
     for path in exports:
         check_file("--export", path, overwrite, [store])
 

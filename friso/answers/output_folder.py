@@ -139,13 +139,18 @@ def check_store_folder(folder: Path) -> None:
 
 
 def check_file(
-    option: str, path: Path, overwrite: bool, inputs: Sequence[Path | None] = (), is_own: bool = False
+    option: str,
+    path: Path,
+    overwrite: bool,
+    inputs: Sequence[Path | None] = (),
+    is_own: bool = False,
+    example: str = "",
 ) -> None:
     """Raises InputError where a file that the user names must not be written: it is among the `inputs`, which are read,
-    or there already, unless it `is_own` or may be overwritten."""
+    or there already, unless it `is_own` or may be overwritten; with another name as the example, unless one is told."""
     refuse_place(option, path)
-    example = f"{path.stem}-2{path.suffix}"
-    example = f"{option} {example}" if option.startswith("--") else example
+    another = f"{path.stem}-2{path.suffix}"
+    example = example or (f"{option} {another}" if option.startswith("--") else another)
     if any(file and _are_one(path, file) for file in inputs):
         raise InputError(option, f"{path}, which is read", "another file; nothing was overwritten", example)
     if os.path.lexists(path) and not ((is_own or overwrite) and path.is_file()):

@@ -236,7 +236,7 @@ def sweep(
                 check_file("export", path, overwrite)
             runs = run_in_memory([study], crew, share, progress)[0]
         else:
-            refuse_overwriting(store, exports, overwrite)
+            refuse_overwriting(study, store, exports, overwrite)
             runs = _filled(study, store, crew, share, overwrite, metric, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
     keep(export_files(held, exports), exports if overwrite else ())

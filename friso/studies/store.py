@@ -85,7 +85,7 @@ class Store:
                 store._replace()
         metadata = checked_metadata(path)
         with lock_store(path):
-            _refuse_other(path, study)
+            refuse_other(path, study)
             _warn_of_another_machine(path)
             remove_partial_files(path)
             metadata.mend(path)
@@ -95,10 +95,11 @@ class Store:
         """Put this study in place of the store that is there, unless it is that of this study already."""
         with lock_store(self.path) as lock:
             try:
-                _refuse_other(self.path, self.study)
+                refuse_other(self.path, self.study)
             except StoreError:
                 refuse_others_files(self.path)
                 exchange(self.path, self._fill, lock)
+                logger.warning("replaced (--overwrite): %s, which held another study, or a damaged one", self.path)
 
     def _fill(self, folder: Path) -> None:
         """Write the store without results into a folder that is not there yet."""
@@ -310,7 +311,7 @@ def _let_zarr_finish() -> None:
     sync(others())
 
 
-def _refuse_other(path: Path, study: Study) -> None:
+def refuse_other(path: Path, study: Study) -> None:
     """Raises StoreError if the store holds another study than this."""
     with read_store(path) as dataset:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
