@@ -24,6 +24,8 @@ DIGITS = 2
 
 NOT_IDENTIFIED = "not identified: all that is possible"
 
+CHOSEN = "our choice, not identified"
+
 OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
 
 
@@ -102,7 +104,7 @@ def origins(
     tables = {name: table for name, table in stage.as_written().items() if isinstance(table, dict)}
     keys = [f"{name}.{key}" for name, table in tables.items() for key in table]
     ours = keys if chosen is None else chosen
-    return {key: sources.get(key, "our choice, not identified" if key in ours else "as given") for key in keys}
+    return {key: sources.get(key, CHOSEN if key in ours else "as given") for key in keys}
 
 
 def with_origins(text: str, origins: Mapping[str, str]) -> str:

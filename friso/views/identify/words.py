@@ -13,6 +13,7 @@ from friso.axis import axis_shown, unit_shown
 from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import nothing_learnt
+from friso.identification.stage_file import CHOSEN
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.identify.kind_view import Facts, PredictionView, view_of
 from friso.views.identify.laws import TITLE, how, law_facts, law_sentence
@@ -247,7 +248,17 @@ def sentences(identification: Identification, predictions: Sequence[Prediction])
     lines = [sentence for _, sentence in headline(identification)]
     lines += [] if identification.laws is None else [law_sentence(identification.laws)]
     lines += [prediction_line(prediction)[1] for prediction in predictions]
+    lines += _chosen(identification)
     return lines + [f"note: {axis_shown().text(warning)}" for warning in identification.warnings]
+
+
+def _chosen(identification: Identification) -> list[str]:
+    """That a verdict on the stage rests on a controller that is none of the user's, if it does."""
+    table = "controller"
+    sources = {source for key, source in identification.origins.items() if key.startswith(f"{table}.")}
+    if identification.stage is None or sources != {CHOSEN}:
+        return []
+    return [f"The [{table}] of the stage file is our choice: put yours there before you ask whether the stage hunts."]
 
 
 def details(identification: Identification, files: Sequence[LogFile]) -> list[str]:
