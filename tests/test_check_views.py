@@ -353,7 +353,7 @@ def test_sentences(snapshots: Snapshots) -> None:
         ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
         ("hunts, grows", ["was stopped", "may run away", "controller.anti_windup"]),
-        ("settles, not known whether it may", ["not known", 'controller.anti_windup is "none"']),
+        ("settles, not known whether it may", ["not known", 'controller.anti_windup, which is "none"']),
         ("bistable, may grow", ["may last", "not known", "11.8 Hz"]),
     ],
 )

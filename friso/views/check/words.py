@@ -171,12 +171,12 @@ def _doubts(case: Case) -> list[str]:
 
 def _running_away(case: Case) -> list[str]:
     """That large motions may grow without bound, or that this is not known, and what keeps them from it."""
-    unwound = 'controller.anti_windup is "none". Set it to "clamp".'
+    cause = 'set controller.anti_windup, which is "none", to "clamp".'
     return {
         None: [],
         "stable": [],
-        "unstable": [f"Large motions may run away, because {unwound}"],
-        "unknown": [f"It is not known whether large motions run away: {unwound}"],
+        "unstable": [f"Large motions may run away: {cause}"],
+        "unknown": [f"It is not known whether large motions run away: {cause}"],
     }[case.judgement.hunting.lower_gains]
 
 
