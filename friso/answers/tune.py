@@ -48,7 +48,10 @@ class TuneAnswer(Answer):
     @property
     def failure(self) -> str:
         """Whether a change is needed and none works."""
-        return "no change that was tried works" if self.result.needed and not self.result.working else ""
+        if not self.result.needed or self.result.working:
+            return ""
+        so_far = "before it was interrupted, " if self.result.interrupted else ""
+        return f"{so_far}no change that was tried works for certain"
 
     def sentences(self) -> Sequence[str]:
         """What to change, what it brings and costs, and why the other remedies do not work."""

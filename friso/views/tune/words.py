@@ -125,7 +125,7 @@ def answer(tuning: Advice) -> list[str]:
         return [*lines, *_nothing(tuning)]
     least, fastest = tuning.least, tuning.fastest
     assert least is not None
-    lines += _works(least, tuning, "The least change that works")
+    lines += _works(least, tuning, f"The least change {'so far ' if tuning.interrupted else ''}that works")
     if fastest is not None and fastest is not least:
         lines += _works(fastest, tuning, "What settles soonest")
     elif len(tuning.working) > 1:
