@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from refusals import Wording
+from scipy.signal import lfilter
 from variants import VARIANTS
 
+from friso.identification.alternatives import alternatives
 from friso.identification.causes import causes, fragment
 from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
@@ -352,6 +354,20 @@ def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording) -> None:
     assert cause.without is not None
     assert inverse.value("mass") < 0.5 * MASS
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.05)
+
+
+def test_what_friction_does_to_a_servo_that_follows_well_is_no_missing_feedforward() -> None:
+    """The reference of a PD servo, by its force: friction at low speed is in their difference."""
+    log, lag = axis(), 0.02
+    velocity = np.gradient(log["position"], DT)
+    stribeck = 6.0 * np.exp(-((velocity / 0.1) ** 2)) * np.sign(velocity)
+    error = lfilter([DT / (DT + lag)], [1, -lag / (DT + lag)], axis(noise=0.0)["force"] + stribeck) / 3e4
+    signals = {"position": log["position"], "reference": log["position"] + error, "force": log["force"] + stribeck}
+    followed = replace(log, signals=signals)
+    inverse = inverse_model(followed, 5.0)
+    assert np.abs(error).max() < 0.02 * np.ptp(log["position"])
+    assert inverse.value("mass") == pytest.approx(MASS, rel=0.01)
+    assert not alternatives(followed, inverse, 0.0)
 
 
 def test_a_force_that_is_cut_off_spoils_the_record(wording: Wording) -> None:
