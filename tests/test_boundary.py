@@ -12,6 +12,7 @@ from variants import VARIANTS
 import friso
 from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
 from friso.hunting.boundary.branch import REACHED, Point, Tracer, continued
+from friso.hunting.boundary.crossing import crossing
 from friso.hunting.boundary.diagram import each_once
 from friso.hunting.boundary.locate import changes, corrected
 from friso.hunting.cycle.ensemble import Ensemble
@@ -60,11 +61,54 @@ def test_what_overlapping_branches_meet_is_listed_once(over_crossover: Diagram) 
     def moved(place: float, time: float = 0.0) -> LocatedPoint:
         return replace(fold, point=replace(fold.point, place=fold.point.place + place, time=fold.point.time + time))
 
-    ((kept,), *others) = each_once([[fold], [moved(2e-4)], [moved(0.01)], [moved(0.0, 0.05)]])
+    hundredth = over_crossover.space.hundredth(np.zeros(1), np.ones(1))
+    ((kept,), *others) = each_once([[fold], [moved(2e-4)], [moved(0.01)], [moved(0.0, 0.05)]], hundredth)
     assert [len(own) for own in others] == [0, 1, 1]
     assert kept.point == fold.point
     assert kept.error == pytest.approx(2e-4 + fold.error)
-    assert each_once([[fold, moved(2e-4)]]) == ((fold, moved(2e-4)),)  # round a cusp
+    assert each_once([[fold, moved(2e-4)]], hundredth) == ((fold, moved(2e-4)),)  # round a cusp
+    rough = replace(fold, error=3e-4)
+    assert [len(own) for own in each_once([[rough, moved(2e-4), moved(4e-4)]], hundredth)] == [2]
+
+
+@pytest.mark.parametrize(
+    ("swept", "value", "percent"),
+    [
+        (KeyRange("k", 2.0, 40.0), 5.0, 0.05),
+        (KeyRange("k", 5.5, 5.7), 5.6, 0.056),
+        (KeyRange("k", 5.7, 5.5), 5.6, 0.056),
+        (KeyRange("k", 1.0, 100.0, log=True), 10.0, 0.1),
+        (KeyRange("k", -3.0, 2.0), 0.0, 0.03),
+    ],
+)
+def test_a_hundredth_of_a_key_does_not_depend_on_the_range(swept: KeyRange, value: float, percent: float) -> None:
+    """But where the range holds 0; on a line at an angle to the key it is longer."""
+    space = Space.of(RIGID, [swept, KeyRange("n", 1.0, 1000.0)])
+    place = float(swept.place(np.array(value)))
+    assert swept.at(np.array(place + swept.hundredth(place))) - value == pytest.approx(
+        percent * np.sign(swept.high - swept.low), rel=0.01
+    )
+    slanted = space.hundredth(np.array([0.0, 1.0]), np.array([0.5, 0.0]))
+    assert slanted(2 * place) == pytest.approx(2 * swept.hundredth(place))
+
+
+def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> None:
+    """Straight lines through values that scatter: the reserve mostly holds the true place; what is not known within
+    half of the range is not told. Of three crossings the last is told, as uncertain as they are apart."""
+    draws, places = np.random.default_rng(0), np.linspace(-0.01, 0.01, 8)
+    for scatter in (4e-4, 2e-3, 4e-3):
+        true = draws.uniform(-2e-3, 2e-3, 300)
+        values = (0.4 * (places - at) + scatter * draws.standard_normal(8) for at in true)
+        found = [(crossing(places, value), at) for value, at in zip(values, true, strict=True)]
+        known = [(it, at) for it, at in found if it]
+        assert all(0 < it.reserve <= 0.01 for it, _ in known)
+        assert scatter > 4e-4 or len(known) > 290
+        assert np.mean([abs(it.place - at) <= it.reserve for it, at in known]) > 0.9
+    assert crossing(places, places + 2.0) is None
+    assert crossing(places[:5], places[:5]) is None
+    thrice = crossing(places, places * (places - 0.004) * (places + 0.004))
+    assert thrice is not None
+    assert (thrice.place, thrice.reserve) == (pytest.approx(0.004), pytest.approx(0.008))
 
 
 def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagram) -> None:

@@ -6,6 +6,7 @@ from beyond_flip import STEEP
 
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors.survey import of_cycles
+from friso.hunting.boundary import KeyRange, Space, diagram
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.cycle.held import RANGE, held_by
@@ -74,3 +75,8 @@ def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_
         assert end == "found"
         assert 2e-3 < reserve < 0.01
         assert flip * (1 - reserve) < 5.599 < 5.614 < flip * (1 + reserve)
+    key = KeyRange("controller.crossover", 5.4, 5.8)
+    traced = diagram(Space.of(rig.replace({"joint.locked": False}), [key]), seeds=2)
+    ((flip,),) = traced.special  # a boundary lists it once, as uncertain
+    assert 2e-3 < traced.error(flip) / 5.6 < 0.01
+    assert abs(traced.value(flip.point.place) - 5.6065) + 0.0075 < traced.error(flip)

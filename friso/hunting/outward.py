@@ -14,7 +14,8 @@ from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, NO_FARTHER, REACHED, Point, Tracer
-from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside
+from friso.hunting.boundary.crossing import ENOUGH, SPREAD, crossing
+from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside, smoothed
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, families, hunting_cycles
 from friso.hunting.cycle.held import held_beside
@@ -42,13 +43,9 @@ BETWEEN = np.array([0.1, 0.3, 0.6])
 """Shares of the way there at which, as at its end, cycles, and motions beside those that repel, are looked for that
 attract over less, or from a narrow range."""
 
-SPREAD, ENOUGH = 9, 6
-"""Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
-known."""
-
-NEAR, ABOUT = 1.03, 1.01
-"""The range of factors about the flip over which that curve is laid again; and that of an orbit that was followed to
-it."""
+NEAR = 1.03
+"""The range of factors about the flip of the simplest cycle over which the curve through its multipliers is laid
+again."""
 
 FOUND, LOST, UNCLEAR = "found", "lost", "unclear"
 """What is known of the end of an orbit."""
@@ -280,10 +277,14 @@ class Outward:
             last = last_inside(tracer, first, second, kind, FLAT if kind == "fold" else PRECISE)
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
-            if last is not None and kind == "flip":
-                place, rough = _smoothed(tracer, last) if self._chatters else _rough(tracer, last, first, second)
+            if last is not None and kind != "fold" and self._chatters:
+                found = smoothed(tracer, last, kind)
+                ended = found is not None and (found.slope < 0) == (kind == "flip")  # beyond it, the orbit repels
+                if found and ended:
+                    farthest, reserve = replace(farthest, place=found.place), max(PRECISE, found.reserve)
+            elif last is not None and kind == "flip":
+                rough = _rough(tracer, last, first, second)
                 ended, reserve = bool(np.isfinite(rough)), float(np.fmax(PRECISE, rough))
-                farthest = replace(farthest, place=place) if ended else farthest
         elif tracer.reaches(points, reason):
             raise Beyond
         lost = LOST if reason.startswith(NO_FARTHER) and abs(farthest.multiplier) < FIRM else UNCLEAR
@@ -306,11 +307,11 @@ class Outward:
             closed = np.isfinite(excess)
             if np.count_nonzero(closed) < ENOUGH or not np.any(excess < 0):
                 break
-            place, uncertainty = _crossing(np.linspace(0, 1, SPREAD)[closed], excess[closed])
-            if not np.isfinite(uncertainty):
+            found = crossing(np.linspace(0, 1, SPREAD)[closed], excess[closed])
+            if found is None or found.slope < 0:
                 break
-            uncertainty *= abs(float(np.log(outside / at)))
-            before, flip_at = flip, float(at * (outside / at) ** place)
+            uncertainty = found.reserve * abs(float(np.log(outside / at)))
+            before, flip_at = flip, float(at * (outside / at) ** found.place)
             flip = flip_at, uncertainty if before is None else max(uncertainty, abs(flip_at / before[0] - 1))
             at, outside = flip_at / NEAR, flip_at * NEAR  # a curve over less is closer
         return flip
@@ -348,46 +349,14 @@ def orbit_distance(point: Point, orbit: Swinging) -> float:
     return float(np.copysign(np.exp(point.distance), orbit.distance))
 
 
-def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> tuple[float, float]:
-    """The place of a flip, the last point before it, and up to what share of its bandwidth it is known, between two
-    points: twice by what the multiplier changes at a tighter tolerance, over its slope. It is rough where a law turns
+def _rough(tracer: Tracer, last: Point, first: Point, second: Point) -> float:
+    """Up to what share of its bandwidth a flip is known, between two points, of which `last` is the last before it:
+    twice by what the multiplier changes at a tighter tolerance, over its slope. It is rough where a law turns
     sharply, as rolling friction at full deflection. Not finite: it is not known."""
     stages = tracer.family(np.zeros(1, np.int64), np.array([last.place]))
     tight = multipliers(stages, last.cycle.orbits, TIGHTER * tracer.rtol)
     slope = (second.multiplier - first.multiplier) / (second.place - first.place)
-    return last.place, float(2 * abs(tight.local[0, 0].real - last.multiplier) / abs(slope))
-
-
-def _smoothed(tracer: Tracer, flip: Point) -> tuple[float, float]:
-    """The place of a flip, and up to what share of its bandwidth it is known, from a curve through the multipliers of
-    orbits about a first guess: where a limiter chatters these scatter, and may pass -1 several times. Not finite: it is
-    not known."""
-    orbits: list[Point] = []
-    for way in (-1.0, 1.0):
-        near: Point | None = flip
-        for away in way * np.linspace(0, np.log(ABOUT), SPREAD // 2 + 1)[1:]:
-            target = flip.vector + np.array([away, 0.0, 0.0])
-            near = near and tracer.solve(near, target, np.array([1.0, 0.0, 0.0]))
-            orbits += [near] if near else []
-    if len(orbits) < ENOUGH:
-        return np.nan, np.nan
-    places = np.array([point.place for point in orbits])
-    place, uncertainty = _crossing(places, np.array([-point.multiplier - 1 for point in orbits]))
-    return place, float(max(uncertainty, abs(place - flip.place)))
-
-
-def _crossing(places: np.ndarray, excess: np.ndarray) -> tuple[float, float]:
-    """The last place at which a cubic through what scatters about it passes 0, and twice how far this scattering may
-    move it; not finite where there is none."""
-    curve = np.polynomial.Polynomial.fit(places, excess, 3)
-    roots = curve.roots()
-    real = roots.real[np.abs(roots.imag) < 1e-9 * np.ptp(places)]
-    inside = real[(real >= places.min()) & (real <= places.max())]
-    if not inside.size:
-        return np.nan, np.nan
-    place = float(inside.max())
-    scatter = float(np.sqrt(np.sum((excess - curve(places)) ** 2) / max(len(places) - 4, 1)))
-    return place, 2 * scatter / abs(float(curve.deriv()(place)))
+    return float(2 * abs(tight.local[0, 0].real - last.multiplier) / abs(slope))
 
 
 def _kind(first: Point, second: Point) -> Bifurcation:

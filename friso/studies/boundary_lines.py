@@ -8,7 +8,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from friso.hunting.boundary import Branch, Curve, Diagram, LocatedPoint, Plane, Space
+from friso.hunting.boundary import Branch, Curve, Diagram, LocatedPoint, Plane, Point, Space
+from friso.hunting.boundary.diagram import SAME
 from friso.hunting.cycle.find import Cycles
 
 CycleShape = Literal["symmetric", "asymmetric", "whole"]
@@ -23,9 +24,9 @@ failed or did not settle, and where no stage may be."""
 class Line:
     """A branch of cycles over one key, or a curve in two: its n points in order.
 
-    `at` [SI], shape (n, keys), and `error`, by how much it changes at a hundredth of the tolerance (NaN but at special
-    points); `kinds` of the special points ("" for others); `amplitude` [m], `period` [s] and `multiplier`, each (n,);
-    and how the line ends on either side.
+    `at` [SI], shape (n, keys), and `error`, by how much it may be off (NaN but at special points); `kinds` of the
+    special points ("" for others); `amplitude` [m], `period` [s] and `multiplier`, each (n,); and how the line ends on
+    either side.
     """
 
     shape: CycleShape
@@ -75,9 +76,11 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
 
 
 def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
-    """The points of a branch with those of its special points that are inside the range, in order."""
+    """The points of a branch with those of its special points that are inside the range, in order, but for those within
+    the error of one: there it is not known whether they attract."""
     path = np.array([point.vector for point in branch.points])
-    placed = [(float(k), point, np.nan, "") for k, point in enumerate(branch.points)]
+    ordinary = [(k, point) for k, point in enumerate(branch.points) if not any(_in_doubt(s, point) for s in special)]
+    placed = [(float(k), point, np.nan, "") for k, point in ordinary]
     placed += [
         (_path_coordinate(path, spot.point.vector), spot.point, spot.error, spot.kind)
         for spot in special
@@ -87,6 +90,12 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
         _Row(np.array([point.place]), np.array([error]), point.cycle, kind)
         for _, point, error, kind in sorted(placed, key=lambda row: row[0])
     ]
+
+
+def _in_doubt(special: LocatedPoint, point: Point) -> bool:
+    """Whether a point of its branch lies within the error of a special one, if that is known."""
+    apart = np.abs(special.point.vector - point.vector)
+    return bool(np.isfinite(special.error) and apart[0] < special.error and apart[1:].max() < SAME)
 
 
 def _path_coordinate(path: np.ndarray, vector: np.ndarray) -> float:
@@ -176,7 +185,9 @@ def begins_at(line: Line, k: int) -> bool | None:
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
-    """Whether any cycle attracts on both sides of a place."""
+    """Whether any cycle attracts on both sides of a place, and none is in doubt there."""
+    if result.in_doubt(np.array([place]))[0]:
+        return False
     pairs = [pair for branch in result.branches for pair in pairwise(branch.points)]
     across = [(a, b) for a, b in pairs if (a.place - place) * (b.place - place) <= 0]
     return any(max(abs(a.multiplier), abs(b.multiplier)) < 1 for a, b in across)

@@ -45,6 +45,9 @@ NO_FARTHER = "it could not be followed farther"
 TURN = 0.3
 """Largest change of direction [rad] from one step to the next."""
 
+HUNDREDTH = float(np.log(1.01))
+"""Length of a line over which what is varied changes by a hundredth, where places are logarithms of it."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -85,7 +88,8 @@ class Branch:
 class Tracer:
     """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
     those of the cycle (the latter only if they are not as few as there may be); `pace` times as fast as a curve is
-    drawn, in steps not shorter than `shortest`."""
+    drawn, in steps not shorter than `shortest`. At a place, what is varied changes by a hundredth over a length of the
+    line, `hundredth`."""
 
     def __init__(
         self,
@@ -96,10 +100,11 @@ class Tracer:
         swings: int | None = None,
         pace: float = 1.0,
         shortest: float = SHORTEST,
+        hundredth: Callable[[float], float] = lambda _: HUNDREDTH,
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
         self.first, self.longest, self.smooth = pace * FIRST, pace * LONGEST, pace * SMOOTH
-        self.shortest = shortest
+        self.shortest, self.hundredth = shortest, hundredth
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None

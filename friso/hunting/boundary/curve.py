@@ -57,7 +57,7 @@ class Spot:
 
     @property
     def error(self) -> np.ndarray:
-        """How far it moves, along each key, when it is computed to a hundredth of the tolerance, shape (2,)."""
+        """By how much it may be off along each key, shape (2,)."""
         return np.abs(self.special.error * self.across)
 
 
@@ -110,7 +110,8 @@ class CurveTracer:
     ) -> Spot | None:
         """The point of the curve on the line through an origin of the box along a direction, found from one near it, or
         from about what is expected there."""
-        tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol)
+        hundredth = self.space.hundredth(origin, across)
+        tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol, hundredth=hundredth)
         point, special = near.special.point, near.special
         size, states, slope = near.size, point.cycle.states, np.nan
         if expected is not None:

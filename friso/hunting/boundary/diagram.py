@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -25,8 +25,8 @@ again and again there is no end of them."""
 SAME = 0.02
 """Difference in the logarithm of distance up to which two cycles of one stage are the same."""
 
-CLOSE = 1e-3
-"""Difference in place up to which two branches meet one special point, where their cycles are the same there."""
+CLOSE = 0.1
+"""Hundredths of the key up to which two branches meet one special point, where their cycles are the same there."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,17 @@ class Diagram:
         return float(self.space.ranges[0].at(np.array(place)))
 
     def error(self, special: LocatedPoint) -> float:
-        """By how much the value [SI] of a special point changes when it is computed to a hundredth of the tolerance."""
+        """By how much the value [SI] of a special point may be off."""
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
+
+    def in_doubt(self, places: np.ndarray) -> np.ndarray:
+        """Whether places, (n,), lie within the error of a special point: there multipliers tell nothing."""
+        return _in_doubt(self.special, places)
+
+
+def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> np.ndarray:
+    near = [np.abs(spot.point.place - places) < spot.error for own in special for spot in own]
+    return np.any([np.zeros(len(places), bool), *near], axis=0)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -61,6 +70,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
     sought, surveyed = families(stages, rtol), attractors(stages, rtol=rtol)
+    hundredth = space.hundredth(np.zeros(1), np.ones(1))
     branches: list[Branch] = []
     special: list[tuple[LocatedPoint, ...]] = []
 
@@ -69,7 +79,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
         if any(_passes(branch, start) for branch in branches):
             return False
         line = space.lines(np.zeros((1, 1)), np.ones((1, 1)))
-        tracer = Tracer(line, cycle.sign, rtol, swings=cycle.swings)
+        tracer = Tracer(line, cycle.sign, rtol, swings=cycle.swings, hundredth=hundredth)
         branches.append(tracer.branch(start))
         special.append(tuple(special_points(tracer, branches[-1])))
         return True
@@ -81,19 +91,25 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     for motion in surveyed.motions:
         if motion.cycles is not None and skipped < OTHERS:
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
-    attracts = surveyed.attracts | sought[0].attracting
-    decided = surveyed.decided | sought[0].attracting
+    once = each_once(special, hundredth)
+    attracting = sought[0].attracting & ~_in_doubt(once, places)
+    attracts, decided = surveyed.attracts | attracting, surveyed.decided | attracting
     unstable = np.any([*unstable_among(stages).values()], axis=0)
-    return Diagram(space, tuple(branches), each_once(special), places, sought[0], attracts, decided, unstable)
+    return Diagram(space, tuple(branches), once, places, sought[0], attracts, decided, unstable)
 
 
-def each_once(special: Sequence[Sequence[LocatedPoint]]) -> tuple[tuple[LocatedPoint, ...], ...]:
-    """The special points of branches, of what several meet that of the first alone: where a limiter chatters cycles are
-    followed over short ways, which overlap. What these differ by is part of its error."""
+def each_once(
+    special: Sequence[Sequence[LocatedPoint]], hundredth: Callable[[float], float]
+) -> tuple[tuple[LocatedPoint, ...], ...]:
+    """The special points of branches, of those within the errors of each other the first alone, and so of those of
+    several branches that are CLOSE, in terms of the `hundredth` of the key at a place: where a limiter chatters cycles
+    are followed over short ways, which overlap, and multipliers scatter. What these differ by is part of its error."""
     once: list[tuple[int, LocatedPoint]] = []
     for number, own in enumerate(special):
         for spot in own:
-            twin = next((k for k, (branch, other) in enumerate(once) if branch != number and _same(other, spot)), None)
+            close = CLOSE * hundredth(spot.point.place)
+            twins = (k for k, (on, other) in enumerate(once) if _same(other, spot, close if on != number else 0.0))
+            twin = next(twins, None)
             if twin is None:
                 once.append((number, spot))
                 continue
@@ -103,11 +119,13 @@ def each_once(special: Sequence[Sequence[LocatedPoint]]) -> tuple[tuple[LocatedP
     return tuple(tuple(spot for branch, spot in once if branch == number) for number in range(len(special)))
 
 
-def _same(first: LocatedPoint, second: LocatedPoint) -> bool:
-    """Whether two special points are one: of the same kind, with the same cycle there."""
+def _same(first: LocatedPoint, second: LocatedPoint, close: float) -> bool:
+    """Whether two special points are one: of the same kind, with the same cycle there, not farther apart than `close`
+    or what is known of their errors."""
+    close = max([close, *(spot.error for spot in (first, second) if np.isfinite(spot.error))])
     apart = np.abs(first.point.vector - second.point.vector)
     kinds = [(spot.kind, spot.point.cycle.sign, spot.point.cycle.swings) for spot in (first, second)]
-    return bool(kinds[0] == kinds[1] and apart[0] < CLOSE and apart[1:].max() < SAME)
+    return bool(kinds[0] == kinds[1] and apart[0] < close and apart[1:].max() < SAME)
 
 
 def _passes(branch: Branch, point: Point) -> bool:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
+from friso.hunting.boundary.crossing import SPREAD, Crossing, crossing
 
 Bifurcation = Literal["flip", "fold", "torus"]
 
@@ -22,6 +23,9 @@ MET = 1e-5
 """How far the multiplier may be off at a first guess that is right, going by what it is expected to change along the
 way."""
 
+ALONG = np.array([1.0, 0.0, 0.0])
+"""Direction along the key alone, in the space of place, log distance and log time."""
+
 TIGHTER = 0.01
 """Share of the tolerance at which a point is computed again for its error."""
 
@@ -29,8 +33,9 @@ TIGHTER = 0.01
 @dataclass(frozen=True)
 class LocatedPoint:
     """A point at which a branch stops attracting (or begins to), with the direction of the branch there, by how much
-    its place may be off (what the search has left, and the change at a hundredth of the tolerance), and how fast the
-    multiplier changes along that direction."""
+    its place may be off (what the search has left, and the change at a hundredth of the tolerance; of a flip or a torus
+    with a limiter that chatters, the reserve of `smoothed`), and how fast the multiplier changes along that
+    direction."""
 
     kind: Bifurcation
     point: Point
@@ -124,7 +129,14 @@ def _slope(kind: Bifurcation, points: dict[float, Point]) -> float:
 def _special_point(
     tracer: Tracer, kind: Bifurcation, point: Point, direction: np.ndarray, slope: float
 ) -> LocatedPoint:
-    """The point with its error; infinite where it cannot be computed at the tighter tolerance."""
+    """The point with its error; infinite where it cannot be computed at the tighter tolerance, or multipliers scatter
+    too much."""
+    if kind != "fold" and tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
+        found = smoothed(tracer, point, kind)
+        if found is None:
+            return LocatedPoint(kind, point, direction, np.inf, slope)
+        there = tracer.solve(point, point.vector + (found.place - point.place) * ALONG, ALONG) or point
+        return LocatedPoint(kind, there, direction, found.reserve, found.slope * float(direction[0]))
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
         return LocatedPoint(kind, point, direction, np.inf, slope)
@@ -132,6 +144,21 @@ def _special_point(
     return LocatedPoint(
         kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])), slope
     )
+
+
+def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None:
+    """Where on a branch a flip or a torus is, from a curve through the multipliers of orbits within a hundredth of the
+    key about a first guess: where a limiter chatters these scatter, and may pass -1 several times. Its reserve is that
+    of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
+    orbits: list[Point] = []
+    for way in (-1.0, 1.0):
+        near: Point | None = guess
+        for away in way * np.linspace(0, tracer.hundredth(guess.place), SPREAD // 2 + 1)[1:]:
+            near = near and tracer.solve(near, guess.vector + away * ALONG, ALONG)
+            orbits += [near] if near else []
+    places = np.array([point.place for point in orbits])
+    found = crossing(places, np.array([distance_to(kind, point) for point in orbits]))
+    return found and found._replace(reserve=max(found.reserve, abs(found.place - guess.place)))
 
 
 def corrected(

@@ -153,7 +153,13 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     back, if there is one, and whether it reaches that neighbour without."""
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh
-    tracer = Tracer(space.lines(start[None], across[None]), cycle.sign, rtol, farthest=mesh)
+    tracer = Tracer(
+        space.lines(start[None], across[None]),
+        cycle.sign,
+        rtol,
+        farthest=mesh,
+        hundredth=space.hundredth(start, across),
+    )
     first = Point.of(space.stages(start[None]), 0.0, cycle)
     steps = count(1)
     points, reason = tracer.walk(first, 1.0, lambda last, point: bool(changes(last, point)) or next(steps) >= PATIENCE)

@@ -43,6 +43,15 @@ class KeyRange:
             return np.log(value / self.low) / np.log(self.high / self.low)
         return (value - self.low) / (self.high - self.low)
 
+    def hundredth(self, place: float) -> float:
+        """By how much a place changes with a hundredth of the value there, or, where the range holds 0, of its larger
+        end."""
+        if self.log:
+            return float(np.log(1.01) / abs(np.log(self.high / self.low)))
+        ends = [abs(self.low), abs(self.high)]
+        size = abs(float(self.at(np.array(place)))) if self.low * self.high > 0 else max(ends)
+        return 0.01 * size / abs(self.high - self.low)
+
 
 @dataclass(frozen=True)
 class Space:
@@ -87,3 +96,13 @@ class Space:
             return self.stages(origins[which] + places[:, None] * directions[which])
 
         return family
+
+    def hundredth(self, origin: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
+        """The length of a line through the box, from an origin (keys,) along a direction (keys,), over which the first
+        of its keys changes by a hundredth, at a place on it."""
+
+        def length(place: float) -> float:
+            steps = zip(self.ranges, origin + place * direction, direction, strict=True)
+            return min(swept.hundredth(float(at)) / abs(float(way)) for swept, at, way in steps if way)
+
+        return length
