@@ -20,6 +20,10 @@ from typing import TypeVar
 
 _T = TypeVar("_T")
 
+PATIENCE = 2.0
+"""How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
+file that appears."""
+
 
 def _quoted(word: str) -> str:
     """A word of a command in quotes, of KEY=VALUE the value alone."""
@@ -39,10 +43,6 @@ def _paths_of(error: OSError) -> list[str]:
 if sys.platform == "win32":
     import _thread
     import ctypes
-
-    PATIENCE = 2.0
-    """How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
-    file that appears."""
 
     _DEVICES = {
         *("CON", "PRN", "AUX", "NUL", "CONIN$", "CONOUT$"),
@@ -80,21 +80,11 @@ if sys.platform == "win32":
         signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
         return outlet
 
-    def once_free(use: Callable[[], _T]) -> _T:
-        """What `use` returns: where another program holds the file open, it is tried again for as long as `PATIENCE`.
-        Raises what `use` raises."""
-        end = time.monotonic() + PATIENCE
-        while True:
-            try:
-                return use()
-            except OSError as error:
-                if time.monotonic() > end or not (_may_be_held(error) or error.errno == errno.ENOTEMPTY):
-                    raise  # a file that was deleted while another program reads it stays in its folder for as long
-                time.sleep(0.05)
-
     def _may_be_held(error: OSError) -> bool:
-        """Whether what is refused is there: Windows gives the same reason where another program holds it open."""
-        return isinstance(error, PermissionError) and any(os.path.exists(path) for path in _paths_of(error))
+        """Whether another program may hold what is refused: Windows gives the same reason for what may not be used. A
+        file that was deleted while another program reads it stays in its folder for as long."""
+        refused = isinstance(error, PermissionError) and any(os.path.exists(path) for path in _paths_of(error))
+        return refused or error.errno == errno.ENOTEMPTY
 
     def check_free(path: Path) -> None:
         """Raises OSError where a file cannot be replaced, since it is read-only, or another program holds it open."""
@@ -195,9 +185,9 @@ else:
         signal.set_wakeup_fd(inlet, warn_on_full_buffer=False)
         return outlet
 
-    def once_free(use: Callable[[], _T]) -> _T:
-        """What `use` returns: no program keeps others from a file. Raises what `use` raises."""
-        return use()
+    def _may_be_held(error: OSError) -> bool:
+        """False: no program keeps others from a file."""
+        return False
 
     def check_free(path: Path) -> None:
         """Nothing: see `once_free`."""
@@ -262,6 +252,19 @@ else:
             folder.chmod(0o700)
             return folder.lstat()
         return status
+
+
+def once_free(use: Callable[[], _T]) -> _T:
+    """What `use` returns: where another program holds the file open, it is tried again for as long as `PATIENCE`.
+    Raises what `use` raises."""
+    end = time.monotonic() + PATIENCE
+    while True:
+        try:
+            return use()
+        except OSError as error:
+            if time.monotonic() > end or not _may_be_held(error):
+                raise
+            time.sleep(0.05)
 
 
 def open_file(path: Path, flags: int) -> int:

@@ -102,7 +102,7 @@ def _bistable(case: Case) -> str:
     if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if case.judgement.hunting.passing:
-        after = _AFTERWARDS[case.judgement.hunting.lower_gains]
+        after = _AFTERWARDS[case.judgement.hunting.lower_gains or "unknown"]
         return f"{first}, but another move or a kick may start a swing that {after}."
     if not starts:
         return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
