@@ -1,0 +1,40 @@
+"""Where values that scatter pass zero, and up to what that is known: by a cubic through them."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+SPREAD, ENOUGH = 9, 6
+"""Values through which the cubic is laid, and how many of these have to be known."""
+
+
+class Crossing(NamedTuple):
+    """A place at which values pass zero, by how much it may be off, and their slope there."""
+
+    place: float
+    reserve: float
+    slope: float
+
+
+def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
+    """The last place at which the cubic through values, (n,), passes zero in the direction of their trend. It may be
+    off by twice what their scatter moves the cubic or their trend, or by the distance to where the cubic passes zero as
+    well; None if that is more than half of the range of places, beyond which nothing is known, or if it does not pass
+    zero, or there are too few values."""
+    if len(places) < ENOUGH:
+        return None
+    trend, curve = (np.polynomial.Polynomial.fit(places, values, degree) for degree in (1, 3))
+    slopes, roots = curve.deriv(), curve.roots()
+    real = roots.real[np.abs(roots.imag) < 1e-9 * np.ptp(places)]
+    inside = real[(real >= places.min()) & (real <= places.max())]
+    steepness = float(trend.deriv()(0.0))
+    along = inside[slopes(inside) * steepness > 0]
+    if not along.size:
+        return None
+    place = float(along.max())
+    scatter = float(np.sqrt(np.sum((values - curve(places)) ** 2) / (len(places) - 4)))
+    slope = float(slopes(place))
+    reserve = max(2 * scatter / min(abs(slope), abs(steepness)), float(np.abs(inside - place).max()))
+    return Crossing(place, reserve, slope) if reserve <= np.ptp(places) / 2 else None
