@@ -14,7 +14,7 @@ from refusals import Wording
 from scipy.signal import lfilter
 from variants import VARIANTS
 
-from friso.identification.alternatives import alternatives
+from friso.identification.alternatives import alternatives, perhaps_fed_forward
 from friso.identification.causes import causes, fragment
 from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
@@ -343,7 +343,7 @@ def test_a_force_along_the_way_is_found(wording: Wording) -> None:
     assert cause.without.value("coulomb") == pytest.approx(COULOMB, rel=0.1)
 
 
-def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording) -> None:
+def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording, monkeypatch: pytest.MonkeyPatch) -> None:
     log = axis()
     ahead = np.roll(log["position"], -20)
     force = log["force"] - 4.0 * np.gradient(np.gradient(ahead, DT), DT)
@@ -354,6 +354,11 @@ def test_a_feed_forward_that_is_not_logged_is_found(wording: Wording) -> None:
     assert cause.without is not None
     assert inverse.value("mass") < 0.5 * MASS
     assert cause.without.value("mass") == pytest.approx(MASS, rel=0.05)
+    assert perhaps_fed_forward(lacking, inverse, 0.0) == ""  # it is certain
+    monkeypatch.setattr("friso.identification.alternatives._lacks_when_fast", lambda *_: False)
+    perhaps = perhaps_fed_forward(lacking, inverse, 0.0)
+    assert "this log does not tell" in perhaps
+    assert float(perhaps.split()[-2]) == pytest.approx(MASS, rel=0.05)
 
 
 def test_what_friction_does_to_a_servo_that_follows_well_is_no_missing_feedforward() -> None:

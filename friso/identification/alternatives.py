@@ -129,9 +129,9 @@ def _with_columns(log: Log, inverse: InverseModel, cart_share: float) -> Iterato
             with suppress(InputError):
                 model = inverse_model(log, inverse.bandwidth, False, cart_share, extra=extra)
                 yield Alternative(words(model, log), model)
-    model = _fed_forward(log, inverse, cart_share)
-    if model:
-        yield Alternative(_feedforward_sentence(model, log), model)
+    fed = _fed_forward(log, inverse, cart_share)
+    if fed and _lacks_when_fast(inverse, fed[1]):
+        yield Alternative(_feedforward_sentence(fed[0], log), fed[0])
 
 
 def _places(log: Log, rows: int) -> dict[str, np.ndarray]:
@@ -157,8 +157,9 @@ def _of_reference(log: Log, bandwidth: float) -> dict[str, np.ndarray]:
     return columns
 
 
-def _fed_forward(log: Log, inverse: InverseModel, cart_share: float) -> InverseModel | None:
-    """The inverse model with what a feedforward adds, where the log tells this from the motion's own force."""
+def _fed_forward(log: Log, inverse: InverseModel, cart_share: float) -> tuple[InverseModel, np.ndarray] | None:
+    """The inverse model with what a feedforward adds to the force, and what its part in the acceleration is, shape
+    (rows,) [N]; None where nothing is lacking in it."""
     columns = _of_reference(log, inverse.bandwidth)
     accelerated = {name: column for name, column in columns.items() if name == ACCELERATION}
     if not columns:
@@ -167,10 +168,19 @@ def _fed_forward(log: Log, inverse: InverseModel, cart_share: float) -> InverseM
         alone, both = (
             inverse_model(log, inverse.bandwidth, False, cart_share, extra=extra) for extra in (accelerated, columns)
         )
-        model = both if max(both.value(ACCELERATION), both.value(DIRECTION)) < 0 else alone
-        if alone.value(ACCELERATION) < 0 and _lacks_when_fast(inverse, inverse.measured - alone.measured):
-            return model
+        if alone.value(ACCELERATION) < 0:
+            lacking = max(both.value(ACCELERATION), both.value(DIRECTION)) < 0
+            return both if lacking else alone, inverse.measured - alone.measured
     return None
+
+
+def perhaps_fed_forward(log: Log, inverse: InverseModel, cart_share: float) -> str:
+    """A sentence on a feedforward that may be missing from the force, where the log does not tell; "" elsewhere."""
+    fed = _fed_forward(log, inverse, cart_share)
+    if fed is None or fed[0].error >= BETTER * inverse.error or _lacks_when_fast(inverse, fed[1]):
+        return ""
+    mass = f"{inverse.value('mass') - fed[0].value(ACCELERATION):.2g} {unit_of('kg', log)}"
+    return f"if the force leaves out a feedforward, which this log does not tell, the mass is about {mass}"
 
 
 def _lacks_when_fast(inverse: InverseModel, fed: np.ndarray) -> bool:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import welch
 
-from friso.identification.alternatives import alternatives
+from friso.identification.alternatives import alternatives, perhaps_fed_forward
 from friso.identification.inverse_model import InverseModel
 from friso.identification.logs.checks import CLIPPED, clipped_share, jumps
 from friso.identification.logs.log import Log
@@ -44,7 +44,8 @@ def causes(log: Log, inverse: InverseModel, cart_share: float) -> list[Cause]:
     none of these explains it."""
     better = [Cause(other.sentence, other.model, True) for other in alternatives(log, inverse, cart_share)]
     of_record = [_jump(log), _coarse(log)]
-    plain = [_constant(inverse, log.unit("force")), "" if better else _oscillation(inverse)]
+    fed = "" if better else perhaps_fed_forward(log, inverse, cart_share)
+    plain = [_constant(inverse, log.unit("force")), fed, "" if better else _oscillation(inverse)]
     first, last = ([Cause(sentence) for sentence in sentences if sentence] for sentences in (of_record, plain))
     return [*first, *better, *_clipped(log), *last]
 
