@@ -244,7 +244,9 @@ def test_scales(text: str, unit: str, factor: float) -> None:
     assert read_scale("force", text, unit)[0] == pytest.approx(factor)
 
 
-@pytest.mark.parametrize(("text", "unit"), [("35", ""), ("35 N", "V"), ("35 m/V", "V"), ("3 N/V", "A"), ("x N/V", "V")])
+@pytest.mark.parametrize(
+    ("text", "unit"), [("35", ""), ("35 N", "V"), ("35 m/V", "V"), ("3 N/V", "A"), ("x N/V", "V"), ("24 N/A", "N")]
+)
 def test_wrong_scales(text: str, unit: str, refused: Refused) -> None:
     with refused("scale"):
         read_scale("force", text, unit)

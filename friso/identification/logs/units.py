@@ -198,6 +198,9 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
     if unit == below:
         return above, unit
     actual = f"{quoted(text)}, and the channel is in {unit}"
+    if unit_factor(unit, role_unit) is not None:
+        expected = "no scale for this log: identify the other by itself first, which keeps its scale beside it"
+        raise LogError("scale", actual, expected, f"friso identify other.csv --scale {role}={quoted(text)}")
     raise LogError("scale", actual, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
 
 
