@@ -99,11 +99,11 @@ def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> N
     for scatter in (4e-4, 2e-3, 4e-3):
         true = draws.uniform(-2e-3, 2e-3, 300)
         values = (0.4 * (places - at) + scatter * draws.standard_normal(8) for at in true)
-        found = [(crossing(places, value), at) for value, at in zip(values, true, strict=True)]
-        known = [(it, at) for it, at in found if it]
-        assert all(0 < it.reserve <= 0.01 for it, _ in known)
-        assert scatter > 4e-4 or len(known) > 290
-        assert np.mean([abs(it.place - at) <= it.reserve for it, at in known]) > 0.9
+        sought = [(crossing(places, value), at) for value, at in zip(values, true, strict=True)]
+        reached = [(met, at) for met, at in sought if met]
+        assert all(0 < met.reserve <= 0.01 for met, _ in reached)
+        assert scatter > 4e-4 or len(reached) > 290
+        assert np.mean([abs(met.place - at) <= met.reserve for met, at in reached]) > 0.9
     assert crossing(places, places + 2.0) is None
     assert crossing(places[:5], places[:5]) is None
     thrice = crossing(places, places * (places - 0.004) * (places + 0.004))

@@ -278,10 +278,10 @@ class Outward:
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
             if last is not None and kind != "fold" and self._chatters:
-                found = smoothed(tracer, last, kind)
-                ended = found is not None and (found.slope < 0) == (kind == "flip")  # beyond it, the orbit repels
-                if found and ended:
-                    farthest, reserve = replace(farthest, place=found.place), max(PRECISE, found.reserve)
+                passed = smoothed(tracer, last, kind)
+                ended = passed is not None and (passed.slope < 0) == (kind == "flip")  # beyond it, the orbit repels
+                if passed and ended:
+                    farthest, reserve = replace(farthest, place=passed.place), max(PRECISE, passed.reserve)
             elif last is not None and kind == "flip":
                 rough = _rough(tracer, last, first, second)
                 ended, reserve = bool(np.isfinite(rough)), float(np.fmax(PRECISE, rough))
@@ -307,11 +307,11 @@ class Outward:
             closed = np.isfinite(excess)
             if np.count_nonzero(closed) < ENOUGH or not np.any(excess < 0):
                 break
-            found = crossing(np.linspace(0, 1, SPREAD)[closed], excess[closed])
-            if found is None or found.slope < 0:
+            passed = crossing(np.linspace(0, 1, SPREAD)[closed], excess[closed])
+            if passed is None or passed.slope < 0:
                 break
-            uncertainty = found.reserve * abs(float(np.log(outside / at)))
-            before, flip_at = flip, float(at * (outside / at) ** found.place)
+            uncertainty = passed.reserve * abs(float(np.log(outside / at)))
+            before, flip_at = flip, float(at * (outside / at) ** passed.place)
             flip = flip_at, uncertainty if before is None else max(uncertainty, abs(flip_at / before[0] - 1))
             at, outside = flip_at / NEAR, flip_at * NEAR  # a curve over less is closer
         return flip

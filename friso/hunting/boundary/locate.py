@@ -132,11 +132,11 @@ def _special_point(
     """The point with its error; infinite where it cannot be computed at the tighter tolerance, or multipliers scatter
     too much."""
     if kind != "fold" and tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
-        found = smoothed(tracer, point, kind)
-        if found is None:
+        passed = smoothed(tracer, point, kind)
+        if passed is None:
             return LocatedPoint(kind, point, direction, np.inf, slope)
-        there = tracer.solve(point, point.vector + (found.place - point.place) * ALONG, ALONG) or point
-        return LocatedPoint(kind, there, direction, found.reserve, found.slope * float(direction[0]))
+        there = tracer.solve(point, point.vector + (passed.place - point.place) * ALONG, ALONG) or point
+        return LocatedPoint(kind, there, direction, passed.reserve, passed.slope * float(direction[0]))
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
         return LocatedPoint(kind, point, direction, np.inf, slope)
@@ -157,8 +157,8 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
             near = near and tracer.solve(near, guess.vector + away * ALONG, ALONG)
             orbits += [near] if near else []
     places = np.array([point.place for point in orbits])
-    found = crossing(places, np.array([distance_to(kind, point) for point in orbits]))
-    return found and found._replace(reserve=max(found.reserve, abs(found.place - guess.place)))
+    passed = crossing(places, np.array([distance_to(kind, point) for point in orbits]))
+    return passed and passed._replace(reserve=max(passed.reserve, abs(passed.place - guess.place)))
 
 
 def corrected(
