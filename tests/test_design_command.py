@@ -121,7 +121,7 @@ def folder(written: tuple[Path, str]) -> Path:
 @pytest.fixture
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are not drawn again, and nothing is written."""
-    monkeypatch.setattr("friso.answers.output_folder.write", lambda files, progress: [])
+    monkeypatch.setattr("friso.answers.output_folder.write", lambda *_: [])
     monkeypatch.setattr("friso.views.design.page.design_figures", lambda design: ())
 
 
