@@ -307,9 +307,11 @@ def test_identify_reads_csv_with_crlf(host: str, tmp_path: Path) -> None:
 
 @on_windows
 def test_two_processes_share_an_empty_cache(host: str, axis: Path, tmp_path: Path) -> None:
-    arguments = ("simulate", "axis.toml", "--json")
+    arguments = ("simulate", "axis.toml", "--json", "--out")
     folder = tmp_path / "für Kernel"
-    both = [started(host, axis, *arguments, FRISO_CACHE_DIR=str(folder)) for _ in range(2)]
+    both = [started(host, axis, *arguments, name, FRISO_CACHE_DIR=str(folder)) for name in ("one", "other")]
     documents = [json.loads(process.communicate()[0]) for process in both]
+    written = [document.pop("files") for document in documents]
+    assert [Path(name).name for name in written[0]] == [Path(name).name for name in written[1]] != []
     assert documents[0] == documents[1]
     assert any((folder / "kernels").iterdir())  # and not in a temporary folder
