@@ -316,3 +316,11 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     ]
     names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]
     assert "flip of the hunting cycle" in names
+
+
+def test_a_value_is_told_as_far_as_it_is_known() -> None:
+    key = ShownKey("controller.crossover", "Hz")
+    assert key.as_known(9.7498512, 1e-8) == "9.74985 Hz"
+    assert key.as_known(5.60878, 0.02) == "5.609 ± 0.02 Hz"
+    assert key.as_known(1234.5, 30.0) == "1234 ± 30 Hz"
+    assert "unknown" in key.as_known(5.60878, float("inf"))

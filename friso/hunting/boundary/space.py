@@ -98,8 +98,8 @@ class Space:
         return family
 
     def hundredth(self, origin: np.ndarray, direction: np.ndarray) -> Callable[[float], float]:
-        """The length of a line through the box, from an origin (keys,) along a direction (keys,), over which the first
-        of its keys changes by a hundredth, at a place on it."""
+        """The length of a line through the box, from an origin (keys,) along a direction (keys,), over which the key
+        that changes soonest does so by a hundredth, at a place on it."""
 
         def length(place: float) -> float:
             steps = zip(self.ranges, origin + place * direction, direction, strict=True)

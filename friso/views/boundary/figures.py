@@ -104,7 +104,7 @@ def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Show
     turns = sorted(((line, k) for line in branches for k in line.special), key=lambda turn: turn[0].at[turn[1], 0])
     markers = []
     for line, k in turns:
-        text = f"{line.kinds[k]} at {key.text(line.at[k, 0])}" if key else ""
+        text = f"{line.kinds[k]} at {key.as_known(line.at[k, 0], line.error[k, 0])}" if key else ""
         value = getattr(line, measure)[[k]]
         markers.append(Markers(line.at[[k], 0], value, text, COLOURS[line.shape], SYMBOLS[line.kinds[k]]))
     return Panel("", x, y, tuple(series), tuple(markers))

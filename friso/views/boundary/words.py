@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,6 +48,10 @@ MEANINGS = {
 BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 
+PLAIN = 1e-5
+"""Share of a value by which it may be off and still be told alone, in six digits."""
+
+
 @dataclass(frozen=True)
 class ShownKey:
     """A key and the unit in which its values are printed: its name, and its value in SI."""
@@ -65,10 +69,16 @@ class ShownKey:
         return self._with_unit(f"{self.number(value):.{digits}g}")
 
     def uncertain(self, value: float, error: float) -> str:
-        """A value with its error [SI]."""
+        """A value with its error [SI], to a digit more than that."""
         if not math.isfinite(error):
             return f"{self.text(value)} (error unknown)"
-        return self._with_unit(f"{self.number(value):.6g} ± {self.number(error):.1g}")
+        number, off = self.number(value), self.number(error)
+        rounded = round(number, 1 - math.floor(math.log10(off))) if off > 0 else number
+        return self._with_unit(f"{rounded:.6g} ± {float(f'{off:.1g}'):g}")
+
+    def as_known(self, value: float, error: float) -> str:
+        """The same, without an error that its digits do not show."""
+        return self.text(value) if error < PLAIN * abs(value) else self.uncertain(value, error)
 
     def extent(self, values: Array, swept: KeyRange) -> str:
         """From the lowest value [SI] to the highest inside a range."""
@@ -144,12 +154,13 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
     values_tried = f"{len(verdicts)} values were tried"
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
     at = {change.low for change in changes}
+    errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in lines(traced) for k in line.special}
     others = sorted({value for value, _ in followed_changes(traced)} - at)
-    also = [f"Cycles also begin or stop attracting at {listed([key.text(value) for value in others], 'and')}."]
+    also = [f"Cycles also begin or stop attracting at {listed([key.as_known(v, errors[v]) for v in others], 'and')}."]
     answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
     if changes:
         places = [
-            f"{'begins' if change.begins else 'ends'} {_between(change, key)}{_if_unstable(traced, change)}"
+            f"{'begins' if change.begins else 'ends'} {_between(change, key, errors)}{_if_unstable(traced, change)}"
             for change in changes
         ]
         answer = f"Hunting {listed(places, 'and')} ({values_tried}{unknown})."
@@ -162,9 +173,10 @@ def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
     return " (where the loop is unstable anyway)" if traced.unstable[beside] else ""
 
 
-def _between(change: StabilityChange, key: ShownKey) -> str:
+def _between(change: StabilityChange, key: ShownKey, errors: Mapping[float, float]) -> str:
+    """Where hunting begins or ends; `errors` of special points [SI] by their values."""
     if change.low == change.high:
-        return f"at {key.key} = {key.text(change.low)}"
+        return f"at {key.key} = {key.as_known(change.low, errors[change.low])}"
     return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"
 
 
