@@ -7,6 +7,7 @@ Texts are drawn as they stand: a dollar sign in a stage's name starts no formula
 from __future__ import annotations
 
 import io
+import math
 from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -20,8 +21,8 @@ from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.ticker import (
+    FuncFormatter,
     Locator,
-    LogFormatterMathtext,
     LogLocator,
     MaxNLocator,
     MultipleLocator,
@@ -78,6 +79,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "pdf.fonttype": 42,
 }
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DASHES = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.6))}
 _SYMBOLS: dict[str, dict[str, Any]] = {
     "circle": {"marker": "o", "markersize": 6},
@@ -237,8 +239,13 @@ def _decades(axis: Any, limits: tuple[float, float], even: Locator) -> None:
     few = high < 1000 * low
     fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
     axis.set_major_locator(fine if few else LogLocator(numticks=8))
-    axis.set_major_formatter("{x:g}" if few else LogFormatterMathtext())
+    axis.set_major_formatter("{x:g}" if few else FuncFormatter(_power_of_ten))
     axis.set_minor_formatter(NullFormatter())
+
+
+def _power_of_ten(value: float, _: int | None = None) -> str:
+    """The label of a tick at a power of ten, in letters: formulas take a tenth of the time of a figure."""
+    return "10" + str(round(math.log10(value))).translate(_RAISED)
 
 
 def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
