@@ -192,7 +192,7 @@ def _row_height(figure: Figure) -> float:
 
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
     """Everything of one panel, which is `width` [inch] wide."""
-    _scale(axes, panel, width)
+    _scale(axes, panel)
     draw_coloured(axes, panel)
     handles: list[Artist] = []
     for band in panel.bands:
@@ -209,22 +209,26 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
         axes.set_ylim(panel.y.limits)
     if panel.equal:
         axes.set_aspect("equal")
+    _ticks(axes, panel, width)
     _annotate(axes, panel, handles, width)
 
 
-def _scale(axes: Axes, panel: Panel, width: float) -> None:
-    """Scales and ticks: plain numbers, never a factor or an offset beside the axis."""
+def _scale(axes: Axes, panel: Panel) -> None:
     axes.set_xscale("log" if panel.x.log else "linear")
     axes.set_yscale("log" if panel.y.log else "linear")
     if panel.markers and panel.x.limits is None:
         axes.margins(x=0.03)
+
+
+def _ticks(axes: Axes, panel: Panel, width: float) -> None:
+    """Ticks of what is drawn: plain numbers, never a factor or an offset beside the axis."""
     bins = (min(9, int(2 * width)), [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
     for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
         if declared.words:
             positions, words = word_ticks(declared)
             axis.set_ticks(positions, words, parse_math=False)
         elif declared.log:
-            _decades(axis, declared.limits or (0.0, np.inf), MaxNLocator(nbins=most, steps=steps))
+            _decades(axis, MaxNLocator(nbins=most, steps=steps))
         else:
             plain = ScalarFormatter(useOffset=False)
             plain.set_scientific(False)
@@ -233,9 +237,9 @@ def _scale(axes: Axes, panel: Panel, width: float) -> None:
             axis.set_major_locator(MultipleLocator(declared.step) if declared.step else even)
 
 
-def _decades(axis: Any, limits: tuple[float, float], even: Locator) -> None:
+def _decades(axis: Any, even: Locator) -> None:
     """Ticks of a logarithmic axis: at powers of ten, also at 2 and 5 over a few decades, even ones within a decade."""
-    low, high = limits
+    low, high = axis.get_view_interval()
     few = high < 1000 * low
     fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
     axis.set_major_locator(fine if few else LogLocator(numticks=8))
