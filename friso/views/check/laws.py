@@ -45,7 +45,7 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
     hunts, edges = laws.hunts(case), _edges(laws, case)
     if hunts is not None:
         verdicts = {name for verdict in laws.verdicts for name in verdict.verdicts(case)}
-        return f"under {_all(laws)} the stage {_does(verdicts)}{edges}."
+        return f"under {_all(laws)} the stage {_does(verdicts)}, {edges}."
     if not laws.answers(case):
         return "the verdict is not certain under any law that was tried."
     parts = []
@@ -55,11 +55,13 @@ def _sentence(laws: VerdictsByLaw, case: str) -> str:
             does = _does({name for verdict in alike for name in verdict.verdicts(case)})
             subject = "" if parts else "the stage "
             parts.append(f"{subject}{does} under {listed([verdict.law for verdict in alike], 'and')}")
-    parts += [_open(verdict, case) for verdict in laws.verdicts if verdict.hunts(case) is None]
-    depends = "the verdict depends on the friction law: " if laws.depends_on_law(case) else ""
+    left_open = [_open(verdict, case) for verdict in laws.verdicts if verdict.hunts(case) is None]
+    depends = ["the verdict depends on the friction law"] if laws.depends_on_law(case) else []
     measure = listed(laws.deciding(case), "and")
-    decide = f" To decide, measure {measure}." if measure else ""
-    return f"{depends}{'; '.join(parts)}{edges}.{decide}"
+    first = ": ".join([*depends, *(["; ".join(parts)] if parts else [])])
+    decide = f"To decide, measure {measure}" if measure else ""
+    said = [first, *left_open, edges[0].upper() + edges[1:], decide]
+    return " ".join(f"{text}." for text in said if text)
 
 
 def _all(laws: VerdictsByLaw) -> str:
@@ -87,9 +89,9 @@ def _open(verdict: LawVerdict, case: str) -> str:
         does = _does({trial.cases[case].verdict}) if trial.certain(case) else "is not certain"
         trials.setdefault(does, []).append(trial)
     if len(trials) == 1:
-        return f"under {verdict.law} that is not certain"
+        return f"Under {verdict.law} that is not certain"
     parts = [f"{does} with {_values(verdict, having)}" for does, having in trials.items()]
-    return f"under {verdict.law} it {listed(parts, 'and')}"
+    return f"Under {verdict.law} it {listed(parts, 'and')}"
 
 
 def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
@@ -108,16 +110,17 @@ def _values(verdict: LawVerdict, trials: Sequence[Trial]) -> str:
 
 
 def _edges(laws: VerdictsByLaw, case: str) -> str:
+    """Over which bandwidths the edge of hunting lies under all laws."""
     edges = [edge for verdict in laws.verdicts if (edge := verdict.edges(case))]
     unsought = [verdict.law for verdict in laws.verdicts if not verdict.edges_sought(case)]
     part = "in part " if any(verdict.edges(case) for verdict in laws.verdicts if verdict.law in unsought) else ""
     missing = f"{part}not determined under {listed(unsought, 'and')}" if unsought else ""
     if not edges:
-        none = f"with no edge of hunting within a factor of {FARTHEST:g} of its bandwidth"
-        return f", its edge of hunting {missing}" if missing else f", {none}"
+        none = f"no edge of hunting within a factor of {FARTHEST:g} of its bandwidth"
+        return f"its edge of hunting {missing}" if missing else none
     low, high = min(edge[0] for edge in edges), max(edge[1] for edge in edges)
     doubt = "" if all(verdict.edges_certain(case) for verdict in laws.verdicts) else " (not certain)"
-    return f", edge {_span(laws, (low, high))}{doubt}{', ' + missing if missing else ''}"
+    return f"edge {_span(laws, (low, high))}{doubt}{', ' + missing if missing else ''}"
 
 
 def _beyond(laws: VerdictsByLaw, case: str) -> str:
