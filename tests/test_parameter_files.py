@@ -46,7 +46,14 @@ GAINS = {"P": 4.0, "I": 80.0, "D": 0.06, "FF1": 0.001, "FF2": 4e-4, "DEADBAND": 
 
 ODRIVE = {
     "axis0": {
-        "motor": {"config": {"torque_constant": 0.04, "current_lim": 20.0, "torque_lim": float("inf")}},
+        "motor": {
+            "config": {
+                "torque_constant": 0.04,
+                "current_lim": 20.0,
+                "torque_lim": float("inf"),
+                "current_control_bandwidth": 1000.0,
+            }
+        },
         "encoder": {"config": {"cpr": 8192, "bandwidth": 1000.0}},
         "controller": {
             "config": {
@@ -134,11 +141,14 @@ def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force
         ("[JOINT_0]", "[JOINT_0]  # X", 1),
         ("LINEAR_UNITS = mm", "LINEAR_UNITS = 1.0", 1),
         ("LINEAR_UNITS = mm", "LINEAR_UNITS = 0.03937007874016", 25.4),
+        ("LINEAR_UNITS = mm\n[JOINT_0]", "[JOINT_0]\nUNITS = inch", 25.4),
+        ("TYPE = LINEAR", "TYPE = LINEAR\nUNITS = 1.0", 1),
         ("[TRAJ]", "#INCLUDE traj.inc\n[TRAJ]", 1),
     ],
 )
 def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: str, times: float) -> None:
-    """Comments behind values and sections, units by their number in a millimetre, other files taken in."""
+    """Comments behind values and sections, units by their number in a millimetre or of the joint, other files taken
+    in."""
     path = ini(tmp_path, {"P": 50, "I": 100})
     plain = path.read_text()
     assert usual in plain
@@ -153,14 +163,24 @@ def test_files_are_written_in_several_ways(tmp_path: Path, usual: str, written: 
     assert any("traj.inc" in sentence for sentence in drawn.left_out) == ("INCLUDE" in written)
 
 
+def test_units_that_contradict_each_other_are_asked_for(tmp_path: Path) -> None:
+    path, answers = ini(tmp_path, {"P": 50}, joint="UNITS = inch"), {**MACHINE, "force_per_output": "20 N"}
+    with pytest.raises(InputError, match="machine_unit"):
+        stage_from(path, None, answers)
+    flat = stage_from(path, None, {**answers, "machine_unit": "inch"}).stage.flat()
+    assert flat["controller.kp"] == pytest.approx(50 * 20 / 0.0254)
+
+
 def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
     """With an output in machine units per second, as FF1 = 1 says; steps and an encoder are a servo axis too."""
     gains = {"P": 50.0, "I": 10.0, "FF1": 1.0, "DEADBAND": 0.001, "BIAS": 0.5}
-    gains |= {"STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0}
+    gains |= {"STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0, "HOME_OFFSET": 2.0}
+    gains |= {"OUTPUT_SCALE": 250.0, "BACKLASH": 0.01, "FF9": 3.0, "DEDBAND": 0.1}
     loop = {"controller.kp": "900 N*s/m", "controller.velocity_integral_time": "8 ms"}
     drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop})
-    assert drawn.left_out[0].startswith("BIAS = 0.5")
-    assert any("velocity_per_output" in sentence for sentence in drawn.left_out)
+    for told in ("BIAS = 0.5", "BACKLASH = 0.01", "OUTPUT_SCALE = 250", "FF9, DEDBAND: ", "the scale of the output"):
+        assert sum(sentence.startswith(told) for sentence in drawn.left_out) == 1
+    assert "velocity_per_output" in " ".join(drawn.left_out)
     back = gains_of(drawn.stage, {"machine_unit": "mm", "velocity_per_output": "1 mm/s"}, "linuxcnc").parameters
     assert back is not None
     assert {name: back[name] for name in ("P", "I", "FF1", "DEADBAND")} == pytest.approx(
@@ -231,11 +251,11 @@ def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
     config = ODRIVE["axis0"]["controller"]["config"]
     back = gains_of(friso.loads(drawn.text()), {"travel_per_turn": travel}, "odrive").parameters
     assert back is not None
-    names = ("pos_gain", "vel_gain", "vel_integrator_gain", "inertia", "vel_integrator_limit")
+    names = ("input_mode", "pos_gain", "vel_gain", "vel_integrator_gain", "inertia", "vel_integrator_limit")
     assert {name: back[f"controller.config.{name}"] for name in names} == pytest.approx(
         {name: config[name] for name in names}
     )
-    assert back["encoder.config.bandwidth"] == pytest.approx(1000.0)
+    assert back["encoder.config.bandwidth"] == back["motor.config.current_control_bandwidth"] == pytest.approx(1000.0)
     lines = tmp_path / "parameters.txt"
     lines.write_text(
         f"# kept\n{FORMATS['odrive'].text(back)}odrv0.axis0.controller.config.enable_gain_scheduling = False\n"
@@ -243,7 +263,7 @@ def test_odrive_there_and_back(tmp_path: Path, travel: str) -> None:
     again = stage_from(lines, None, {**labels, "motion.kind": "hold", "motion.duration": "1 s"})
     assert not any("gain_scheduling" in sentence for sentence in again.left_out)
     repeated = gains_of(friso.loads(again.text()), {"travel_per_turn": travel}, "odrive").parameters
-    assert repeated == pytest.approx({**back, "controller.config.inertia": 0.0})  # of a reference that the drive makes
+    assert repeated == pytest.approx(back)
     assert back["motor.config.torque_lim"] == pytest.approx(0.04 * 20)
 
 
@@ -393,10 +413,28 @@ def test_an_odrive_that_controls_no_position(tmp_path: Path, changes: dict[str, 
 
 def test_what_is_left_out_is_told(tmp_path: Path) -> None:
     path = backup(tmp_path, enable_gain_scheduling=True, gain_scheduling_width=0.01, input_mode=1)
+    path.write_text(path.read_text().replace('"decel_limit": 20.0', '"decel_limit": 5.0'))
     drawn = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"})
-    assert any("enable_gain_scheduling" in text for text in drawn.left_out)
+    for told in ("enable_gain_scheduling", "decel_limit = 5"):
+        assert any(told in text for text in drawn.left_out)
     assert all(f"# Left out: {text}" in drawn.text() for text in drawn.left_out)
     assert drawn.stage.flat()["controller.velocity_feedforward"] == 0.0
+    mirrored = stage_from(backup(tmp_path, input_mode=7), None, {**MACHINE, "travel_per_turn": "5 mm"})
+    assert any("input_mode = 7" in text for text in mirrored.left_out)
+
+
+@pytest.mark.parametrize(
+    ("share", "mode", "lost"), [(1.0, 5, ()), (0.0, 1, ("acceleration",)), (0.8, 1, ("velocity", "acceleration"))]
+)
+def test_an_odrive_feeds_forward_along_its_own_trajectories(share: float, mode: int, lost: tuple[str, ...]) -> None:
+    """The velocity whole and the acceleration, or neither."""
+    keys = {"controller.velocity_feedforward": share}
+    stage = friso.load(EXAMPLES / "twincat_cascade.toml").replace(keys)
+    back = gains_of(stage, {"travel_per_turn": "10 mm"}, "odrive")
+    assert back.parameters is not None
+    assert back.parameters["controller.config.input_mode"] == mode
+    assert ("controller.config.inertia" in back.parameters) == (share == 1.0)
+    assert {key for key in back.not_held if "feedforward" in key} == {f"controller.{name}_feedforward" for name in lost}
 
 
 def test_what_these_firmwares_do_not_have_is_told(tmp_path: Path) -> None:

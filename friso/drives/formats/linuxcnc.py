@@ -43,7 +43,19 @@ NOT_CARRIED = {
     "BIAS": "BIAS = {:g}, a constant output: friso assumes that it balances a constant load",
     "MAX_ERROR": "MAX_ERROR = {:g}, beyond which the error counts no further",
     "MAX_ERROR_D": "MAX_ERROR_D = {:g}, the limit of the error's derivative",
+    "BACKLASH": "BACKLASH = {:g}, by which LinuxCNC compensates a play: the play itself is transmission.backlash",
+    "OUTPUT_OFFSET": "OUTPUT_OFFSET = {:g}, what is taken from the output of pid",
 }
+OUTPUT_SCALE = "OUTPUT_SCALE"
+"""By what a HAL file may divide the output of `pid`, so that an output of 1 is not 1 V of an amplifier."""
+
+DOCUMENTED = re.compile(
+    r"TYPE|UNITS|MAX_(?:VELOCITY|ACCELERATION|JERK|OUTPUT|ERROR|ERROR_I|ERROR_D)|BACKLASH|COMP_FILE(?:_TYPE)?|"
+    r"(?:MIN|MAX)_LIMIT|(?:MIN_)?FERROR|LOCKING_INDEXER|HOME\w*|VOLATILE_HOME|DEADBAND|BIAS|P|I|D|FF[0-3]|CYCLE_TIME|"
+    r"(?:OUTPUT|INPUT|ENCODER|STEP)\w*|SCALE|DIR(?:SETUP|HOLD)|PWM\w*|DAC\w*|MOTOR\w*"
+)
+"""Names in the section of a joint that the manual has, and those of what stands between `pid` and the machine."""
+
 MOST_LINES = 100_000
 
 _AXIS = r"(?:JOINT|AXIS)_[0-9]{1,3}"
@@ -140,7 +152,8 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
     asked: list[OpenQuestion] = []
     if _unit_of(axis) is None and UNIT not in answers:
         example = '"mm"' if kind == LINEAR else '"deg"'
-        asked.append(OpenQuestion(UNIT, "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS", example))
+        meaning = "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS, or the axis has other UNITS"
+        asked.append(OpenQuestion(UNIT, meaning, example))
     if "SERVO_PERIOD" not in axis.machine and "drive.sample_time" not in answers:
         asked.append(OpenQuestion("drive.sample_time", "period of the servo thread", '"1 ms"'))
     if "controller.kp" in answers and FORCE not in answers and VELOCITY not in answers and not _unity(axis):
@@ -160,6 +173,10 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     kind = _kind(axis)
     unit = _metres(axis, answers, kind)
     left = [text.format(axis.number(key)) for key, text in NOT_CARRIED.items() if axis.is_set(key)]
+    if axis.is_set(OUTPUT_SCALE) and axis.number(OUTPUT_SCALE) != 1:
+        left.append(f"OUTPUT_SCALE = {axis.number(OUTPUT_SCALE):g}: an output of 1 is that of pid, before this scale")
+    if strange := [name for name in axis.values if not DOCUMENTED.fullmatch(name)]:
+        left.append(f"{', '.join(strange)}: names that LinuxCNC's manual does not have")
     if INCLUDED in axis.machine:
         left.append(f"what #INCLUDE names: {axis.machine[INCLUDED]}")
     in_torque = FORCE in answers
@@ -257,18 +274,22 @@ def _kind(axis: AxisParameters) -> AxisKind:
 
 
 def _unit_of(axis: AxisParameters) -> str | None:
-    """The machine unit of an axis, as the file says: by its name, or, as older files do, by how many of it are a
-    millimetre or a degree."""
+    """The machine unit of an axis, as the file says; None where it does not, or where axis and machine differ: by
+    LinuxCNC's manual the axis's counts, by its program the machine's."""
     kind = _kind(axis)
-    name = axis.machine.get("unit" if kind == LINEAR else "angle", axis.values.get("UNITS"))
-    if name is None:
-        return None
-    try:
-        per_unit = 1 / float(name)
-    except (ValueError, ZeroDivisionError):
-        return str(name).lower()
+    names = (axis.machine.get("unit" if kind == LINEAR else "angle"), axis.values.get("UNITS"))
+    units = {_unit_named(str(name), kind) for name in names if name is not None}
+    return units.pop() if len(units) == 1 else None
+
+
+def _unit_named(name: str, kind: AxisKind) -> str:
+    """A machine unit by its name, or, as older files have it, by how many of it are a millimetre or a degree."""
     units, base = (LENGTHS, 1e-3) if kind == LINEAR else (ANGLES, ANGLES["deg"])
-    return next((unit for unit, size in units.items() if isclose(size, per_unit * base, rel_tol=1e-4)), str(name))
+    try:
+        size = base / float(name)
+    except (ValueError, ZeroDivisionError):
+        size = units.get(name.lower(), 0.0)
+    return next((unit for unit, known in units.items() if isclose(known, size, rel_tol=1e-4)), name)
 
 
 def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:

@@ -28,8 +28,12 @@ GAINS = ("pos_gain", "vel_gain", "vel_integrator_gain")
 RATE = 8000.0
 """Samples of the controller in a second, of ODrive 3."""
 
-POSITION_CONTROL, PASSTHROUGH, AHEAD = 3, 1, (3, 5)
-"""Values of control_mode and input_mode; `AHEAD`, those in which the drive feeds its own reference forward."""
+POSITION_CONTROL = 3
+"""Value of control_mode."""
+
+PASSTHROUGH, POSITION_FILTER, TRAJECTORY = 1, 3, 5
+AHEAD = (POSITION_FILTER, TRAJECTORY)
+"""Values of input_mode; `AHEAD`, those in which the drive feeds its own reference forward."""
 
 MOST_KEYS, LONGEST_KEY = 100_000, 200
 
@@ -68,18 +72,11 @@ OTHERS = frozenset(
 KNOWN = OTHERS.union(GAINS)
 """Names in controller.config of these firmwares; `OTHERS` are those beside the gains."""
 
-HELD = frozenset(
-    {
-        "kv",
-        "kp",
-        "velocity_integral_time",
-        "velocity_feedforward",
-        "acceleration_feedforward",
-        "force_limit",
-        "integral_limit",
-    }
-)
-"""Names in [controller] that the parameters hold; a velocity fed forward by the drive's own trajectories, or not."""
+HELD = frozenset({"kv", "kp", "velocity_integral_time", "force_limit", "integral_limit"})
+"""Names in [controller] that the parameters hold."""
+
+FED_FORWARD = frozenset({"velocity_feedforward", "acceleration_feedforward"})
+"""Those that they hold where the drive's own trajectories feed them forward: the velocity whole."""
 
 
 _LINE = re.compile(r"^[ \t]*odrv[0-9]{1,3}\.(axis[0-9]{1,3}\.[\w.]{1,180})[ \t]*=[ \t]*([^#\s]{1,200})", re.MULTILINE)
@@ -238,8 +235,15 @@ def _left_out(axis: AxisParameters, mode: float, limited: bool) -> tuple[str, ..
         left.append(f"vel_limit = {axis.number(f'{CONFIG}.vel_limit'):g} turn/s, the largest velocity commanded")
     if mode == PASSTHROUGH:
         left.append("input_vel and input_torque of the position source: taken as 0")
-    if mode == AHEAD[0]:
+    elif mode == POSITION_FILTER:
         left.append("the filter of the commanded position (input_filter_bandwidth)")
+    elif mode != TRAJECTORY:
+        left.append(
+            f"input_mode = {mode:g}: how the drive comes to its position; none of its feedforward is taken over"
+        )
+    accelerates, brakes = (axis.number(f"{MOVE}.{name}", 0.0) for name in ("accel_limit", "decel_limit"))
+    if accelerates and brakes and accelerates != brakes:
+        left.append(f"decel_limit = {brakes:g} turn/s^2: friso's move brakes as it accelerates")
     if limited:
         left.append("at the limit of the torque the integral decays by 1 % a sample; here it rests")
     own, load = axis.name.removeprefix("axis"), axis.values.get(f"{CONFIG}.load_encoder_axis")
@@ -280,17 +284,22 @@ def parameters(flat: FlatStage, answers: UserAnswers) -> Parameters:
     travel = float(answered)
     force = 2 * pi / travel
     kp, time = flat[f"{name}kp"] * travel / force, flat.get(f"{name}velocity_integral_time")
+    ahead = flat[f"{name}velocity_feedforward"] == 1.0
+    held = HELD | FED_FORWARD if ahead else HELD
     settings = {
+        f"{CONFIG}.input_mode": TRAJECTORY if ahead else PASSTHROUGH,
         f"{CONFIG}.pos_gain": flat[f"{name}kv"],
         f"{CONFIG}.vel_gain": kp,
         f"{CONFIG}.vel_integrator_gain": kp / time if time else 0.0,
-        f"{CONFIG}.inertia": flat[f"{name}acceleration_feedforward"] * travel / force,
     }
+    if ahead:
+        settings[f"{CONFIG}.inertia"] = flat[f"{name}acceleration_feedforward"] * travel / force
     if f"{name}integral_limit" in flat:
         settings[f"{CONFIG}.vel_integrator_limit"] = flat[f"{name}integral_limit"] / force
     if f"{name}force_limit" in flat:
         settings[f"{MOTOR}.torque_lim"] = flat[f"{name}force_limit"] / force
-    held = HELD if flat[f"{name}velocity_feedforward"] in (0.0, 1.0) else HELD - {"velocity_feedforward"}
+    if (bandwidth := flat.get("drive.current_bandwidth")) is not None:
+        settings[f"{MOTOR}.current_control_bandwidth"] = 2 * pi * bandwidth
     if place := _loop_of_velocity(flat):
         settings[f"{ENCODER}.bandwidth"] = 2 * pi * flat[f"{place}.frequency"]
         held |= {place.removeprefix(name)}
