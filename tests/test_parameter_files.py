@@ -178,8 +178,14 @@ def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
     gains |= {"OUTPUT_SCALE": 250.0, "BACKLASH": 0.01, "FF9": 3.0, "DEDBAND": 0.1}
     loop = {"controller.kp": "900 N*s/m", "controller.velocity_integral_time": "8 ms"}
     drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop})
-    for told in ("BIAS = 0.5", "BACKLASH = 0.01", "OUTPUT_SCALE = 250", "FF9, DEDBAND: ", "the scale of the output"):
-        assert sum(sentence.startswith(told) for sentence in drawn.left_out) == 1
+    for beginning in (
+        "BIAS = 0.5",
+        "BACKLASH = 0.01",
+        "OUTPUT_SCALE = 250",
+        "FF9, DEDBAND: ",
+        "the scale of the output",
+    ):
+        assert sum(sentence.startswith(beginning) for sentence in drawn.left_out) == 1
     assert "velocity_per_output" in " ".join(drawn.left_out)
     back = gains_of(drawn.stage, {"machine_unit": "mm", "velocity_per_output": "1 mm/s"}, "linuxcnc").parameters
     assert back is not None
@@ -415,8 +421,8 @@ def test_what_is_left_out_is_told(tmp_path: Path) -> None:
     path = backup(tmp_path, enable_gain_scheduling=True, gain_scheduling_width=0.01, input_mode=1)
     path.write_text(path.read_text().replace('"decel_limit": 20.0', '"decel_limit": 5.0'))
     drawn = stage_from(path, None, {**MACHINE, "travel_per_turn": "5 mm"})
-    for told in ("enable_gain_scheduling", "decel_limit = 5"):
-        assert any(told in text for text in drawn.left_out)
+    for setting in ("enable_gain_scheduling", "decel_limit = 5"):
+        assert any(setting in text for text in drawn.left_out)
     assert all(f"# Left out: {text}" in drawn.text() for text in drawn.left_out)
     assert drawn.stage.flat()["controller.velocity_feedforward"] == 0.0
     mirrored = stage_from(backup(tmp_path, input_mode=7), None, {**MACHINE, "travel_per_turn": "5 mm"})

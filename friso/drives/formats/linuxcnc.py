@@ -289,7 +289,7 @@ def _unit_named(name: str, kind: AxisKind) -> str:
         size = base / float(name)
     except (ValueError, ZeroDivisionError):
         size = units.get(name.lower(), 0.0)
-    return next((unit for unit, known in units.items() if isclose(known, size, rel_tol=1e-4)), name)
+    return next((unit for unit, listed in units.items() if isclose(listed, size, rel_tol=1e-4)), name)
 
 
 def _metres(axis: AxisParameters, answers: UserAnswers, kind: AxisKind) -> float:
