@@ -25,6 +25,7 @@ from friso.hunting.cycle.hunting import cannot_hunt, hunting
 from friso.hunting.feeding import Decline, Feeding, dry_friction, feeding
 from friso.hunting.loop import unstable
 from friso.stage import Stage
+from friso.stage.plausible import idle_encoder
 from friso.views.bode.words import caveats
 from friso.views.check.feeding_words import feeding_sentences
 from friso.virtual_rig.run import run
@@ -49,6 +50,7 @@ SCREW = {
     "backlash": "20 um",
 }
 BY_RATE = {"kind": "pid", "kp": "2e5 N/m", "kd": "8e3 N*s/m", "ki": "2e6 N/(m*s)", "derivative_on": "measurement"}
+USUAL = {"kind": "pid", "crossover": "15 Hz", "alpha": 0.1, "beta": 2}
 BELT = {"mass": "40 kg", "stiffness": "2.5 N/um", "damping": "440 N*s/m", "backlash": "20 um"}
 
 
@@ -59,7 +61,7 @@ def machine(**tables: object) -> Stage:
         "motor_friction": AT_MOTOR,
         "transmission": SCREW,
         "encoder": {"position": "load", "velocity": "load"},
-        "controller": {"kind": "pid", "crossover": "15 Hz", "alpha": 0.1, "beta": 2},
+        "controller": USUAL,
         "motion": {"kind": "step", "size": "1 mm", "duration": "0.5 s"},
     }
     return Stage(**{name: table for name, table in {**usual, **tables}.items() if table is not None})
@@ -125,6 +127,15 @@ def test_each_mistake_has_one_message(changes: dict[str, object], fragment: str)
     with pytest.raises(StageError) as wrong:
         machine(**changes)
     assert fragment in str(wrong.value)
+
+
+def test_an_encoder_that_no_controller_reads_is_named() -> None:
+    """Not where the controller takes a velocity, nor where both are on one side."""
+    sides = {"position": "load", "velocity": "motor"}
+    cascade = {"kind": "cascade", "kv": "40 1/s", "kp": "4e3 N*s/m"}
+    for controller, idle in ((USUAL, 1), ({**BY_RATE, "kd": "0 N*s/m"}, 1), (BY_RATE, 0), (cascade, 0)):
+        assert len([*idle_encoder(machine(encoder=sides, controller=controller))]) == idle
+    assert not [*idle_encoder(machine())]
 
 
 def bristles(flat: dict[str, float], table: str, velocity: float, z: float) -> tuple[float, float]:

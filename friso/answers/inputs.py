@@ -15,7 +15,7 @@ from friso.quantities import Quantity, exactly, positive, quoted
 from friso.stage import Stage, load, parse_set
 from friso.stage.correlations import Correlations, correlations_file, read_correlations
 from friso.stage.files import load_changed, load_tables
-from friso.stage.plausible import implausible_values
+from friso.stage.plausible import idle_encoder, implausible_values
 from friso.stage.rig import AS_BUILT
 
 StageLike: TypeAlias = Stage | str | os.PathLike[str] | Mapping[str, Any]
@@ -73,7 +73,7 @@ def read_stage(
     that the centres of uncertain keys are used, unless these are wanted too (`uncertain_too`), and which of its tables
     the analysis leaves out. Raises InputError."""
     stage = stage_of(source, changes)
-    for doubt in implausible_values(stage):
+    for doubt in (*implausible_values(stage), *idle_encoder(stage)):
         LOGGER.warning(doubt)
     keys = [] if uncertain_too else [*stage.uncertain()]
     if keys:

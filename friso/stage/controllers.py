@@ -118,6 +118,11 @@ class ControllerSection(AgainstFriction):
         raise NotImplementedError
 
     @classmethod
+    def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
+        """Whether it acts on a measured velocity, which may come from another encoder than the position."""
+        return cls.feeds_back == "velocity"
+
+    @classmethod
     def stiffness(cls, blocks: Any, variant: Any) -> Any:
         """Proportional stiffness of the loop [N/m], from which the scales of the motion are taken."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""Values of a stage file that are possible, but implausible: another unit is the likely reason."""
+"""What a stage file may say, but hardly means: implausible values, and an encoder that nothing reads."""
 
 from __future__ import annotations
 
@@ -83,6 +83,16 @@ _ROTARY: Mapping[str, _Usual] = {
     "friction.stribeck_velocity": _Usual(1e-7, 100.0, "rad/s", ("rad/s", "mrad/s", "urad/s", "deg/s")),
 }
 """What rotary axes have, from a mirror to a telescope."""
+
+
+def idle_encoder(stage: Stage) -> Iterator[str]:
+    """A sentence where the velocity is to come from another encoder than the position, and no velocity is taken."""
+    sides, controller = stage.encoder, stage.controller
+    if sides and controller and sides.velocity != sides.position and not controller.takes_velocity(stage.flat()):
+        yield (
+            f'encoder.velocity = "{sides.velocity}" has no effect: this controller takes no velocity, and acts on the '
+            f"position of the {sides.position} alone"
+        )
 
 
 def implausible_values(stage: Stage) -> Iterator[str]:

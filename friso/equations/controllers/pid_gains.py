@@ -94,6 +94,11 @@ class PidGains(Pid):
         )
 
     @classmethod
+    def takes_velocity(cls, flat: Mapping[str, Any]) -> bool:
+        """Where the derivative is that of the measurement."""
+        return bool(flat[KD] > 0 and flat[DERIVATIVE_ON] == "measurement")
+
+    @classmethod
     def structures(cls, flat: Mapping[str, Any]) -> Mapping[str, Mapping[str, Any]]:
         """The derivative of the other signal, feedforward, and no integral."""
         listed: dict[str, Mapping[str, Any]] = {}
