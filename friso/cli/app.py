@@ -38,7 +38,7 @@ def friso(
 ) -> None:
     """Does a positioning stage on contact bearings hunt, why, and what stops it?
 
-    Start with: friso init stage.toml && friso check stage.toml
+    Start with: friso init stage.toml, then friso check stage.toml
     """
 
 

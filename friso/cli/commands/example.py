@@ -22,7 +22,7 @@ def example(
 ) -> None:
     """Copy an example that comes with friso, a stage file with its sources.
 
-    Example: friso example thesis_rig && friso check thesis_rig.toml
+    Example: friso example thesis_rig
     """
     from friso.answers.output_folder import write_file
     from friso.answers.starting import example as example_path
