@@ -144,7 +144,7 @@ def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapsho
     assert {out / "identified.toml", out / "identify.html", correlations_file(out / "identified.toml")} <= files
     assert all(entry.stat().st_size > 0 for entry in files)
     assert {file.suffix for file in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
-    page = (out / "identify.html").read_text()
+    page = (out / "identify.html").read_text("utf-8")
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=.https?:", page)
     snapshots.check("identify", "page", Page(page).lines)
 

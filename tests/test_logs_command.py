@@ -96,7 +96,7 @@ def test_the_command(bare: Path, tmp_path: Path) -> None:
     assert "▁" in done.stdout
     assert "--map force=u" in done.stdout
     assert {file.name for file in (tmp_path / "out").iterdir()} >= {"logs.html", "logs_1.png"}
-    page = (tmp_path / "out" / "logs.html").read_text()
+    page = (tmp_path / "out" / "logs.html").read_text("utf-8")
     assert "--map force=u" in page
     assert not (tmp_path / "bare.csv.friso.toml").exists()
     document = json.loads(friso_inside(tmp_path, "logs", "bare.csv", "--json").stdout)

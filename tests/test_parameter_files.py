@@ -317,7 +317,7 @@ def test_export_writes_page_and_parameters(tmp_path: Path) -> None:
     assert "[ kp (1 + 1/(Tn s)) ]" in done.stdout
     assert "controller.filters.1" in done.stdout
     assert "vel_gain" in (tmp_path / "out" / "parameters.txt").read_text()
-    assert "[ kp (1 + 1/(Tn s)) ]" in (tmp_path / "out" / "gains.html").read_text()
+    assert "[ kp (1 + 1/(Tn s)) ]" in (tmp_path / "out" / "gains.html").read_text("utf-8")
     document = json.loads(friso_inside(tmp_path, "export", "gains", stage, "--json").stdout)
     assert document["gains"][0]["values"][0] == {"value": 25.0, "unit": "1/s"}
 
