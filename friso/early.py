@@ -19,7 +19,7 @@ def _module() -> str:
     return ""
 
 
-_IS_MODULE = _module() == "friso"
+_IS_MODULE = _module() in ("friso", "friso.__main__")
 _HOME = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 if _IS_MODULE and sys.path[:1] == [os.getcwd()] != [_HOME]:  # python -m puts it there, but for -P
     del sys.path[0]  # before anything is imported that Python has not had until now

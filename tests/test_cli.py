@@ -170,7 +170,7 @@ def test_a_library_that_cannot_be_loaded_names_the_remedy(error: Exception, caps
     assert LIBRARIES in " ".join(capsys.readouterr().err.split())
 
 
-@pytest.mark.parametrize("module", [["-m", "friso"], ["-mfriso"], ["-W", "ignore", "-Bum", "friso"]])
+@pytest.mark.parametrize("module", [["-m", "friso"], ["-mfriso.__main__"], ["-W", "ignore", "-Bum", "friso"]])
 def test_as_a_module_friso_imports_nothing_from_the_current_folder(tmp_path: Path, module: list[str]) -> None:
     # Not those that Python's own -m imports before it looks for friso: types, functools, contextlib and their like.
     for name in ("typer", "logging", "numpy", "signal", "enum", "atexit"):

@@ -10,9 +10,11 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 import xarray as xr
+from filelock import FileLock
 from inside import friso_inside
 from refusals import Refused, Wording
 from systems import posix
@@ -99,7 +101,6 @@ def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, 
         ("--refine",),
         ("--log",),
         ("--samples", "8"),
-        ("--out", "b.zarr"),
         ("--set", "controller.alpha=0.2"),
     ],
 )
@@ -230,6 +231,7 @@ def test_a_store_is_checked(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "map", "a.zarr", "--check")
     assert done.returncode == 1
     assert "damaged: 0.0, peaks/.zarray" in done.stdout
+    assert "--check" in friso_inside(tmp_path, "map", RIG, "--check").stderr
 
 
 def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, dict], tmp_path: Path) -> None:
@@ -248,8 +250,8 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, 
     (tmp_path / "b.html").symlink_to("b.png")  # which has no digest
     annotate_metadata(tmp_path / "b.zarr", notes={"views": {"b.html": [None]}})
     study, _ = stored_study(tmp_path / "b.zarr", None, None)
-    with pytest.raises(InputError, match="--overwrite"):
-        refuse_overwriting(study, tmp_path / "b.zarr", [], overwrite=False)
+    with pytest.raises(InputError, match="--out figures"):
+        refuse_overwriting(study, tmp_path / "b.zarr", [], overwrite=False, beside="--out figures")
     with pytest.raises(StoreError, match="another study"):  # before the figure, which is not all that would be lost
         refuse_overwriting(replace(study, rtol=1e-7), tmp_path / "b.zarr", [], overwrite=False)
 
@@ -267,11 +269,35 @@ def test_a_file_beside_a_store_that_appears_while_it_runs_stays(
     def appears(*arguments: object) -> None:
         (tmp_path / "a.html").write_text("precious")
 
-    monkeypatch.setattr("friso.answers.map_study.drawn_runs", appears)
+    monkeypatch.setattr("friso.answers.sweep.drawn_runs", appears)
     done = friso_inside(tmp_path, "map", "a.zarr")
     assert (done.returncode, "the runs are in a.zarr" in done.stderr) == (1, True)
     assert {path.name for path in tmp_path.iterdir()} == {"a.zarr", "a.html"}
     assert (tmp_path / "a.html").read_text() == "precious"
+
+
+def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
+    mapped: tuple[Path, dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, undrawn: None
+) -> None:
+    shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
+    (tmp_path / "a.png").write_text("precious")
+    kept = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file()}
+
+    class Denied(FileLock):
+        def acquire(self, *arguments: object, **options: object) -> NoReturn:
+            raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("friso.studies.store_folder.FileLock", Denied)
+    done = friso_inside(tmp_path, "map", "a.zarr", "--out", "figures", "--verify", "1")
+    assert done.returncode == 0, done.stderr
+    assert {file.name for file in (tmp_path / "figures").iterdir()} > {"map.png", "map.html"}
+    assert "wrote figures/map.html" in done.stdout
+    assert {file: file.read_bytes() for file in kept} == kept
+    for out in ("a.zarr", "figures/map.png"):
+        assert friso_inside(tmp_path, "map", "a.zarr", "--out", out, "--overwrite").returncode == 2
+    next((tmp_path / "a.zarr" / ".blocks").iterdir()).unlink()
+    assert friso_inside(tmp_path, "map", "a.zarr", "--out", "more").returncode == 2
+    assert not (tmp_path / "more").exists()
 
 
 def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:

@@ -161,19 +161,6 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     return InputError("yes", size, "--yes, or fewer points; nothing was run", "yes=True")
 
 
-def view_files(runs: xr.Dataset, store: Path, metric: str, progress: Progress = silent) -> dict[Path, Content]:
-    """The figure and the page of a map, beside its store."""
-    from friso.views.map.page import map_files
-
-    files = map_files(
-        runs,
-        metric,
-        f"friso simulate --cell {shell_word(str(store))} {{indices}}",
-        drawn_runs(study_of(runs), runs, progress),
-    )
-    return {_path_beside(store, form): content for form, content in files.items()}
-
-
 def drawn_runs(study: Study, runs: xr.Dataset, progress: Progress = silent) -> Traces | None:
     """The runs of the cells that were not inferred, for the page to draw; None of more than DRAWN cells."""
     from friso.studies.traces import traces
@@ -202,9 +189,9 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
     return dict.fromkeys(paths, partial(export, runs))
 
 
-def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool) -> None:
-    """Refuse to write over what is no earlier result of this study. Raises InputError, StoreError where another study
-    is in its store."""
+def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite: bool, beside: str = "") -> None:
+    """Refuse to write over what is no earlier result of this study, nor, where figure and page are written `beside` the
+    store, over such of others: with this example. Raises InputError, StoreError where another study is in its store."""
     from friso.studies.metadata import is_store
     from friso.studies.store import refuse_other
 
@@ -214,8 +201,8 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
     if not overwrite and is_store(store):
         refuse_other(store, study)
     own = _own_views(store)
-    for view in _views(store):
-        check_file("--out", view, overwrite, [store], is_own=view in own, example=OVERWRITE)
+    for view in _views(store) if beside else ():
+        check_file("--out", view, overwrite, [store], is_own=view in own, example=beside)
     for path in exports:
         check_file("--export", path, overwrite, [store])
 
@@ -249,7 +236,7 @@ def _views(store: Path) -> list[Path]:
     """The figure in all formats and the page beside a store."""
     from friso.views.map.page import FORMS
 
-    return [_path_beside(store, form) for form in FORMS]
+    return [path_beside(store, form) for form in FORMS]
 
 
 def _own_views(store: Path) -> list[Path]:
@@ -279,6 +266,7 @@ _MOST_OF_A_VIEW = 1 << 30
 """Bytes of a figure or a page at most that is known again."""
 
 
-def _path_beside(store: Path, form: str) -> Path:
+def path_beside(store: Path, form: str) -> Path:
+    """The path of the figure or the page of a store, by its format."""
     stem = store.with_suffix("") if store.suffix == ".zarr" else store
     return stem.with_name(f"{stem.name}.{form}")

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 
 LOGGER = logging.getLogger("friso")
 
-STORE_MAKER = "map"
-"""The command whose folder is a store."""
+STORE_MAKER = "map, a store"
+"""What made a folder that is a store, not one of files."""
 
 MARKER = ".friso-output"
 """The file that records which command made a folder, and which files there are friso's."""
@@ -54,8 +54,9 @@ class OutputFolder:
         maker, self.files = marked(folder)
         self.is_marked = maker == command
         self.is_own = self.is_marked or not _entries(folder)
-        if not (self.is_own or overwrite):
-            raise _of_others(folder, maker, f"one that friso {command} made, or {OVERWRITE}, {REPLACES}")
+        if not self.is_own and (maker == STORE_MAKER or not overwrite):
+            more = "" if maker == STORE_MAKER else f", or {OVERWRITE}, {REPLACES}"
+            raise _of_others(folder, maker, f"one that friso {command} made{more}")
         own = [name for name in self.files if self.is_own]
         self.check(own)
         for name in own:
@@ -98,7 +99,7 @@ class OutputFolder:
         others = [name for name in files if name not in self.files and os.path.lexists(self.folder / name)]
         contents = {self.folder / name: content for name, content in files.items()}
         own = contents if self.overwrite else [self.folder / name for name in self.files]
-        own = [*own, *(beside or ()), *([self.folder / MARKER] if self.is_marked else ())]
+        own = [*own, *filter(Path.is_file, beside or ()), *([self.folder / MARKER] if self.is_marked else ())]
         gone = {name for name, content in files.items() if content is None}
         names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
         leaving = [name for name in gone if os.path.lexists(self.folder / name)]
@@ -129,7 +130,7 @@ def check_store_folder(folder: Path) -> None:
     maker, _ = marked(folder)
     if _entries(folder):
         if maker != STORE_MAKER:
-            raise _of_others(folder, maker, f"or one that friso {STORE_MAKER} made; {OVERWRITE} replaces stores alone")
+            raise _of_others(folder, maker, f"or a store that friso map made; {OVERWRITE} replaces stores alone")
         return
     try:
         _try_draft(folder.parent / MARKER)
@@ -161,7 +162,7 @@ def check_file(
             check_free(path)
         _try_draft(path)
     except OSError as error:
-        raise _unwritable(option, path, error) from None
+        raise _unwritable(option, path, error, example) from None
 
 
 def write_file(option: str, path: Path, content: Content, overwrite: bool) -> None:
@@ -171,12 +172,12 @@ def write_file(option: str, path: Path, content: Content, overwrite: bool) -> No
         path.parent.stat()  # a folder that is missing is a mistake, not one to make
         write({path: content}, [path] if overwrite else ())
     except OSError as error:
-        raise _unwritable(option, path, error) from None
+        raise _unwritable(option, path, error, path.name) from None
 
 
-def _unwritable(option: str, path: Path, error: OSError) -> InputError:
+def _unwritable(option: str, path: Path, error: OSError, example: str) -> InputError:
     expected = f"a new file in a folder that can be written ({cause_of(error)}); nothing was overwritten"
-    return InputError(option, str(path), expected, path.name)
+    return InputError(option, str(path), expected, example)
 
 
 def output_folder(
@@ -236,7 +237,8 @@ def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
 
 def _of_others(folder: Path, maker: str, expected: str) -> InputError:
     """That a folder is not new, empty or the command's own; `expected` is what else it may be."""
-    holds = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
+    made = f"made by friso {maker}" if maker else f"with {_first_names(_entries(folder))} in it"
+    holds = "a store of friso map" if maker == STORE_MAKER else made
     return InputError("--out", f"{folder}, {holds}", f"a new or empty folder, {expected}", _beside(folder))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -17,13 +17,13 @@ from friso.answers.map_study import (
     coloured_by,
     drawn_runs,
     export_files,
+    path_beside,
     place_of_store,
     refuse_overwriting,
     stored_study,
     study_for,
-    view_files,
 )
-from friso.answers.output_folder import check_file, refuse_place, write
+from friso.answers.output_folder import OVERWRITE, check_file, refuse_place, write
 from friso.axis import speak_of
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -32,10 +32,11 @@ from friso.stage import Stage
 from friso.studies.axes import AxisValues
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
-from friso.studies.store import Store, check_store, in_memory
+from friso.studies.store import Store, check_store, in_memory, read_store
+from friso.studies.store_folder import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
-from friso.studies.verify import WANTED, checked_share, loosest_rtol
+from friso.studies.verify import WANTED, checked_share, loosest_rtol, verify_cells
 from friso.system import MOST_PROCESSES, shell_word, usable_cores
 
 if TYPE_CHECKING:
@@ -43,9 +44,6 @@ if TYPE_CHECKING:
 
     from friso.views.drawing.figure import Figure
     from friso.views.files import Content, Files
-
-FileKeeper = Callable[[Mapping[Path, "Content"], Collection[Path]], object]
-"""What is done with files by their paths, of which some may be replaced."""
 
 LARGE = 10_000_000
 """Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
@@ -103,23 +101,27 @@ class SweepAnswer(Answer):
 
         return map_document(self.result, self.study, self.store, self.metric)
 
-    def files(self) -> Files:
-        """The figure in all formats and the page."""
-        from friso.views.map.page import map_files
-
-        repeated = 'friso.simulate(runs.cell("{indices}"))'
-        if not self.drawable:
-            return {}
-        files = map_files(self.result, self.metric, repeated, drawn_runs(self.study, self.result))
-        return {f"map.{form}": content for form, content in files.items()}
+    def files(self, progress: Progress = silent) -> Files:
+        """The figure in all formats and the page, by name."""
+        return {f"map.{form}": content for form, content in self._views(progress).items()}
 
     def files_beside(self, progress: Progress = silent) -> Mapping[Path, Content]:
         """The figure and the page beside the store, unless there are too many cells for them, and the exports. The runs
         that the page draws are made here, which `progress` is told."""
-        views: dict[Path, Content] = {}
-        if self.store is not None and self.drawable:
-            views = view_files(self.result, self.store, self.metric, progress)
-        return {**views, **export_files(self.result, [*self.exports])}
+        views = {} if self.store is None else self._views(progress)
+        beside = {path_beside(self.store, form): content for form, content in views.items() if self.store is not None}
+        return {**beside, **export_files(self.result, [*self.exports])}
+
+    def _views(self, progress: Progress) -> Files:
+        """The figure in all formats and the page, by the format; none of too many cells."""
+        from friso.views.map.page import map_files
+
+        if not self.drawable:
+            return {}
+        again = 'friso.simulate(runs.cell("{indices}"))'
+        if self.store is not None:
+            again = f"friso simulate --cell {shell_word(str(self.store))} {{indices}}"
+        return map_files(self.result, self.metric, again, drawn_runs(self.study, self.result, progress))
 
 
 @question
@@ -145,7 +147,7 @@ def sweep(
     out: str | os.PathLike[str] | None = None,
     overwrite: bool = False,
     yes: bool = False,
-    keep: FileKeeper = write,
+    beside: bool = False,
     progress: Progress = silent,
 ) -> SweepAnswer:
     """Run every combination of the values of some keys: what `friso map` does.
@@ -191,9 +193,9 @@ def sweep(
         Whether the store of another study may be replaced, and figures and exports.
     yes : bool
         Whether a study of more than ten million cells is meant.
-    keep : callable, optional
-        Called with the exports by path, and those of them that may be replaced; default: they are written, all of them
-        or none.
+    beside : bool
+        Whether the caller writes figure, page and exports (``answer.files_beside()``): that they can be is made sure
+        before anything is run. Default: exports are written, all of them or none.
     progress : Progress
         Called as cells are done.
 
@@ -219,10 +221,11 @@ def sweep(
     varied = Varied.of_texts(axes or {}, x, y, axis, link, samples, latin, log)
     store = None if out is None else place_of_store(out)
     with _crew(workers, scheduler) as crew:
-        if isinstance(stage, str | os.PathLike) and Path(stage).is_dir():
+        resumed = Path(stage) if isinstance(stage, str | os.PathLike) and Path(stage).is_dir() else None
+        if resumed is not None:
             if varied != Varied() or set or rtol or refine or out:
-                raise _another_study(Path(stage))
-            store = place_of_store(stage)
+                raise _another_study(resumed)
+            store = place_of_store(resumed)
             study, metric = stored_study(store, metric, None if yes else LARGE)
         else:
             metric = metric or "outcome"
@@ -236,10 +239,12 @@ def sweep(
                 check_file("export", path, overwrite)
             runs = run_in_memory([study], crew, share, progress)[0]
         else:
-            refuse_overwriting(study, store, exports, overwrite)
+            example = OVERWRITE if resumed is None else "--out figures"
+            refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             runs = _filled(study, store, crew, share, overwrite, metric, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
-    keep(export_files(held, exports), exports if overwrite else ())
+    if not beside:
+        write(export_files(held, exports), exports if overwrite else ())
     return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
 
 
@@ -301,7 +306,7 @@ def _filled(
     study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, progress: Progress
 ) -> xr.Dataset:
     """Run what the store lacks, and note there what is drawn of it. Whatever ends it early, the message says where the
-    rest is."""
+    rest is. One in which nothing can be written is read, if it lacks nothing."""
     stored = 0
 
     def counted(done: int, total: int, what: str, /) -> None:
@@ -312,8 +317,13 @@ def _filled(
     try:
         with Store.opened(store, study, overwrite) as opened:
             opened.note(metric=opened.notes.get("metric", metric))
-            runs = fill(opened, crew, share, counted)
-            return runs
+            return fill(opened, crew, share, counted)
+    except ReadOnlyStoreError:
+        if not check_store(store).is_whole:
+            raise
+        runs = read_store(store)
+        runs.attrs |= verify_cells(study, runs, crew, share)
+        return runs
     except (KeyboardInterrupt, OSError, RuntimeError):
         if store.exists():
             resumed = f"friso map {shell_word(str(store))}"

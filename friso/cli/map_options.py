@@ -52,7 +52,12 @@ Scheduler = Annotated[
 ]
 Exports = Annotated[list[Path] | None, typer.Option("--export", metavar="FILE", help="Also write a .nc or .csv file.")]
 StoreFolder = Annotated[
-    Path | None, typer.Option("--out", metavar="STORE", help="Folder of the results, resumed if it exists.")
+    Path | None,
+    typer.Option(
+        "--out",
+        metavar="STORE",
+        help="Folder of the results, resumed if it exists; of a STORE: of its figure and page.",
+    ),
 ]
 ReplaceStore = Annotated[
     bool,

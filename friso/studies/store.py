@@ -272,6 +272,11 @@ class StoreState:
     files: list[str]
     unreadable: list[str]
 
+    @property
+    def is_whole(self) -> bool:
+        """Whether all blocks are done and can be read."""
+        return self.done == self.blocks and not (self.damaged or self.unreadable)
+
 
 def check_store(path: Path) -> StoreState:
     """Read all of the store at `path` and compare it with its digests. Raises StoreError where its metadata or axes

@@ -31,6 +31,10 @@ _OLD = ".old"
 _DIGITS = "[0-9a-f]" * 32
 
 
+class ReadOnlyStoreError(StoreError):
+    """Nothing can be written into a store."""
+
+
 def where_links_lead(path: Path) -> Path:
     """Where a store is: what is made aside, and what is replaced, is there, not at a link to it. Raises StoreError for
     a link that leads nowhere, as to a disk that is missing."""
@@ -112,7 +116,7 @@ def remove_partial_files(path: Path) -> None:
 @contextmanager
 def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
     """Keep other processes out of a store; the lock. Raises StoreError if one is in, and still so after `patience`
-    [s]."""
+    [s], ReadOnlyStoreError where nothing can be written."""
     lock = FileLock(path / LOCK)
     try:
         lock.acquire(timeout=patience)
@@ -120,8 +124,8 @@ def lock_store(path: Path, patience: float = 0.0) -> Iterator[FileLock]:
         expected = "to wait, or another --out"
         raise StoreError("", "a store that another friso is writing to", expected, origin=str(path)) from None
     except OSError as error:
-        expected = f"a store that can be written to ({cause_of(error)})"
-        raise StoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
+        expected = f"a copy of it that can be written to ({cause_of(error)})"
+        raise ReadOnlyStoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
     try:
         yield lock
     finally:

@@ -122,8 +122,8 @@ def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = sil
         store.write(block, measures)
         tally.add(len(measures["outcome"]), CELLS)
     runs = store.read()
-    if verify and runs.attrs.get("verified_share") != verify:
-        store.annotate(verify_cells(study, runs, crew, verify))
+    if verified := verify_cells(study, runs, crew, verify):
+        store.annotate(verified)
     return store.read()
 
 

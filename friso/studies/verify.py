@@ -45,9 +45,11 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
 
     The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
-    stated where there are no others, or no share was asked for.
+    stated where there are no others, no share was asked for, or the attributes of the runs state it.
     """
-    if not share or study.rtol < 10 * TIGHTEST:  # there is no tolerance to check it with
+    if (
+        share in (0, runs.attrs.get("verified_share")) or study.rtol < 10 * TIGHTEST
+    ):  # there is no tolerance to check it with
         return {}
     count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
     tighter = replace(study, rtol=rtol, metrics=ALWAYS)

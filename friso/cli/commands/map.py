@@ -32,6 +32,7 @@ from friso.cli.map_options import (
 )
 from friso.cli.output import print_document
 from friso.cli.progress import ProgressBar
+from friso.errors import InputError
 from friso.system import shell_word
 
 
@@ -67,10 +68,13 @@ def map_cells(
     if check:
         return _check(source, as_json)
     from friso.answers.map_study import write_beside
+    from friso.answers.output_folder import output_folder
     from friso.answers.sweep import sweep
     from friso.axis import speak_of
 
-    store = out if source.is_dir() else out or Path(f"{source.stem}_map.zarr")
+    store, elsewhere = out or Path(f"{source.stem}_map.zarr"), None
+    if source.is_dir():
+        store, elsewhere = None, output_folder("map", out, overwrite)
     options = {"x": x, "y": y, "axis": axis or (), "link": link, "samples": samples, "latin": latin, "log": log}
     options |= {"set": overrides, "metric": metric, "rtol": rtol, "verify": verify, "refine": refine}
     options |= {
@@ -82,14 +86,16 @@ def map_cells(
         "out": store,
     }
     with ProgressBar() as progress, named_as_options(options):
-        # The exports are written together with the figure and the page, all of them or none.
-        answer = sweep(source, **options, keep=lambda exports, replaced: None, progress=progress)
+        answer = sweep(source, **options, beside=elsewhere is None, progress=progress)
         speak_of(answer.axis_kind)
         place = answer.store or source
-        files, unwritten = tried(
-            lambda: write_beside(answer.files_beside(progress), place, overwrite, progress),
-            f"the runs are in {place}, but no file was written beside it",
-        )
+
+        def written() -> list[Path]:
+            if elsewhere is not None:
+                return [*elsewhere.write(answer.files(progress), progress), *answer.exports]
+            return write_beside(answer.files_beside(progress), place, overwrite, progress)
+
+        files, unwritten = tried(written, f"the runs are in {place}, but no figure was written")
     show(answer, files, as_json, unwritten=unwritten)
 
 
@@ -97,6 +103,10 @@ def _check(store: Path, as_json: bool) -> None:
     """Tell whether a store is whole; status 1 where it is not. Raises StoreError where it cannot be read at all."""
     from friso.answers.sweep import whole
 
+    if store.is_file():
+        raise InputError(
+            "--check", f"{store}, a file", "the store of a study", f"friso map {store.stem}_map.zarr --check"
+        )
     state = whole(store)
     damaged = [*state["damaged"], *state["damaged_files"]]
     if as_json:
