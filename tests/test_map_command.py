@@ -242,8 +242,11 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, 
     assert done.returncode == 2
     assert "--overwrite" in done.stderr
     assert (tmp_path / "b.png").read_text() == "precious"
-    assert friso_inside(tmp_path, "map", "b.zarr", "--overwrite").returncode == 0
-    assert friso_inside(tmp_path, "map", "b.zarr").returncode == 0  # they are its own from then on
+    drawn = ("map", "b.zarr", "--export", "b.csv")
+    assert friso_inside(tmp_path, *drawn, "--overwrite").returncode == 0
+    assert friso_inside(tmp_path, *drawn).returncode == 0  # they are its own from then on
+    (tmp_path / "b.csv").write_text("precious")
+    assert friso_inside(tmp_path, *drawn).returncode == 2
     (tmp_path / "b.html").write_text("mine, under a name that was friso's")
     assert friso_inside(tmp_path, "map", "b.zarr").returncode == 2
     (tmp_path / "b.html").unlink()

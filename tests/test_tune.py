@@ -12,6 +12,8 @@ from variants import maxwell, release, van_dijk
 from variants import stage as variant
 
 from friso import Stage, load, loads
+from friso.answers.tune import TuneAnswer
+from friso.cli.asking import show
 from friso.design_method.isolator import isolated
 from friso.engine.arrays import Results
 from friso.engine.batch import RunOptions, run_chunks
@@ -333,6 +335,8 @@ def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None
     assert tuning.interrupted
     assert [result.certainty for result in tuning.outcomes] == ["works", "unsure"]
     wording(answer(tuning)[0])
+    with pytest.raises(KeyboardInterrupt):  # status 130, whatever was found
+        show(TuneAnswer(tuning), ())
 
 
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:

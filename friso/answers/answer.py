@@ -98,6 +98,11 @@ class Answer(ABC):
         """What could not be completed, or is not met; "" where all went well."""
         return ""
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C ended what it rests on: it says what was found so far."""
+        return False
+
     @abstractmethod
     def sentences(self) -> Sequence[str]:
         """The answer in words, the conclusion first."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.answers.inputs import Changes, axes_of, pairs_of, wrong
-from friso.answers.output_folder import OVERWRITE, check_file, check_store_folder, drafts_of, refuse_place, written
+from friso.answers.output_folder import check_file, check_store_folder, drafts_of, refuse_place, written
 from friso.errors import InputError, StoreError
 from friso.progress import Progress, silent
 from friso.quantities import quoted
@@ -200,16 +200,16 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
     check_store_folder(store)
     if not overwrite and is_store(store):
         refuse_other(store, study)
-    own = _own_views(store)
+    own = _own_files(store, exports) if beside else []
     for view in _views(store) if beside else ():
         check_file("--out", view, overwrite, [store], is_own=view in own, example=beside)
     for path in exports:
-        check_file("--export", path, overwrite, [store])
+        check_file("--export", path, overwrite, [store], is_own=path in own)
 
 
 def write_beside(files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress) -> list[Path]:
-    """Write files beside a store, all of them or none; their paths. Of what is there by then, only the figure and the
-    page that the store wrote give way, unless `overwrite`; that it writes these, it notes first.
+    """Write files beside a store, all of them or none; their paths. Of what is there by then, only what the store wrote
+    gives way, unless `overwrite`; that it writes these, it notes first.
 
     Raises StoreError where another process holds the store, OSError where a file cannot be written.
     """
@@ -217,11 +217,11 @@ def write_beside(files: Mapping[Path, Content], store: Path, overwrite: bool, pr
     from friso.studies.store_folder import lock_store
 
     with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE):
-        own, views = _own_views(store), _views(store)
+        own = _own_files(store, files)
         digests = {
             path.name: sorted({str(_digest(file)) for file in ([draft, path] if path in own else [draft])})
             for draft, path in drafts.drafts
-            if draft is not None and path in views
+            if draft is not None
         }
         annotate_metadata(store, notes={"views": digests})
         drafts.put_in_place([*files] if overwrite else own)
@@ -239,8 +239,9 @@ def _views(store: Path) -> list[Path]:
     return [path_beside(store, form) for form in FORMS]
 
 
-def _own_views(store: Path) -> list[Path]:
-    """Those among the figure and the page beside a store that are as it wrote them, by the digests that it notes."""
+def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
+    """Those among the figure and the page beside a store, and its exports, that are as it wrote files of these names,
+    by the digests that it notes."""
     from friso.studies.metadata import checked_metadata
 
     try:
@@ -249,21 +250,21 @@ def _own_views(store: Path) -> list[Path]:
         return []
     digests = noted if isinstance(noted, dict) else {}
     lists = {name: digest for name, digest in digests.items() if isinstance(digest, list)}  # a store may be of others
-    present = {view: digest for view in _views(store) if (digest := _digest(view)) is not None}
-    return [view for view, digest in present.items() if digest in lists.get(view.name, [])]
+    named = {path: lists[path.name] for path in (*_views(store), *exports) if path.name in lists}
+    return [path for path, known in named.items() if (digest := _digest(path)) is not None and digest in known]
 
 
-def _digest(view: Path) -> str | None:
+def _digest(file: Path) -> str | None:
     from friso.studies.store_files import digest_of
 
     try:
-        return digest_of(view, _MOST_OF_A_VIEW)
+        return digest_of(file, _MOST_OF_A_FILE)
     except PermissionError:
         return None
 
 
-_MOST_OF_A_VIEW = 1 << 30
-"""Bytes of a figure or a page at most that is known again."""
+_MOST_OF_A_FILE = 1 << 30
+"""Bytes of a figure, a page or an export at most that is known again."""
 
 
 def path_beside(store: Path, form: str) -> Path:

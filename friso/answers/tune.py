@@ -53,6 +53,11 @@ class TuneAnswer(Answer):
         so_far = "before it was interrupted, " if self.result.interrupted else ""
         return f"{so_far}no change that was tried works for certain"
 
+    @property
+    def interrupted(self) -> bool:
+        """Whether the search was."""
+        return self.result.interrupted
+
     def sentences(self) -> Sequence[str]:
         """What to change, what it brings and costs, and why the other remedies do not work."""
         from friso.views.tune.words import answer, failing

@@ -74,7 +74,7 @@ def show(
     answer: Answer, files: Iterable[Path], as_json: bool = False, details: bool = False, unwritten: str = ""
 ) -> None:
     """Print the answer with the `files` written, or why they are `unwritten`. Raises typer.Exit with the status of a
-    failure."""
+    failure, KeyboardInterrupt after an answer that was interrupted."""
     written = [*files]
     if as_json:
         print_document(answer.document(), written)
@@ -96,6 +96,8 @@ def show(
     failures = [failure for failure in (answer.failure, unwritten) if failure]
     for failure in failures:
         say(failure)
+    if answer.interrupted:
+        raise KeyboardInterrupt
     if failures:
         raise typer.Exit(answer.status if answer.failure else 1)
 
