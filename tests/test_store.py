@@ -598,6 +598,34 @@ def test_arrays_that_friso_does_not_write_are_not_decoded(stored: Path, name: st
         read_store(stored)
 
 
+@pytest.mark.parametrize(
+    ("name", "change"),
+    [
+        (".zattrs", {"rtol": 1e300}),
+        (".zattrs", {"verified_cells": 10**400, "verified_surviving": 1, "verified_rtol": 1e-8}),
+        (".zattrs", {"verified_cells": 3, "verified_surviving": "<b>", "verified_rtol": 1e-8}),
+        ("peaks/.zarray", {"chunks": [1, 1]}),
+        ("peaks/.zarray", {"dimension_separator": "/"}),
+    ],
+)
+def test_what_a_store_states_of_its_runs_is_such_as_friso_states(
+    stored: Path, name: str, change: dict[str, Any]
+) -> None:
+    with sealed_again(stored) as metadata:
+        metadata[name] |= change
+    with pytest.raises(StoreError):
+        read_store(stored)
+
+
+@posix
+def test_what_lies_deeper_than_files_of_a_store_is_not_looked_at(stored: Path, rig: Stage, tmp_path: Path) -> None:
+    """However deep: a path, or a function that calls itself, has an end."""
+    (stored / "a" / "b").mkdir(parents=True)
+    (stored / "a" / "b" / "c").symlink_to(tmp_path)
+    sweep(rig, AXES, store=stored)
+    assert check_store(stored).damaged == []
+
+
 def test_an_array_is_a_measure_as_large_as_its_axes(stored: Path) -> None:
     with sealed_again(stored) as metadata:
         metadata["extra/.zarray"] = metadata["peaks/.zarray"] | {"shape": [10**13], "chunks": [10**6]}

@@ -147,8 +147,9 @@ def store_versions(rng: random.Random, folder: Path) -> None:
     own, attributes = document["friso"], document["metadata"][".zattrs"]
     own["format"] = rng.choice((0, 1, 2, 3, 99, -1, "2", None, [], 2.5, 10**30))
     attributes["equations"] = rng.choice((attributes["equations"], "9.9.9 (000000000000)", 3, ""))
-    for name in rng.sample(("axes", "links", "rtol", "refined", "stage", "machine", "friso"), rng.randrange(3)):
-        attributes[name] = rng.choice((None, "", "{", 3, [], "NaN", "1e999", attributes[name]))
+    names = ("axes", "links", "rtol", "refined", "stage", "machine", "friso", "verified_cells", "verified_surviving")
+    for name in rng.sample(names, rng.randrange(3)):
+        attributes[name] = rng.choice((None, "", "{", 3, [], "NaN", "1e999", attributes.get(name)))
     if rng.random() < 0.5:
         del attributes[rng.choice([*attributes])]
     if rng.random() < 0.8:  # as a friso would have sealed it

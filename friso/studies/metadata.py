@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.errors import StoreError
+from friso.escapes import one_line
 from friso.studies.cells import METRICS
 from friso.studies.store_files import digest_of, put, stored
 from friso.system import cause_of
@@ -133,7 +134,7 @@ def checked_metadata(path: Path) -> Metadata:
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
     if number is not None and number > FORMAT:
-        actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"
+        actual = f"a store of a newer friso ({one_line(str(attributes.get('friso', 'unknown')))})"
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
     if number == FORMAT:
         study, axes, notes = (entry.get(name) for name in ("study", "axes", "notes"))
@@ -200,7 +201,8 @@ def _is_plain(array: Mapping[str, Any]) -> bool:
     """Whether chunks decode to numbers or texts, compressed and checked as friso does, of a size that it writes."""
     kind = _KIND.fullmatch(array["dtype"])
     codecs = {codec["id"] for codec in [array["compressor"], *(array["filters"] or ())] if codec}
-    if kind is None or not codecs <= _CODECS or min(*array["shape"], *array["chunks"]) < 1:
+    laid_out = (array["order"], array.get("dimension_separator", "."))
+    if kind is None or not codecs <= _CODECS or laid_out != ("C", ".") or min(*array["shape"], *array["chunks"]) < 1:
         return False
     size = int(kind["size"]) * (4 if kind["letter"] == "U" else 1)  # a character takes 4 bytes
     return size > 0 and size * math.prod(array["chunks"]) <= _CHUNK

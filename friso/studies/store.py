@@ -23,6 +23,7 @@ import numpy as np
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
+from friso.escapes import one_line
 from friso.stage.arguments import check_arguments
 from friso.studies.cells import UNITS, WORDS, attributes_of
 from friso.studies.kept_cells import KeptCells
@@ -39,6 +40,7 @@ from friso.studies.store_folder import (
     where_links_lead,
 )
 from friso.studies.study import CellBlock, Study, study_of
+from friso.studies.verify import check_verified
 from friso.system import cause_of, once_free, path_of
 
 if TYPE_CHECKING:
@@ -253,7 +255,11 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
         runs.attrs = metadata.attributes
         runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
         runs.encoding["source"] = os.path.abspath(path)
-        study_of(runs)
+        study = study_of(runs)
+        blocks = Store(Path(path), study).blocks
+        if any(runs[name].encoding["chunks"] != blocks for name in study.metrics):
+            raise ValueError("other chunks than friso writes")
+        check_verified(runs.attrs, study.cells)
         return runs
     except Exception:  # whatever a codec, or a study, makes of what it cannot read
         expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
@@ -321,14 +327,14 @@ def refuse_other(path: Path, study: Study) -> None:
     with read_store(path) as dataset:
         differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:
-        text = "a store of another study:\n            " + "\n            ".join(differences)
+        text = "a store of another study:\n            " + "\n            ".join(map(one_line, differences))
         expected = "the same study, to resume it, another --out, or --overwrite, which replaces the store"
         raise StoreError("", text, expected, origin=str(path))
 
 
 def _warn_of_another_machine(path: Path) -> None:
     with read_store(path) as dataset:
-        machine_stored = dataset.attrs.get("machine")
+        machine_stored = one_line(str(dataset.attrs.get("machine")))
     if machine_stored != machine():
         logger.warning(
             "the store was begun on %s, here is %s: cells may differ in their last bits", machine_stored, machine()

@@ -124,10 +124,11 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
         raise StoreError("", f"a store whose {name} {actual}", expected, f"{remove} {name}", str(path))
 
 
-def _entries(folder: Path | str) -> Iterator[os.DirEntry[str]]:
-    """All that is in a folder and those below it, which come before what is in them; no link is followed."""
+def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
+    """All that is in a folder and in those below it, as deep as a store has files, each folder before what is in it; no
+    link is followed."""
     with os.scandir(folder) as entries:
         for entry in entries:
             yield entry
-            if entry.is_dir(follow_symlinks=False):
-                yield from _entries(entry.path)
+            if levels > 1 and entry.is_dir(follow_symlinks=False):
+                yield from _entries(entry.path, levels - 1)

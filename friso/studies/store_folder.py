@@ -108,7 +108,7 @@ def remove_leftovers(path: Path) -> None:
 def remove_partial_files(path: Path) -> None:
     """Remove files that were being written when their process was killed, from a store that is locked: whoever writes
     into it holds the lock."""
-    for file in path.rglob(f"*{PARTIAL}"):
+    for file in (*path.glob(f"*{PARTIAL}"), *path.glob(f"*/*{PARTIAL}")):
         if is_partial(file) and file.is_file():
             delete_file(file)
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.cache import code_digest, machine
+from friso.engine.tolerance import checked_rtol
 from friso.stage import Stage, loads
 from friso.studies.axes import SweptAxis
 from friso.studies.cells import BY_ATTRACTORS, METRICS, flat_cells
@@ -201,7 +202,7 @@ def study_of(runs: xr.Dataset) -> Study:
         dimensions.append(Dimension(str(name), axes))
     stage = loads(runs.attrs["stage"])
     metrics = tuple(name for name in METRICS if name in runs)
-    links, rtol = dict(json.loads(runs.attrs["links"])), float(runs.attrs["rtol"])
+    links, rtol = dict(json.loads(runs.attrs["links"])), checked_rtol(float(runs.attrs["rtol"]))
     return Study(stage, tuple(dimensions), links, metrics, rtol, bool(runs.attrs["refined"]))
 
 

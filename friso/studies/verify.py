@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from operator import index
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.tolerance import TIGHTEST
+from friso.engine.tolerance import TIGHTEST, checked_rtol
 from friso.errors import InputError
 from friso.studies.cells import ALWAYS, INFERRED, allowed_cells
 from friso.studies.execute import Crew, run_scattered
@@ -67,6 +68,16 @@ def verify_cells(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> di
         checked, confirmed = same(INFERRED)
         columns |= {"inferred_checked": checked, "inferred_confirmed": confirmed}
     return columns
+
+
+def check_verified(attributes: Mapping[str, Any], cells: int) -> None:
+    """Raises ValueError, TypeError or KeyError for attributes that `verify_cells` never gives a study of so many cells:
+    a store may be of others."""
+    for checked, same in (("verified_cells", "verified_surviving"), ("inferred_checked", "inferred_confirmed")):
+        if checked in attributes and not 0 <= index(attributes[same]) <= index(attributes[checked]) <= cells:
+            raise ValueError(f"{checked} is no number of cells")
+    if "verified_cells" in attributes:
+        checked_rtol(float(attributes["verified_rtol"]))
 
 
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
