@@ -251,7 +251,7 @@ def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
     digests = noted if isinstance(noted, dict) else {}
     lists = {name: digest for name, digest in digests.items() if isinstance(digest, list)}  # a store may be of others
     named = {path: lists[path.name] for path in (*_views(store), *exports) if path.name in lists}
-    return [path for path, known in named.items() if (digest := _digest(path)) is not None and digest in known]
+    return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]
 
 
 def _digest(file: Path) -> str | None:
