@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.engine.allowance import current_allowance
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, new_queue
-from friso.engine.kernel import Kernel, empty_results
+from friso.engine.kernel import Kernel, columns, empty_results
 from friso.engine.layout import LANES
 from friso.engine.overtaken import current_flag, go_on
 from friso.engine.side_by_side import cores_to_use, results_of
@@ -98,16 +98,10 @@ def prepare(
     """The kernel's input for the runs of one chunk, from the states `starts` unless as the motion says."""
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
-    def columns(rows: list[Any]) -> np.ndarray:
-        full = np.empty((runs, len(rows)))
-        for i, row in enumerate(rows):
-            full[:, i] = row
-        return full
-
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        constants = columns(kernel.module.constants(values))
-        scales = columns(kernel.module.scales(values))
-        rates = columns(kernel.module.rate(values))[:, 0]
+        constants = columns(kernel.module.constants(values), runs)
+        scales = columns(kernel.module.scales(values), runs)
+        rates = columns(kernel.module.rate(values), runs)[:, 0]
     scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
@@ -115,7 +109,7 @@ def prepare(
     modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
     longest = LONGEST_SHARE * segments[:, -1, 0]
-    clocks = columns(kernel.module.clock(values)) if kernel.layout.clocked else np.zeros((1, 2))
+    clocks = columns(kernel.module.clock(values), runs) if kernel.layout.clocked else np.zeros((1, 2))
     least = np.full(runs, options.least_swing, dtype=float)
     tolerances = options.rtol * scales
     return Batch(constants, starts, tolerances, modes, first_steps, longest, segments, windows, clocks, least)
@@ -190,17 +184,18 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
     if allowance is None:
         run_batch(kernel, batch, options_of(options), results, options.threads)
         return
-    which, steps = np.arange(len(batch.starts)), 0
+    which, part, steps = np.arange(len(batch.starts)), results, 0
     while which.size:
         before, steps = steps, int(min(options.budget, allowance.most_steps(len(which), states)))
         if steps < MORE * before:
             allowance.exhaust()
-        part = _empty_like(results, len(which))
         run_batch(kernel, _batch_of(batch, which), options_of(replace(options, budget=steps)), part, options.threads)
         allowance.charge(part.statistics[:, STATISTICS.index("attempted")], states)
-        for column, rows in zip(results, part, strict=True):
-            column[which] = rows
+        if part is not results:
+            for column, rows in zip(results, part, strict=True):
+                column[which] = rows
         which = which[(part.statuses == Status.BUDGET) & (steps < options.budget)]
+        part = _empty_like(results, len(which))
 
 
 def _batch_of(batch: Batch, which: np.ndarray) -> Batch:

@@ -122,10 +122,7 @@ class Kernel:
 
     def settled_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
         """The same for stages given by the values of their parameters."""
-        full = np.zeros((runs, self.initial_size))
-        for i, row in enumerate(self.module.settled(steady, values)):
-            full[:, i] = row
-        return full
+        return columns(self.module.settled(steady, values), runs)
 
     def unwound_at(self, values: list[np.ndarray], steady: Steady, runs: int) -> np.ndarray:
         """The same with all integrals 0, the force of the controller being what follows from that."""
@@ -259,6 +256,15 @@ def _load(request: KernelRequest, entry: Compiled) -> None:
 def _loops() -> Loops:
     (entry,) = built_entries([DRIVER])
     return Loops(load_object(entry.code, ["run"])["run"], driver_kinds())
+
+
+def columns(rows: Iterable[Any], runs: int) -> np.ndarray:
+    """What a generated function says of runs, numbers or arrays of shape (runs,), as an array (runs, rows)."""
+    rows = list(rows)
+    full = np.empty((runs, len(rows)))
+    for i, row in enumerate(rows):
+        full[:, i] = row
+    return full
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:

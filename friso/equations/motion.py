@@ -68,8 +68,11 @@ _SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
 
 def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """The reference of each run, shape (runs, pieces, 4): start [s], position [m], velocity, acceleration."""
-    rows = [np.broadcast_arrays(*piece, np.empty(runs))[:4] for piece in _PIECES[flat["motion.kind"]](flat)]
-    return np.ascontiguousarray(np.moveaxis(np.array(rows, dtype=float), 2, 0))
+    rows = _PIECES[flat["motion.kind"]](flat)
+    full = np.empty((runs, len(rows), 4))
+    for i, j in np.ndindex(len(rows), 4):
+        full[:, i, j] = rows[i][j]
+    return full
 
 
 def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:

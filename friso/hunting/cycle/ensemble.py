@@ -11,7 +11,7 @@ import numpy as np
 
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import RunOptions, run_chunks
-from friso.engine.kernel import Kernel, kernel
+from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
 
@@ -95,7 +95,7 @@ class Ensemble:
         """Magnitudes of the states, shape (count, states)."""
         size = np.where(self.length > 0, self.length, WITHOUT_FRICTION)
         values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
-        return np.stack([np.broadcast_to(row, (self.count,)) for row in self.kernel.module.scales(values)], axis=1)
+        return columns(self.kernel.module.scales(values), self.count)
 
     @property
     def sticking(self) -> int:
@@ -151,8 +151,7 @@ class Ensemble:
     def rates(self, states: np.ndarray) -> np.ndarray:
         """The time derivative of the states, both of shape (count, states)."""
         modes = self.kernel.modes(states.T, 0.0, np.zeros(3), self.values)
-        rows = self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values)
-        return np.stack([np.broadcast_to(row, (self.count,)) for row in rows], axis=1)
+        return columns(self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values), self.count)
 
     def steady_friction(self, velocities: np.ndarray) -> np.ndarray | None:
         """Friction force [N] in steady motions of the cart at velocities [m/s], one per stage, both of shape (count,);
@@ -205,11 +204,10 @@ def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 def _with_room(results: Results, room: int) -> Results:
     """The results with room for so many turning points."""
-    if results.turn_times.shape[1] == room:
-        return results
-    gap = ((0, 0), (0, max(0, room - results.turn_times.shape[1])))
-    times, values = (np.pad(turns[:, :room], gap) for turns in (results.turn_times, results.turn_values))
-    return results._replace(turn_times=times, turn_values=values)
+    turns = results.turn_times[:, :room], results.turn_values[:, :room]
+    if missing := room - turns[0].shape[1]:
+        turns = tuple(np.pad(column, ((0, 0), (0, missing))) for column in turns)
+    return results._replace(turn_times=turns[0], turn_values=turns[1])
 
 
 def done(results: Results) -> np.ndarray:

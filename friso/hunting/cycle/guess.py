@@ -73,15 +73,21 @@ def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apar
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
     """The distance that is its own end, of those whose numbers are in `goes`; if there is none, the one that is almost:
-    near a fold both lie between two points of the map."""
-    rise = end - start
-    crosses = np.array([i for i in goes if i + 1 in goes and rise[i] * rise[i + 1] <= 0], dtype=int)
+    near a fold both lie between two points of the map. With `apart` neither where the map passes its symmetric fixed
+    point, or comes near that: it almost comes back there whenever a flip is near."""
+    rise, side = end - start, np.zeros(len(start) + 1)
+    side[goes] = np.sign(far - start)[goes] if apart else 1.0
+    crosses = np.flatnonzero((side[:-2] * side[1:-1] > 0) & (rise[:-1] * rise[1:] <= 0))
     if crosses.size:
         differ = np.abs(np.log(far[crosses] / start[crosses]))
         i = crosses[differ.argmax() if apart else differ.argmin()]
         return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
     change = np.abs(np.log(end[goes] / start[goes]))
-    return float(start[goes[change.argmin()]]) if goes.size and change.min() < ALMOST else None
+    if not goes.size or change.min() >= ALMOST:
+        return None
+    nearest = goes[change.argmin()]
+    towards = nearest + int(side[nearest])  # the symmetric fixed point
+    return float(start[nearest]) if not apart or side[towards] == side[nearest] else None
 
 
 def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
