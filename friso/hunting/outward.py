@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.polynomial import polynomial
 
 from friso.engine.allowance import Exhausted
 from friso.equations.bandwidth import faster
@@ -17,10 +18,10 @@ from friso.hunting.boundary.branch import END_OF_RANGE, NO_FARTHER, REACHED, Poi
 from friso.hunting.boundary.crossing import ENOUGH, SPREAD, crossing
 from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside, smoothed
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import Cycles, families, hunting_cycles
+from friso.hunting.cycle.find import RTOL, Cycles, described, families, hunting_cycles
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.cycle.multipliers import multipliers
-from friso.hunting.cycle.shooting import swings_of_simplest
+from friso.hunting.cycle.shooting import close, swings_of_simplest
 
 SCALE = 0.06
 """Change of the logarithm of the bandwidth over which is simulated where no orbit can be followed."""
@@ -46,6 +47,9 @@ attract over less, or from a narrow range."""
 NEAR = 1.03
 """The range of factors about the flip of the simplest cycle over which the curve through its multipliers is laid
 again."""
+
+CURVE = 2
+"""Degree of the curve from which cycles are closed again there."""
 
 FOUND, LOST, UNCLEAR = "found", "lost", "unclear"
 """What is known of the end of an orbit."""
@@ -297,29 +301,29 @@ class Outward:
         from a curve through its multipliers in between: each of them is rough where a limiter chatters. The curve is
         laid twice, the second time over less; what both differ by, and twice what the multipliers scatter about the
         second one in terms of the factor, is the reserve. None if it does not, or too few are known."""
-        flip: tuple[float, float] | None = None
-        for _ in range(2):
-            factors = np.geomspace(at, outside, SPREAD)
-            beyond = self._excess(factors[ENOUGH:])
-            if not np.any(beyond > 0):  # it ends in another way
-                break
-            excess = np.append(self._excess(factors[:ENOUGH]), beyond)
-            closed = np.isfinite(excess)
-            if np.count_nonzero(closed) < ENOUGH or not np.any(excess < 0):
-                break
-            passed = crossing(np.linspace(0, 1, SPREAD)[closed], excess[closed])
-            if passed is None or passed.slope < 0:
-                break
-            uncertainty = passed.reserve * abs(float(np.log(outside / at)))
-            before, flip_at = flip, float(at * (outside / at) ** passed.place)
-            flip = flip_at, uncertainty if before is None else max(uncertainty, abs(flip_at / before[0] - 1))
-            at, outside = flip_at / NEAR, flip_at * NEAR  # a curve over less is closer
-        return flip
+        factors = np.geomspace(at, outside, SPREAD)
+        beyond = hunting_cycles(self._stages(factors[ENOUGH:]))
+        if not np.any(_excess(beyond) > 0):  # it ends in another way
+            return None
+        within = hunting_cycles(self._stages(factors[:ENOUGH]))
+        first = _crossed(factors, np.append(_excess(within), _excess(beyond)))
+        if first is None:
+            return None
+        near = NEAR ** self._ahead(at)
+        closer = np.geomspace(first[0] / near, first[0] * near, SPREAD)
+        second = _crossed(closer, _excess(self._interpolated(factors, (within, beyond), closer)))
+        return (second[0], max(second[1], abs(second[0] / first[0] - 1))) if second else first
 
-    def _excess(self, factors: np.ndarray) -> np.ndarray:
-        """By how much the size of the simplest cycle's multiplier exceeds 1 at factors (NaN: none was closed)."""
-        cycles = hunting_cycles(self._stages(factors))
-        return np.where(cycles.closed, np.abs(cycles.multiplier) - 1, np.nan)
+    def _interpolated(self, factors: np.ndarray, known: tuple[Cycles, ...], wanted: np.ndarray) -> Cycles:
+        """The cycles at `wanted` factors, closed from a curve through those that are `known` at some factors."""
+        closed = np.concatenate([cycles.closed for cycles in known])
+        states = np.concatenate([cycles.states for cycles in known])[closed]
+        times = np.concatenate([cycles.orbits.times for cycles in known])[closed]
+        scale = np.log(factors[0])
+        through = polynomial.polyfit(np.log(factors[closed]) - scale, np.column_stack([states, np.log(times)]), CURVE)
+        guess = polynomial.polyval(np.log(wanted) - scale, through).T
+        stages = self._stages(wanted)
+        return described(stages, close(stages, guess[:, :-1], np.exp(guess[:, -1]), known[0].sign, RTOL), RTOL)
 
     def _simulated(
         self, at: float, motions: tuple[Swinging, ...], outside: float
@@ -338,6 +342,24 @@ class Outward:
         if ahead * (beyond - self.farthest) > 0:
             raise Beyond
         return float(factors[last]), survey.take(attract[-1:]).motions, beyond
+
+
+def _excess(cycles: Cycles) -> np.ndarray:
+    """By how much the sizes of multipliers exceed 1 (NaN where no cycle was closed)."""
+    return np.where(cycles.closed, np.abs(cycles.multiplier) - 1, np.nan)
+
+
+def _crossed(factors: np.ndarray, excess: np.ndarray) -> tuple[float, float] | None:
+    """The factor at which a cycle begins to repel, of some from where it attracts, and up to what share of it that is
+    known, by the `excess` of its multipliers; None if it does not, or too few of these are known."""
+    closed = np.isfinite(excess)
+    if not np.any(excess < 0) or not np.any(excess > 0):
+        return None
+    passed = crossing(np.linspace(0, 1, len(factors))[closed], excess[closed])
+    if passed is None or passed.slope < 0:
+        return None
+    length = float(np.log(factors[-1] / factors[0]))
+    return float(factors[0] * np.exp(passed.place * length)), passed.reserve * abs(length)
 
 
 def _is_simple(orbit: Swinging) -> bool:
