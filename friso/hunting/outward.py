@@ -314,16 +314,16 @@ class Outward:
         second = _crossed(closer, _excess(self._interpolated(factors, (within, beyond), closer)))
         return (second[0], max(second[1], abs(second[0] / first[0] - 1))) if second else first
 
-    def _interpolated(self, factors: np.ndarray, known: tuple[Cycles, ...], wanted: np.ndarray) -> Cycles:
-        """The cycles at `wanted` factors, closed from a curve through those that are `known` at some factors."""
-        closed = np.concatenate([cycles.closed for cycles in known])
-        states = np.concatenate([cycles.states for cycles in known])[closed]
-        times = np.concatenate([cycles.orbits.times for cycles in known])[closed]
+    def _interpolated(self, factors: np.ndarray, parts: tuple[Cycles, ...], wanted: np.ndarray) -> Cycles:
+        """The cycles at `wanted` factors, closed from a curve through those at some `factors`, which are given in parts."""
+        closed = np.concatenate([cycles.closed for cycles in parts])
+        states = np.concatenate([cycles.states for cycles in parts])[closed]
+        times = np.concatenate([cycles.orbits.times for cycles in parts])[closed]
         scale = np.log(factors[0])
         through = polynomial.polyfit(np.log(factors[closed]) - scale, np.column_stack([states, np.log(times)]), CURVE)
         guess = polynomial.polyval(np.log(wanted) - scale, through).T
         stages = self._stages(wanted)
-        return described(stages, close(stages, guess[:, :-1], np.exp(guess[:, -1]), known[0].sign, RTOL), RTOL)
+        return described(stages, close(stages, guess[:, :-1], np.exp(guess[:, -1]), parts[0].sign, RTOL), RTOL)
 
     def _simulated(
         self, at: float, motions: tuple[Swinging, ...], outside: float
