@@ -315,7 +315,7 @@ class Outward:
         return (second[0], max(second[1], abs(second[0] / first[0] - 1))) if second else first
 
     def _interpolated(self, factors: np.ndarray, parts: tuple[Cycles, ...], wanted: np.ndarray) -> Cycles:
-        """The cycles at `wanted` factors, closed from a curve through those at some `factors`, which are given in parts."""
+        """The cycles at `wanted` factors, closed from a curve through those at some factors, `parts`."""
         closed = np.concatenate([cycles.closed for cycles in parts])
         states = np.concatenate([cycles.states for cycles in parts])[closed]
         times = np.concatenate([cycles.orbits.times for cycles in parts])[closed]
