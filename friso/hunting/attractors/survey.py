@@ -54,6 +54,10 @@ CONVERGED, APPROACHES = 1e-4, 0.7
 """The same where nothing has to be proved, and the share of what it was some swings before below which it does for
 motions that are about to repeat themselves (`SETTLED`)."""
 
+GROWS = 1.02
+"""How many times as large as some swings before a deviation is at least that grows as from a cycle that repels: about
+another that attracts nearby it would soon grow no more."""
+
 MOST_ORBITS = 3
 """Orbits that are tried to be closed for a stage after one round of a thorough survey, of others one."""
 
@@ -240,7 +244,7 @@ class Survey:
         repels, and that change sides with every return, all grow along one line, and the run that has come farthest
         shows what the others come to."""
         repeats, away = ends.repeats, _like(self._alternating, owners, ends)
-        leaving = moving[(away & (repeats.deviation > repeats.earlier))[moving]]
+        leaving = moving[(away & (repeats.deviation > GROWS * repeats.earlier))[moving]]
         farthest = {owners[k]: k for k in leaving[np.argsort(repeats.deviation[leaving])]}
         return np.setdiff1d(moving, np.setdiff1d(leaving, list(farthest.values())))
 
