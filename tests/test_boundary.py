@@ -12,7 +12,7 @@ from variants import VARIANTS
 import friso
 from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
 from friso.hunting.boundary.branch import REACHED, Point, Tracer, continued
-from friso.hunting.boundary.crossing import crossing
+from friso.hunting.boundary.crossing import crossing, turn
 from friso.hunting.boundary.diagram import each_once
 from friso.hunting.boundary.locate import changes, corrected
 from friso.hunting.cycle.ensemble import Ensemble
@@ -109,6 +109,36 @@ def test_a_crossing_of_values_that_scatter_is_told_with_an_honest_reserve() -> N
     thrice = crossing(places, places * (places - 0.004) * (places + 0.004))
     assert thrice is not None
     assert (thrice.place, thrice.reserve) == (pytest.approx(0.004), pytest.approx(0.008))
+
+
+def test_a_branch_whose_places_scatter_turns_within_its_reserve() -> None:
+    """Parabolas through places that scatter: the reserve mostly holds the true one; a line does not turn."""
+    draws, lengths = np.random.default_rng(1), np.linspace(-0.03, 0.03, 8)
+    turns = draws.uniform(-0.01, 0.01, 300)
+    branches = [at - (lengths - at) ** 2 + 2e-5 * draws.standard_normal(8) for at in turns]
+    sought = [(turn(lengths, places), at) for places, at in zip(branches, turns, strict=True)]
+    met = [(found, at) for found, at in sought if found]
+    assert len(met) > 290
+    assert np.mean([abs(found.place - at) <= found.reserve for found, at in met]) > 0.9
+    assert turn(lengths, lengths) is None
+
+
+def test_what_is_simulated_within_the_error_of_a_flip_tells_nothing_of_it(over_crossover: Diagram) -> None:
+    """There cycles repel so little that runs may stay on them: hunting ends at the flip, however verdicts alternate."""
+    (first,) = [change for change in stability_changes(over_crossover) if not change.begins]
+    ((branch, flip),) = [
+        (number, spot)
+        for number, own in enumerate(over_crossover.special)
+        for spot in own
+        if over_crossover.value(spot.point.place) == pytest.approx(first.low, rel=1e-9)
+    ]
+    wide = replace(flip, error=3.1 / (len(over_crossover.places) - 1))
+    near = np.flatnonzero(np.abs(over_crossover.places - flip.point.place) < wide.error)
+    attracts = over_crossover.attracts.copy()
+    attracts[near] = np.arange(near.size) % 2 == 1
+    special = tuple(tuple(wide if spot is flip else spot for spot in own) for own in over_crossover.special)
+    doubtful = replace(over_crossover, special=special, attracts=attracts)
+    assert [change for change in stability_changes(doubtful) if not change.begins] == [first]
 
 
 def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagram) -> None:

@@ -80,3 +80,17 @@ def test_a_flip_with_a_limiter_that_chatters_is_known_as_far_as_its_multipliers_
     ((flip,),) = traced.special  # a boundary lists it once, as uncertain
     assert 2e-3 < traced.error(flip) / 5.6 < 0.01
     assert abs(traced.value(flip.point.place) - 5.6065) + 0.0075 < traced.error(flip)
+
+
+def test_a_fold_with_a_limiter_that_chatters_is_where_its_branch_turns_back(rig: Stage) -> None:
+    """Not where the multiplier, over a hundredth of the distance, is 1 (3.64663 Hz). At 1e-9, begun beside the cycle, the
+    stage still swings after 400 periods at 3.6468 Hz, and rests at 3.647 Hz."""
+    joint = {"joint.locked": False, "joint.stiffness": "50 N/mm", "joint.stroke": "50 um"}
+    leaning = rig.replace({**joint, "friction.asymmetry": 0.1, "controller.crossover": "3.63 Hz"})
+    flat = leaning.flat()
+    stages = Ensemble.held(flat, 1)
+    (orbit,) = of_cycles(np.arange(1), hunting_cycles(stages), stages.sticking)
+    factor, _, end, reserve = Outward(flat, 10.0).followed(1.0, orbit)
+    assert end == "found"
+    assert 3.6468 < 3.63 * factor < 3.647
+    assert 1e-5 < reserve < 1e-3

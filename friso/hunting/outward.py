@@ -16,7 +16,7 @@ from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging, of_cycles
 from friso.hunting.boundary.branch import END_OF_RANGE, NO_FARTHER, REACHED, Point, Tracer
 from friso.hunting.boundary.crossing import ENOUGH, SPREAD, crossing
-from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside, smoothed
+from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside, smoothed, towards, turned
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, described, families, hunting_cycles
 from friso.hunting.cycle.held import held_beside
@@ -173,7 +173,9 @@ class Outward:
             if closer is None:
                 if end == LOST:
                     reserve = max(reserve, abs(float(suggested.factors[0]) / at - 1))
-                return AttractionEnd(at, next_to, end != UNCLEAR and decided and bool(survey.decided[0]), reserve)
+                certain = end != UNCLEAR and decided and bool(survey.decided[0])
+                known = at if certain or end == LOST else at * (1 + reserve) ** -self._ahead(at)
+                return AttractionEnd(known, next_to, certain, reserve)
             (place.at, place.motions), place.outside = closer, next_to
         return self._quiet_from(place.at, place.motions)
 
@@ -281,7 +283,12 @@ class Outward:
             last = last_inside(tracer, first, second, kind, FLAT if kind == "fold" else PRECISE)
             ended = last is not None
             farthest = max(farthest, last or first, key=lambda point: point.place)
-            if last is not None and kind != "fold" and self._chatters:
+            if last is not None and kind == "fold" and self._chatters:
+                turn = turned(tracer, last, towards(first, second))
+                ended = turn is not None
+                if turn:
+                    farthest, reserve = replace(farthest, place=turn.place), max(PRECISE, turn.reserve)
+            elif last is not None and self._chatters:
                 passed = smoothed(tracer, last, kind)
                 ended = passed is not None and (passed.slope < 0) == (kind == "flip")  # beyond it, the orbit repels
                 if passed and ended:

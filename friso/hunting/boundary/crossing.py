@@ -1,4 +1,4 @@
-"""Where values that scatter pass zero, and up to what that is known: by a cubic through them."""
+"""Where values that scatter pass zero, or turn, and up to what that is known: by a cubic through them."""
 
 from __future__ import annotations
 
@@ -34,7 +34,38 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
     if not along.size:
         return None
     place = float(along.max())
-    scatter = float(np.sqrt(np.sum((values - curve(places)) ** 2) / (len(places) - 4)))
     slope = float(slopes(place))
-    reserve = max(2 * scatter / min(abs(slope), abs(steepness)), float(np.abs(inside - place).max()))
+    reserve = max(
+        2 * _scatter(curve, places, values) / min(abs(slope), abs(steepness)), float(np.abs(inside - place).max())
+    )
     return Crossing(place, reserve, slope) if reserve <= np.ptp(places) / 2 else None
+
+
+class Turn(NamedTuple):
+    """A length along a branch at which it turns back, its place there, and by how much that may be off."""
+
+    length: float
+    place: float
+    reserve: float
+
+
+def turn(lengths: np.ndarray, places: np.ndarray) -> Turn | None:
+    """Where the cubic through places, (n,), over lengths turns, nearest to length 0. The place may be off by twice what
+    they scatter about it; None if that is more than half of their range, or if it does not turn among them, or there
+    are too few."""
+    if len(places) < ENOUGH:
+        return None
+    curve = np.polynomial.Polynomial.fit(lengths, places, 3)
+    turns = curve.deriv().roots()
+    real = turns.real[np.abs(turns.imag) < 1e-9 * np.ptp(lengths)]
+    inside = real[(real >= lengths.min()) & (real <= lengths.max())]
+    reserve = 2 * _scatter(curve, lengths, places)
+    if not inside.size or reserve > np.ptp(places) / 2:
+        return None
+    length = float(inside[np.abs(inside).argmin()])
+    return Turn(length, float(curve(length)), reserve)
+
+
+def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:
+    """Of values, (n,), about a cubic through them."""
+    return float(np.sqrt(np.sum((values - curve(at)) ** 2) / (len(at) - 4)))

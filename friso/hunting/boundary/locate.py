@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.crossing import SPREAD, Crossing, crossing
+from friso.hunting.boundary.crossing import SPREAD, Crossing, Turn, crossing, turn
 
 Bifurcation = Literal["flip", "fold", "torus"]
 
@@ -26,6 +26,10 @@ way."""
 ALONG = np.array([1.0, 0.0, 0.0])
 """Direction along the key alone, in the space of place, log distance and log time."""
 
+TURNING = 0.03
+"""How far on either side of a fold orbits are looked at where a limiter chatters, in the space of place, log distance
+and log time: the multiplier, over a range of a hundredth of the distance, may be 1 as far as that from it."""
+
 TIGHTER = 0.01
 """Share of the tolerance at which a point is computed again for its error."""
 
@@ -33,9 +37,8 @@ TIGHTER = 0.01
 @dataclass(frozen=True)
 class LocatedPoint:
     """A point at which a branch stops attracting (or begins to), with the direction of the branch there, by how much
-    its place may be off (what the search has left, and the change at a hundredth of the tolerance; of a flip or a torus
-    with a limiter that chatters, the reserve of `smoothed`), and how fast the multiplier changes along that
-    direction."""
+    its place may be off (what the search has left, and the change at a hundredth of the tolerance; with a limiter that
+    chatters, the reserve of `smoothed` or `turned`), and how fast the multiplier changes along that direction."""
 
     kind: Bifurcation
     point: Point
@@ -67,7 +70,7 @@ def _complex(point: Point) -> bool:
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Bifurcation) -> LocatedPoint | None:
     """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
-    direction = _towards(first, second)
+    direction = towards(first, second)
     points = _enclosed(tracer, first, second, kind, PRECISE)
     if points is None:
         return None
@@ -84,7 +87,8 @@ def last_inside(tracer: Tracer, first: Point, second: Point, kind: Bifurcation, 
     return points[max(place for place, point in points.items() if abs(point.multiplier) < 1)]
 
 
-def _towards(first: Point, second: Point) -> np.ndarray:
+def towards(first: Point, second: Point) -> np.ndarray:
+    """The direction from one point of a branch to another."""
     direction = second.vector - first.vector
     return direction / np.linalg.norm(direction)
 
@@ -96,7 +100,7 @@ def _enclosed(
     None if one of them cannot be reached."""
     from scipy.optimize import brentq  # 0.4 s to import
 
-    direction, length = _towards(first, second), float(np.linalg.norm(second.vector - first.vector))
+    direction, length = towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     points: dict[float, Point] = {0.0: first, length: second}
 
     def distance(place_along: float) -> float:
@@ -131,7 +135,9 @@ def _special_point(
 ) -> LocatedPoint:
     """The point with its error; infinite where it cannot be computed at the tighter tolerance, or multipliers scatter
     too much."""
-    if kind != "fold" and tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
+    if tracer.family(np.zeros(1, np.int64), np.array([point.place])).chatters:
+        if kind == "fold":
+            return _turning_point(tracer, point, direction, slope)
         passed = smoothed(tracer, point, kind)
         if passed is None:
             return LocatedPoint(kind, point, direction, np.inf, slope)
@@ -146,19 +152,44 @@ def _special_point(
     )
 
 
+def _turning_point(tracer: Tracer, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
+    """A fold with a limiter that chatters, about a point at which the multiplier is 1."""
+    at = turned(tracer, point, direction)
+    there = at and tracer.solve(point, point.vector + at.length * direction, direction)
+    if not at or not there:
+        return LocatedPoint("fold", point, direction, np.inf, slope)
+    return LocatedPoint("fold", there, direction, max(at.reserve, 2 * abs(there.place - at.place)), slope)
+
+
 def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None:
     """Where on a branch a flip or a torus is, from a curve through the multipliers of orbits within a hundredth of the
     key about a first guess: where a limiter chatters these scatter, and may pass -1 several times. Its reserve is that
     of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
-    orbits: list[Point] = []
-    for way in (-1.0, 1.0):
-        near: Point | None = guess
-        for away in way * np.linspace(0, tracer.hundredth(guess.place), SPREAD // 2 + 1)[1:]:
-            near = near and tracer.solve(near, guess.vector + away * ALONG, ALONG)
-            orbits += [near] if near else []
+    orbits = _beside(tracer, guess, ALONG, tracer.hundredth(guess.place))
     places = np.array([point.place for point in orbits])
     passed = crossing(places, np.array([distance_to(kind, point) for point in orbits]))
     return passed and passed._replace(reserve=max(passed.reserve, abs(passed.place - guess.place)))
+
+
+def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> Turn | None:
+    """Where a branch turns back at a fold, from a curve through the places of orbits about a first guess along a
+    direction: where a limiter chatters the multiplier is that over a range of distances, and passes 1 beside the fold.
+    Its reserve is that of the curve, or the distance to the first guess, if that is larger. None if it is not known."""
+    orbits = _beside(tracer, guess, direction, TURNING)
+    lengths = np.array([(point.vector - guess.vector) @ direction for point in orbits])
+    at = turn(lengths, np.array([point.place for point in orbits]))
+    return at and at._replace(reserve=max(at.reserve, abs(at.place - guess.place)))
+
+
+def _beside(tracer: Tracer, guess: Point, direction: np.ndarray, reach: float) -> list[Point]:
+    """Orbits on either side of a point of a branch along a direction, not farther than `reach`."""
+    orbits: list[Point] = []
+    for way in (-1.0, 1.0):
+        near: Point | None = guess
+        for away in way * np.linspace(0, reach, SPREAD // 2 + 1)[1:]:
+            near = near and tracer.solve(near, guess.vector + away * direction, direction)
+            orbits += [near] if near else []
+    return orbits
 
 
 def corrected(
