@@ -16,14 +16,14 @@ import friso.hunting.cycle.hunting
 from friso.engine.allowance import allowance
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
-from friso.hunting.attractors.rounds import Pending, lengthened
+from friso.hunting.attractors.rounds import TIGHT, Pending, lengthened
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.margin import margin, search_bandwidths
 from friso.hunting.motions import Motions
 from friso.hunting.outward import Beyond, Outward
-from friso.hunting.verdict import WORK, judge_many, judge_runs
+from friso.hunting.verdict import WORK, judge_many, judge_runs, own_motion
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
@@ -508,6 +508,45 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
     assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["transient"]
     with allowance(1):
         assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["failed"]
+
+
+def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_may_come_to_rest() -> None:
+    """The swings repeat themselves every 174 s, but no orbit can be closed from them. Released from 18.7 mm the stage
+    swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it is at rest from 2000 s on."""
+    stage = Stage(
+        masses={"cart": "31.1481 kg", "stage": "34.1805 kg"},
+        friction={
+            "model": "lugre",
+            "static": "251.838 N",
+            "coulomb": "208.989 N",
+            "stribeck_velocity": "0.000459775 m/s",
+            "stribeck_exponent": 2,
+            "viscous": "0 N*s/m",
+            "asymmetry": 0.18000615225799016,
+            "bristle_stiffness": "9.90607e+08 N/m",
+            "bristle_damping": "220012 N*s/m",
+        },
+        joint={
+            "locked": True,
+            "stiffness": "72339.3 N/m",
+            "damping": "52.8925 N*s/m",
+            "stroke": "0.00244296 m",
+            "limiter_stiffness": "1.22219e+09 N/m",
+            "limiter_damping": "81533.2 N*s/m",
+        },
+        controller={
+            "kind": "pid",
+            "crossover": "4.49971 Hz",
+            "alpha": 0.13612704933979777,
+            "beta": 4.330557094225373,
+        },
+        motion={"kind": "release", "displacement": "0.0187486 m", "duration": "20 s"},
+    )
+    target = attractors(held(stage), thorough=True).target.of(0)
+    assert 2 * target.amplitude == pytest.approx(3.4929e-3, rel=1e-3)
+    own = own_motion(stage, target, np.inf, TIGHT)
+    assert own.completed
+    assert not own.ends
 
 
 def test_a_swing_that_grows_without_bound_has_no_size() -> None:

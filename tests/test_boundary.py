@@ -117,18 +117,18 @@ def test_a_branch_whose_places_scatter_turns_within_its_reserve() -> None:
     turns = draws.uniform(-0.01, 0.01, 300)
     branches = [at - (lengths - at) ** 2 + 2e-5 * draws.standard_normal(8) for at in turns]
     sought = [(turn(lengths, places), at) for places, at in zip(branches, turns, strict=True)]
-    met = [(found, at) for found, at in sought if found]
-    assert len(met) > 290
-    assert np.mean([abs(found.place - at) <= found.reserve for found, at in met]) > 0.9
+    reached = [(back, at) for back, at in sought if back]
+    assert len(reached) > 290
+    assert np.mean([abs(back.place - at) <= back.reserve for back, at in reached]) > 0.9
     assert turn(lengths, lengths) is None
 
 
 def test_what_is_simulated_within_the_error_of_a_flip_tells_nothing_of_it(over_crossover: Diagram) -> None:
     """There cycles repel so little that runs may stay on them: hunting ends at the flip, however verdicts alternate."""
     (first,) = [change for change in stability_changes(over_crossover) if not change.begins]
-    ((branch, flip),) = [
-        (number, spot)
-        for number, own in enumerate(over_crossover.special)
+    (flip,) = [
+        spot
+        for own in over_crossover.special
         for spot in own
         if over_crossover.value(spot.point.place) == pytest.approx(first.low, rel=1e-9)
     ]

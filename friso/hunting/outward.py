@@ -174,8 +174,8 @@ class Outward:
                 if end == LOST:
                     reserve = max(reserve, abs(float(suggested.factors[0]) / at - 1))
                 certain = end != UNCLEAR and decided and bool(survey.decided[0])
-                known = at if certain or end == LOST else at * (1 + reserve) ** -self._ahead(at)
-                return AttractionEnd(known, next_to, certain, reserve)
+                inside = at if certain or end == LOST else at * (1 + reserve) ** -self._ahead(at)
+                return AttractionEnd(inside, next_to, certain, reserve)
             (place.at, place.motions), place.outside = closer, next_to
         return self._quiet_from(place.at, place.motions)
 

@@ -152,11 +152,11 @@ class StabilityChange(NamedTuple):
 def stability_changes(result: Diagram) -> list[StabilityChange]:
     """Where hunting begins and ends over the range, in order. Verdicts within the error of a special point tell nothing
     of that: there cycles repel so little that runs may stay on them."""
-    known = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
-    clear = ~np.any([np.abs(result.places - spot.point.place) < spot.error for spot in known], axis=0)
+    special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
+    clear = ~np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
     values = _values(result.space, result.places[:, None])[:, 0]
     verdicts = zip(values.tolist(), place_verdicts(result), np.broadcast_to(clear, len(values)), strict=True)
-    decided = [(value, word == ATTRACTS) for value, word, told in verdicts if told and word in (ATTRACTS, REPELS)]
+    decided = [(value, word == ATTRACTS) for value, word, apart in verdicts if apart and word in (ATTRACTS, REPELS)]
     turns = followed_changes(result)
     changes = []
     for (low, before), (high, after) in pairwise(decided):

@@ -28,8 +28,9 @@ PATIENT = 3.0
 BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 """Distances from which a motion that was observed is tried again, in units of its own."""
 
-WAITED = 6.0
-"""Periods, however long, that are waited for at least."""
+WAITED, UNCLOSED = 6.0, 24.0
+"""Periods, however long, that are waited for at least, of what attracts as a closed orbit and of what was observed: of
+that it is not known how slowly motions leave what is beside it."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +82,8 @@ class Attractors:
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
             constants = CONSTANTS * motion.time_constant / unit
-            until = max(np.clip(np.nan_to_num(constants), *PERIODS) * unit, WAITED * motion.period)
+            waited = (UNCLOSED if motion.cycles is None else WAITED) * motion.period
+            until = max(np.clip(np.nan_to_num(constants), *PERIODS) * unit, waited)
             lasting[k] = np.fmax(lasting[k], until)
             early[k] = np.fmax(early[k], EARLY * until if constants < PERIODS[1] else until)
         return Target(amplitude, period, lasting, early)

@@ -41,7 +41,7 @@ def crossing(places: np.ndarray, values: np.ndarray) -> Crossing | None:
     return Crossing(place, reserve, slope) if reserve <= np.ptp(places) / 2 else None
 
 
-class Turn(NamedTuple):
+class FoldBack(NamedTuple):
     """A length along a branch at which it turns back, its place there, and by how much that may be off."""
 
     length: float
@@ -49,7 +49,7 @@ class Turn(NamedTuple):
     reserve: float
 
 
-def turn(lengths: np.ndarray, places: np.ndarray) -> Turn | None:
+def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     """Where the cubic through places, (n,), over lengths turns, nearest to length 0. The place may be off by twice what
     they scatter about it; None if that is more than half of their range, or if it does not turn among them, or there
     are too few."""
@@ -63,7 +63,7 @@ def turn(lengths: np.ndarray, places: np.ndarray) -> Turn | None:
     if not inside.size or reserve > np.ptp(places) / 2:
         return None
     length = float(inside[np.abs(inside).argmin()])
-    return Turn(length, float(curve(length)), reserve)
+    return FoldBack(length, float(curve(length)), reserve)
 
 
 def _scatter(curve: np.polynomial.Polynomial, at: np.ndarray, values: np.ndarray) -> float:

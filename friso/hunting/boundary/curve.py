@@ -58,6 +58,8 @@ class Spot:
     @property
     def error(self) -> np.ndarray:
         """By how much it may be off along each key, shape (2,)."""
+        if not np.isfinite(self.special.error):
+            return np.full(2, np.inf)
         return np.abs(self.special.error * self.across)
 
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.crossing import SPREAD, Crossing, Turn, crossing, turn
+from friso.hunting.boundary.crossing import SPREAD, Crossing, FoldBack, crossing, turn
 
 Bifurcation = Literal["flip", "fold", "torus"]
 
@@ -171,7 +171,7 @@ def smoothed(tracer: Tracer, guess: Point, kind: Bifurcation) -> Crossing | None
     return passed and passed._replace(reserve=max(passed.reserve, abs(passed.place - guess.place)))
 
 
-def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> Turn | None:
+def turned(tracer: Tracer, guess: Point, direction: np.ndarray) -> FoldBack | None:
     """Where a branch turns back at a fold, from a curve through the places of orbits about a first guess along a
     direction: where a limiter chatters the multiplier is that over a range of distances, and passes 1 beside the fold.
     Its reserve is that of the curve, or the distance to the first guess, if that is larger. None if it is not known."""

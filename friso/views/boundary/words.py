@@ -234,9 +234,13 @@ def _curve(line: Line, keys: tuple[ShownKey, ...], space: Space) -> str:
     """How many points a curve has, where it runs, how it ends, and its largest errors."""
     sides = zip(keys, line.at.T, space.ranges, strict=True)
     extents = ", ".join(f"{key.key} {key.extent(values, swept)}" for key, values, swept in sides)
-    errors = ", ".join(key.text(error, 1) for key, error in zip(keys, line.error.max(axis=0), strict=True))
+    finite = line.error[np.isfinite(line.error).all(axis=1)]
+    errors = ", ".join(key.text(error, 1) for key, error in zip(keys, finite.max(axis=0, initial=0.0), strict=True))
     head = f"{line.kinds[0].capitalize()} of {CYCLES[line.shape]}: {len(line.at)} points, {extents}"
-    return f"{head}{_ends(line)}; largest error: {errors}."
+    unknown = len(line.error) - len(finite)
+    errors_at = [f"largest error: {errors}"] if len(finite) else []
+    errors_at += [f"error unknown at {unknown} of the points"] if unknown else []
+    return f"{head}{_ends(line)}; {', '.join(errors_at)}."
 
 
 def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
