@@ -19,7 +19,7 @@ CASES = {
     "app": 25,
     "arguments": 25,
     "options": 12,
-    "binary-logs": 20,
+    **dict.fromkeys(campaign.BINARY_LOGS, 5),
     "logs": 40,
     "stores": 20,
     "store-faults": 8,

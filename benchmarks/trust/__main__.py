@@ -14,7 +14,7 @@ from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 
 from benchmarks.report import print_table
-from benchmarks.trust.campaign import COMMANDS, HEAVY, NAMES, Part, run_part
+from benchmarks.trust.campaign import BINARY_LOGS, COMMANDS, HEAVY, NAMES, Part, run_part
 
 SHARE = 6
 """How much more time a campaign of light cases may take than one of heavy cases; what is left of it is the next's."""
@@ -23,8 +23,12 @@ PART = {name: 1 if name in COMMANDS else 10 for name in HEAVY}
 """How many cases are run in one go; of light ones 100."""
 
 
-GROUPS = {"light": [name for name in NAMES if name not in COMMANDS], "heavy": [*COMMANDS]}
-"""Campaigns that have a name together: those within this process, and those of commands as processes."""
+GROUPS = {
+    "light": [name for name in NAMES if name not in COMMANDS],
+    "heavy": [*COMMANDS],
+    "binary-logs": BINARY_LOGS,
+}
+"""Campaigns that have a name together: those within this process, those of commands as processes, binary logs."""
 
 
 def main() -> int:
@@ -80,7 +84,9 @@ def _parts(name: str, seed: int, numbers: range, jobs: int, end: float) -> Itera
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.trust", description=__doc__)
-    parser.add_argument("campaigns", nargs="*", metavar="CAMPAIGN", help=f"light, heavy, or of {', '.join(NAMES)}")
+    parser.add_argument(
+        "campaigns", nargs="*", metavar="CAMPAIGN", help=f"{', '.join(GROUPS)}, or of {', '.join(NAMES)}"
+    )
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--cases", type=int, default=16_000, help="of each campaign of light cases")
     parser.add_argument("--minutes", type=float, default=10.0, help="in all")

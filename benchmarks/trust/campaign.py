@@ -21,7 +21,7 @@ from benchmarks.trust.arguments import ARGUMENTS
 from benchmarks.trust.commands import COMMANDS, LeftOut
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.questions import questions
-from benchmarks.trust.readers import READERS
+from benchmarks.trust.readers import BINARY, READERS
 from benchmarks.trust.writing import WRITING
 from friso.errors import InputError
 
@@ -38,7 +38,10 @@ CASES: dict[str, Case] = {**ARGUMENTS, "app": questions, **WRITING, **COMMANDS}
 NAMES = (*READERS, *CASES)
 """All campaigns."""
 
-HEAVY = {"binary-logs": 8, "arguments": 8, "options": 32, "app": 8, "stores": 16, "store-faults": 32,
+BINARY_LOGS = [f"{kind}-logs" for kind in BINARY]
+"""Those of binary logs."""
+
+HEAVY = {**dict.fromkeys(BINARY_LOGS, 8), "arguments": 8, "options": 32, "app": 8, "stores": 16, "store-faults": 32,
          "store-views": 16, "store-exchanges": 32, "store-versions": 8, **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
 """By how much fewer the cases of a campaign are whose cases take long."""
 

@@ -10,7 +10,7 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -119,8 +119,8 @@ def _texts() -> list[bytes]:
     return [text.encode() for text in texts]
 
 
-def _binaries() -> list[bytes]:
-    """What the programs of measurement write, as the tests make it: MAT files of three kinds, TDMS, UFF and LVM."""
+def _binaries(kind: str) -> list[bytes]:
+    """What the programs of measurement write, as the tests make it: MAT files of four kinds, TDMS, UFF and LVM."""
     motion = log_files.motion(200)
     time, names = motion["time"], ("position", "force")
     plain = {name: motion[name] for name in names}
@@ -136,7 +136,7 @@ def _binaries() -> list[bytes]:
             log_files.write_uff(Path(folder, "f.uff"), time, units),
             log_files.write_lvm(Path(folder, "g.lvm"), units),
         ]
-        return [path.read_bytes() for path in paths]
+        return [path.read_bytes() for path in paths if path.suffix == f".{kind}"]
 
 
 def _axis(path: Path) -> None:
@@ -151,6 +151,9 @@ AXES = [
     b"joint.stroke=0.1 mm, 0.3 mm",
     b"joint.locked=true, false",
 ]
+
+BINARY = ("mat", "tdms", "uff", "lvm")
+"""Formats of binary logs."""
 
 READERS = {
     "stages": Reader("stage.toml", _stages, _stage),
@@ -171,6 +174,6 @@ READERS = {
     ),
     "axes": Reader("axis.txt", lambda: AXES, _axis),
     "logs": Reader("log.csv", _texts, _log),
-    "binary-logs": Reader("log.bin", _binaries, _binary_log),
+    **{f"{kind}-logs": Reader("log.bin", partial(_binaries, kind), _binary_log) for kind in BINARY},
 }
 """The kinds by the name of their campaign."""
