@@ -588,9 +588,13 @@ def test_mapping_in_another_folder(tmp_path: Path) -> None:
         place = mappings.place_for(log, tmp_path)
     finally:
         folder.chmod(0o700)
-    assert place == tmp_path / "a.csv.friso.toml"
+    assert place.parent == tmp_path
     place.write_text(mappings.mapping_text(Mapping({"position": "x"})), encoding="utf-8")
     assert mappings.load_mapping(log, tmp_path) == Mapping({"position": "x"})
+    assert mappings.load_mapping(tmp_path / "another" / "a.csv", tmp_path) is None
+    long, alike = (mappings.sidecar(folder / f"{'n' * 240}{end}.csv", tmp_path) for end in "12")
+    assert long != alike
+    assert len(long.name) < 200
 
 
 def test_what_is_said_now_silences_what_was_kept() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import stat
 from collections.abc import Iterable
@@ -129,8 +130,16 @@ def option(name: str, left: str, right: str) -> str:
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:
-    """Where the mapping of a log is kept: beside it, or in the folder given."""
-    return (log.parent if folder is None else folder) / f"{log.name}{SUFFIX}"
+    """Where the mapping of a log is kept: beside it, or in a folder, where logs of the same name from other folders,
+    and those whose long names begin alike, have theirs too."""
+    if folder is None:
+        return log.parent / f"{log.name}{SUFFIX}"
+    own = hashlib.sha256(os.fsencode(os.path.abspath(log))).hexdigest()[:8]
+    return folder / f"{log.name.encode(errors='ignore')[:_LONGEST].decode(errors='ignore')}.{own}{SUFFIX}"
+
+
+_LONGEST = 150
+"""Bytes of the name of a log at most in that of its mapping elsewhere."""
 
 
 def mapping_text(mapping: Mapping) -> str:
