@@ -28,7 +28,7 @@ def guideline(
 
     Example: friso guideline --out guideline
 
-    A quick try: friso guideline --samples 64 --out /tmp/guideline
+    A quick try: friso guideline --samples 64 --out guideline
     """
     from friso.answers.guideline import guideline as question
     from friso.answers.output_folder import UNFINISHED
