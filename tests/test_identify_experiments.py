@@ -29,6 +29,7 @@ from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.readings.rate_effect import break_away, share_below, static_friction
 from friso.identification.response.fitting import ResponseFit
+from friso.identification.sources import recognised
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
     SLOW,
@@ -152,6 +153,7 @@ def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Sta
         assert steps.up.value == pytest.approx(steps.down.value, rel=5e-3)
         assert steps.cart_fixed is None
         wording(steps.warnings[0])
+        assert recognised(log, Path("steps.csv"))[0] == ("steps" if leave_out else "moves")
 
 
 def test_hysteresis_shows_in_steps(rig: friso.Stage) -> None:

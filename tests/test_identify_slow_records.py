@@ -11,9 +11,11 @@ import pytest
 from friso.identification.doubts import quality_of
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
+from friso.identification.output_error.break_aways import exceeded_at_break_away
 from friso.identification.output_error.drawn import DRAWS, drawn_from
 from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
 from friso.identification.readings.common import record
+from friso.identification.readings.ramps import Ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.identification.stage_file import made_up
 
@@ -97,3 +99,20 @@ def test_a_record_that_the_whole_model_alone_describes_is_described(left: float,
     assert quality.failed == failed
     assert not quality.rejected
     assert bool(quality.without) == doubted
+
+
+def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
+    """A body that sticks without bristles: its Stribeck curve, seen in motion alone, led to too little."""
+    static = Estimate("friction.static", "N", 11.3, 10.7, 11.9, "output error")
+    bias = Estimate("bias.cart", "N", 1.0, 0.9, 1.1, "output error")
+
+    def ramps(level: float, count: int = 6) -> Ramps:
+        directions = np.where(np.arange(count) % 2, 1.0, -1.0)
+        forces = level * np.array([1, 1.01, 0.8, 0.99, 1, 1.02])[:count] - directions
+        rest = [np.zeros(count)] * 2
+        return Ramps(*rest, directions, forces, np.ones(count), np.full(count, 0.1), np.zeros(count), 0.0, ())
+
+    assert exceeded_at_break_away([static, bias], ramps(13.9), "N").keys() == {RATIO, STRIBECK.name}
+    assert not exceeded_at_break_away([static, bias], ramps(11.9), "N")
+    assert not exceeded_at_break_away([static, bias], ramps(13.9, 2), "N")
+    assert not exceeded_at_break_away([bias], ramps(13.9), "N")

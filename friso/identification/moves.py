@@ -24,6 +24,7 @@ from friso.identification.model_error import (
     with_possible_values,
     without_bristles,
 )
+from friso.identification.output_error.break_aways import exceeded_at_break_away
 from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
 from friso.identification.output_error.compliance import WORTH_TELLING, with_compliance
 from friso.identification.output_error.coverage import Coverage, coverage
@@ -37,6 +38,7 @@ from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import estimates_of
 from friso.identification.quality import Quality, noise_of
+from friso.identification.readings.ramps import force_ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.progress import Progress, silent
 from friso.quantities import percent
@@ -114,7 +116,13 @@ def identify_moves(
     if not (quality.failed or quality.rejected or is_free(flat)):
         fit, quality = _with_compliance(fit, quality, log["position"][part], log.sample_time, inverse.bandwidth)
     fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
-    estimates, correlation = estimates_of(replace(answer, fit=fit), covered)
+    answer = replace(answer, fit=fit)
+    estimates, correlation = estimates_of(answer, covered)
+    if not (is_free(flat) or (fit.problem.closed and fit.explains(noise))):
+        refuted = exceeded_at_break_away(
+            estimates, force_ramps(log.per_unit_of_force(), fit.value(MASS)), log.unit("force")
+        )
+        estimates, correlation = estimates_of(replace(answer, refuted=refuted), covered)
     if quality.failed:
         estimates, correlation = not_described(estimates)
     elif quality.rejected:

@@ -85,21 +85,26 @@ def identify(
     options = {"stage": stage, "set": overrides, "as_": kind, "map": maps, "unit": units, "scale": scales, "dt": dt}
     options |= {"axis": axis, "predict": predict or [], "bandwidth": bandwidth, "band": band, "period": period}
     options |= {"laws": laws}
+    kept: list[Path] = []
     with ProgressBar(lines=PIPED) as progress, named_as_options(options):
         try:
             answer = question(
-                logs, **options, folder=target.folder, keep=lambda said: _keep(said, target), progress=progress
+                logs,
+                **options,
+                folder=target.folder,
+                keep=lambda said: kept.extend(_keep(said, target)),
+                progress=progress,
             )
         except OpenQuestions as error:
             _keep(error.mappings, target)
             raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
         speak_of(answer.axis_kind)
         files, unwritten = tried(lambda: target.write(answer.files(), progress))
-    show(answer, files, as_json, details, unwritten)
+    show(answer, [*files, *kept] if files else [], as_json, details, unwritten)
 
 
-def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
-    """Keep what was said of logs, by file, for the next time, where it is not kept so already."""
+def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> list[Path]:
+    """Keep what was said of logs, by file, for the next time, where it is not kept so already: the files written."""
     from friso.answers.output_folder import write
     from friso.identification.logs.mapping import load_mapping, mapping_text
     from friso.identification.sources import kept_at
@@ -115,6 +120,7 @@ def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
         target.write({}, beside=texts)  # so that the folder is known for its own next time
     else:
         write(texts, [*filter(Path.is_file, texts)])  # mappings too, as they could be read
+    return [*texts]
 
 
 def _command(options: Sequence[str]) -> str:

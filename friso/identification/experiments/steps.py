@@ -28,6 +28,7 @@ from friso.identification.readings.common import (
     low_pass,
     runs,
 )
+from friso.identification.readings.course import Course
 from friso.stage import Stage
 
 CUTOFF = 25.0
@@ -236,4 +237,11 @@ def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ..
     return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
 
 
-KIND = ExperimentKind[StepStiffness](_analyse, _estimates)
+def _claims(course: Course) -> str | None:
+    """The position rests in several places, without a reference that moves, and the force rises with the place."""
+    if course.reference_moves or not course.against_a_spring:
+        return None
+    return "the position rests here and there, and the force follows from the place, as against a spring"
+
+
+KIND = ExperimentKind[StepStiffness](_analyse, _estimates, claims=_claims)

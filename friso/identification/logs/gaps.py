@@ -12,7 +12,7 @@ from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.checks import samples_held
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import option
-from friso.identification.logs.roles import AssignedRole, Proposal, is_wanted, listing, role_of, words
+from friso.identification.logs.roles import MEASURED, AssignedRole, Proposal, is_wanted, listing, role_of, words
 from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
 from friso.identification.logs.units import OTHERS, in_si, unit_factor
 from friso.quantities import quoted
@@ -58,6 +58,11 @@ class GapsError(LogError):
 def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> None:
     """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
     table, origin = reading.table, reading.origin
+    signals = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
+    if len(signals) < len(needed):
+        names = ", ".join(channel.name for channel in signals) or "none"
+        expected = f"channels for {' and '.join(needed)}: export the log with these"
+        raise LogError("log", f"too few channels of signals: {names}", expected, "", origin)
     chosen = {role: choice for role, choice in proposal.chosen.items() if role in (*needed, "force")}
     gaps: list[LogError] = []
     for role, channels in proposal.rivals.items():
@@ -117,11 +122,14 @@ def _likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> tupl
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
-    """Of the channels that move as the best for a position does, the one with the most noise, as what is measured has,
-    and why; None where that cannot be told."""
+    """Of the channels that move as the best for a position does, the only one whose name says that it was measured, or
+    the one with the most noise, as what is measured has, and why; None where that cannot be told."""
     alike = [channel for channel in channels if channel is best or _are_alike(channel, best)]
     if role != "position" or len(alike) == 1:
         return best, ""
+    said = [channel for channel in alike if MEASURED.intersection(words(channel.name))]
+    if len(said) == 1:
+        return said[0], f"; the name of {quoted(said[0].name)} says that it was measured"
     (most, noisiest), (next_most, _) = sorted(((_noise(c), c) for c in alike), key=lambda pair: -pair[0])[:2]
     others = " and ".join(quoted(channel.name) for channel in alike if channel is not noisiest)
     if most < 2 * next_most or any(samples_held(channel.values) > 1 for channel in alike):

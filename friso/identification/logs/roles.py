@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
@@ -17,6 +18,7 @@ _SET = frozenset(
     [
         "ref", "reference", "set", "setpoint", "setpos", "sp", "des", "desired", "target", "cmd", "command",
         "commanded", "demand", "demanded", "nominal", "traj", "trajectory", "profile", "soll", "consigne", "consigna",
+        "comandata", "comando", "comandada", "riferimento", "referencia", "desiderata", "deseada",
     ]
 )  # fmt: skip
 _NOT_MEASURED = frozenset(
@@ -60,21 +62,59 @@ _KEYS = {
         ]
     ),
     "velocity": frozenset(
-        ["vel", "velo", "velocity", "speed", "geschwindigkeit", "vitesse", "velocidad", "velocidade"]
+        [
+            "vel",
+            "velo",
+            "velocity",
+            "speed",
+            "geschw",
+            "geschwindigkeit",
+            "vitesse",
+            "velocidad",
+            "velocidade",
+            "velocita",
+        ]
     ),
     "acceleration": frozenset(["acc", "accel", "acceleration"]),
     "force": frozenset(
-        ["force", "torque", "current", "iq", "kraft", "strom", "drehmoment", "forza", "fuerza", "forca"]
+        [
+            "force",
+            "torque",
+            "current",
+            "iq",
+            "kraft",
+            "strom",
+            "drehmoment",
+            "forza",
+            "fuerza",
+            "forca",
+            "corrente",
+            "corriente",
+            "courant",
+            "coppia",
+        ]
     ),
     "disturbance": frozenset(["disturbance", "injected", "injection"]),
 }
 """Words in a name that tell what a channel is."""
 
+_LETTERS = {"position": "sxyz", "velocity": "v", "acceleration": "a", "force": "fim"}
+"""Symbols in a name that tell what a channel is where a word of what is wanted or what is stands behind them."""
+
+MEASURED = frozenset(
+    ["ist", "act", "actual", "fbk", "meas", "measured", "mes", "mesure", "mesuree", "real", "reale", "reel", "reelle"]
+)
+"""Words of what is, and was measured."""
+
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A")}
 """Units that tell a role where a single channel without one has them."""
 
-_GERMAN = re.compile(r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?")
-"""Names that begin with what is wanted or what is, or end with it: Sollposition, Istposition, Lagesollwert."""
+_GERMAN = re.compile(
+    r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?"
+    r"|(?:motor|antriebs?)(?P<of_motor>strom|kraft|drehmoment)"
+)
+"""Names that begin with what is wanted or what is, or end with it, and those of a motor's channels: Sollposition,
+Istposition, Lagesollwert, Motorstrom."""
 
 
 @dataclass(frozen=True)
@@ -108,6 +148,7 @@ def role_of(name: str) -> tuple[str, str] | None:
     if name_words & _NOT_MEASURED:
         return None
     key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
+    key |= {} if any(key.values()) else _symbol(parts)
     if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
         return "time", key["time"]
     wanted = next((part for part in parts if part in _SET), "d" if key["position"] and parts[-1] == "d" else "")
@@ -121,6 +162,15 @@ def role_of(name: str) -> tuple[str, str] | None:
     return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
 
 
+def _symbol(parts: Sequence[str]) -> dict[str, str]:
+    """What a symbol before a word of what is wanted or what is tells, by its role: v_ist, xSoll."""
+    for letter, word in pairwise(parts):
+        role = next((role for role, letters in _LETTERS.items() if letter in letters), "")
+        if role and len(letter) == 1 and word in _SET | MEASURED:
+            return {role: f"{letter} {word}"}
+    return {}
+
+
 def is_wanted(name: str) -> bool:
     """Whether a name tells, or hints within a word, that it is what was wanted, and was not measured."""
     return any(word in (name.lower() if len(word) > 2 else words(name)) for word in _SET)
@@ -132,11 +182,18 @@ def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel
     for matches in ([c for c in table.channels if c.name == name], [c for c in table.channels if c.name == plain]):
         if len(matches) == 1:
             return matches[0]
-    names = [channel.name for channel in table.channels]
-    near = difflib.get_close_matches(name, names, 1, 0.6)
-    nearest = near[0] if near else names[0]
+    nearest = _nearest(table, name, role)
     example = f'--unit "{nearest}"=mm' if role == "unit" else f'--map {role}="{nearest}"'
     raise LogError(role, f"{quoted(name)}, which the log does not contain", listing(table), example, origin)
+
+
+def _nearest(table: ChannelTable, name: str, role: str) -> str:
+    """The name of the channel that is likely meant: one of that role, else one that is no clock, or the most alike."""
+    meant = {channel.name: (role_of(channel.name) or ("",))[0] for channel in table.channels}
+    fitting = [one for one, its in meant.items() if its == role] or [one for one, its in meant.items() if its != "time"]
+    written = {one.lower(): one for one in fitting or meant}
+    near = difflib.get_close_matches(name.lower(), list(written), 1, 0.6)
+    return written[near[0]] if near else next(iter(written.values()))
 
 
 def listing(table: ChannelTable) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -39,11 +39,13 @@ SHARP = 3.0
 @dataclass(frozen=True)
 class IdentifiableFit:
     """The fit, profiles by name of the parameters that not every motion shows, where they were asked about, and which
-    of these the record does show."""
+    of these the record does show; `refuted` are parameters that something else in the record contradicts, with the
+    reason."""
 
     fit: OutputErrorFit
     profiles: Mapping[str, Profile]
     shown: frozenset[str]
+    refuted: Mapping[str, str] = field(default_factory=dict)
 
 
 def fit_identifiable(

@@ -69,7 +69,7 @@ def _reasons(identified: IdentifiableFit, covered: Coverage) -> dict[str, str]:
         name: why_not_shown(name, covered)
         for name, parameter in parameters.items()
         if name not in identified.shown and not parameter.core
-    }
+    } | dict(identified.refuted)
     for number, deviation in zip(fit.free, np.sqrt(np.diag(fit.covariance)), strict=True):
         parameter = fit.problem.parameters[number]
         most = MOST if parameter.logarithmic else (parameter.high - parameter.low) / 2

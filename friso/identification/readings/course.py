@@ -10,6 +10,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from friso.errors import InputError
 from friso.identification.logs.log import Log
+from friso.identification.readings.common import runs
 from friso.identification.readings.passes import passes
 from friso.identification.response.period import find_periods
 
@@ -21,6 +22,13 @@ STILL = 0.01
 
 MOSTLY = 0.75
 """Share of the way that is most of it (our choice; of moves it is a sixth to a half that goes at constant speed)."""
+
+AGAINST, PLATEAUS = 0.99, 4
+"""Share of the force's variance from rest to rest that the place explains at least where a spring holds it, and rests
+that it takes."""
+
+LONG = 0.01
+"""Share of a log for which a position that rests does so."""
 
 BLUR = 20
 """Samples over which a position is averaged, for the way that it goes not to be that of its noise."""
@@ -77,6 +85,23 @@ class Course:
         way = float(np.abs(np.diff(uniform_filter1d(position[part], BLUR))).sum())
         gone = sum(float(np.ptp(position[stretch.span])) for stretch in steady)
         return np.array([abs(stretch.velocity) for stretch in steady if gone > MOSTLY * way])
+
+    @cached_property
+    def against_a_spring(self) -> bool:
+        """Whether nothing but the place tells the force with which the position rests here and there."""
+        part = self.log.longest
+        position, force = self.log["position"][part], self.log["force"][part]
+        size = max(int(LONG * len(position)), 2)
+        still = maximum_filter1d(position, size) - minimum_filter1d(position, size) < STILL * np.ptp(position)
+        later = [
+            slice((rest.start + rest.stop) // 2, rest.stop) for rest in runs(still) if rest.stop - rest.start > size
+        ]
+        if len(later) < PLATEAUS:
+            return False
+        places, forces = (np.array([values[rest].mean() for rest in later]) for values in (position, force))
+        if not (np.ptp(places) > 0 and np.ptp(forces) > 0):
+            return False
+        return bool(np.corrcoef(places, forces)[0, 1] ** 2 > AGAINST)
 
     @property
     def repeats(self) -> str:

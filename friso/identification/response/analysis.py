@@ -74,13 +74,20 @@ def analyse(
     warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
     first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
+    if model and band is None and _below(model, first):
+        model = _attempt(warnings, "two masses", fit_two_mass, driven, other, None)
     departs = _attempt(warnings, "departure", departure, driven, model.predict) if model else None
     used = band or _above(driven, departs)
     if model and len(logs) > 1:
         model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
+    if model and _below(model, used):
+        place = f"an antiresonance at {model['antiresonance frequency'].value:.3g} Hz"
+        warnings.append(f"no two masses: {place}, below the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
+        model = None
     upper = driven.between(*used)
     drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
     modes = _attempt(warnings, "modes", fit_modes, upper)
+    warnings += model.warnings if model else ()
     return Bench(
         tuple(logs), driven, other, used,
         _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
@@ -151,6 +158,11 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
     good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
     usable = [response.at(np.isin(response.frequency, good)) for response in responses]
     return usable[0], usable[1] if len(usable) > 1 else None
+
+
+def _below(model: TwoMass, band: FrequencyRange) -> bool:
+    """Whether a two-mass model puts its antiresonance below a band [Hz], where nothing of the response tells of it."""
+    return not model["antiresonance frequency"].value >= band[0]
 
 
 def _above(driven: FrequencyResponse, departs: Departure | None) -> FrequencyRange:

@@ -68,15 +68,23 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
     spacings = np.array([realisation.frequency[0] for realisation in records])
     apart = float(np.ptp(spacings) / spacings.min())
-    if apart > CLOCKS or len({len(realisation.frequency) for realisation in records}) > 1:
+    counts = np.array([len(realisation.frequency) for realisation in records])
+    if apart > CLOCKS or np.ptp(counts) > 1 + CLOCKS * counts.min():
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
     if apart <= EQUAL:
         return records, []
     mean = float(spacings.mean())
-    lines = np.arange(1, len(records[0].frequency) + 1) * mean
+    records = [_first_lines(realisation, int(counts.min())) for realisation in records]
+    lines = np.arange(1, counts.min() + 1) * mean
     remark = f"the periods of the records differ by {1e6 * apart:.3g} ppm, as clocks do: {1 / mean:.6g} s is used"
     return [replace(realisation, frequency=lines) for realisation in records], [remark]
+
+
+def _first_lines(realisation: Spectra, count: int) -> Spectra:
+    """The first so many lines of a realisation."""
+    names = ("frequency", "reference", "excited", "input", "output")
+    return replace(realisation, **{name: getattr(realisation, name)[..., :count] for name in names})
 
 
 def _averaged(records: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

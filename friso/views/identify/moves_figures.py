@@ -11,7 +11,7 @@ from friso.identification.output_error.parameters import FitParameter
 from friso.identification.output_error.problem import Simulated
 from friso.identification.output_error.profile import Profile
 from friso.identification.quality import steady_friction
-from friso.identification.readings.common import cart, on_bearing
+from friso.identification.readings.common import cart, low_pass, on_bearing
 from friso.views.drawing.figure import (
     BLUE,
     GREY,
@@ -29,7 +29,7 @@ from friso.views.drawing.figure import (
 )
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.kind_view import TIME
-from friso.views.identify.numbers import name_of, unit_of
+from friso.views.identify.numbers import digits, name_of, unit_of
 
 FORCE = "force"
 """Name of the figure that opens the page."""
@@ -109,7 +109,7 @@ def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, .
 
 
 def _both(time: Array, measured: Array, simulated: Array, word: str) -> tuple[Series, ...]:
-    return Series(time, measured, "measured", GREY, width=1.6), Series(time, simulated, word, BLUE, width=0.9)
+    return Series(time, measured, "measured", GREY, width=2.0), Series(time, simulated, word, VERMILLION, width=0.8)
 
 
 def _difference(time: Array, left: Array, unit: str) -> Panel:
@@ -135,11 +135,12 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     """Force less inertia over velocity, and the friction found."""
     flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
+    step, cutoff = moves.log.sample_time, SMOOTH * moves.inverse.bandwidth
     moved, stage = (
-        motion(position[moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
-        for position in (on_bearing(moves.log), moves.log["position"])
+        motion(position[moves.part], step, cutoff) for position in (on_bearing(moves.log), moves.log["position"])
     )
-    friction = moves.log["force"][moves.part] - masses[0] * moved.acceleration - masses[1] * stage.acceleration
+    force = low_pass(moves.log["force"][moves.part], step, cutoff)
+    friction = force - masses[0] * moved.acceleration - masses[1] * stage.acceleration
     inner = slice(EDGE, -EDGE)  # at the ends of a record the filter swings in
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
@@ -154,7 +155,10 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
     axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", moves.force_unit, (-reach, reach))
     unshown = any(estimate.name == "friction.static" and not estimate.determined for estimate in moves.estimates)
-    caption = "Loops: measured force less mass times acceleration; they open where the motion reverses."
+    caption = (
+        f"Loops: measured force less mass times acceleration, both below {digits(cutoff, 'Hz')}; they open where the "
+        "motion reverses."
+    )
     if sides:
         caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, without steady motion"
         caption += ", where a Stribeck effect would not show." if unshown else "."

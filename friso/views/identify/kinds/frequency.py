@@ -72,8 +72,16 @@ def _headline(bench: Bench) -> str:
     modes = f"Frequency response: {'; '.join(sentences)}." if sentences else ""
     if units == ("N", "m"):
         return modes
-    scale = f"The force is in {units[0]} and the motion in {units[1]}: masses and stiffness need N and m to enter "
-    return f"{modes} {scale}the stage file (--scale).".strip()
+    return f"{modes} {_without_units(*units)}".strip()
+
+
+def _without_units(force: str, motion: str) -> str:
+    """What units, "1" where the log states none, keep masses and stiffness out of the stage file."""
+    wanted = "masses and stiffness need N and m to enter the stage file"
+    silent = " and the ".join(name for name, unit in (("force", force), ("motion", motion)) if unit == "1")
+    if silent:
+        return f"The log states no unit for the {silent}: {wanted} (--unit, --scale)."
+    return f"The force is in {force} and the motion in {motion}: {wanted} (--scale)."
 
 
 def _outputs(errors: Sequence[float]) -> str:

@@ -22,6 +22,9 @@ from friso.views.identify.kind_view import Facts, KindView, PredictionView
 from friso.views.identify.moves_figures import FORCE, moves_figures, record_panels
 from friso.views.identify.numbers import digits, estimates_in_words, with_interval, within
 
+FALLING = "viscous friction below zero: friction falls as the speed rises (Stribeck effect), which this model lacks"
+"""What a negative viscous friction of the inverse model means."""
+
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
     """How it was fitted, and what the motion covers."""
@@ -73,7 +76,9 @@ def _errors(moves: IdentifiedMoves) -> str:
 
 
 def _inverse_text(model: InverseModel) -> str:
-    return f"{estimates_in_words(model.estimates)}; force error {percent(model.error, 3)}"
+    text = f"{estimates_in_words(model.estimates)}; force error {percent(model.error, 3)}"
+    falling = any(name.startswith("viscous") and value < 0 for name, value in model.solution.items())
+    return f"{text}; {FALLING}" if falling else text
 
 
 def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:

@@ -1,0 +1,40 @@
+"""Whether the friction with which motions begin exceeds the static friction of a fit that leaves these moments out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.identification.estimate import Estimate
+from friso.identification.output_error.identifiable import STRIBECK
+from friso.identification.readings.common import robust
+from friso.identification.readings.ramps import Ramps
+from friso.intervals import COVERAGE
+
+FEW = 3
+"""Break-aways that say something, at least."""
+
+MEDIAN = 1.25
+"""Deviation of a median over that of a mean, of normal errors."""
+
+
+def exceeded_at_break_away(estimates: Sequence[Estimate], ramps: Ramps, unit: str) -> dict[str, str]:
+    """Why static friction and the Stribeck velocity are not to be believed, where motions begin with more friction than
+    the interval of the former holds; empty where they do not.
+
+    A stage that follows a log shows friction while it moves, and the Stribeck curve leads from there to standstill: of
+    a body that sticks by another law, or by a curve with another exponent, it leads to a static friction too low.
+    """
+    names = {estimate.name: estimate for estimate in estimates if estimate.determined}
+    static = names.get("friction.static")
+    if static is None or len(ramps.forces) < FEW:
+        return {}
+    bias = sum(one.value for name, one in names.items() if name.startswith("bias."))
+    friction = ramps.forces + ramps.directions * bias
+    middle = float(np.median(friction))
+    unsure = COVERAGE * MEDIAN * robust(friction) / np.sqrt(len(friction)) + float(np.median(ramps.unsure))
+    if middle - unsure <= static.high:
+        return {}
+    why = f"motions begin with {middle:.3g} {unit} of friction, more than the {static.value:.3g} {unit} of the fit"
+    return dict.fromkeys(STRIBECK, why)

@@ -1,0 +1,113 @@
+"""Ramps of the force from rest, each until the body moves off: how much friction there is as motion begins."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identification.logs.log import Log
+from friso.identification.readings.common import channel, low_pass, on_bearing
+from friso.identification.readings.peaks import peak, smoothed
+from friso.identification.readings.slips import slips
+
+CUTOFF = 100.0
+"""Low-pass of force and velocity [Hz]."""
+
+SMEARED = 2.0
+"""Periods of the low-pass that the second half of a ramp must last for its break-away to be read."""
+
+
+SAMPLES = 5
+"""Samples of the second half of a ramp from which its rate is read."""
+
+BROAD = 40
+"""To see where its second half begins the push is smoothed over one in so many samples of the rest and the ramp."""
+
+LEAST = 20
+"""Samples of a segment that may hold a ramp."""
+
+
+FROM = 0.5
+"""Share of its force at the break-away from below which a ramp rises: our choice. A body that stops within a ramp and
+goes on has its bristles bent already."""
+
+
+@dataclass(frozen=True)
+class Ramps:
+    """Per ramp, shape (n,): time [s], place [m], direction, break-away force [N] in that direction, force rate [N/s],
+    by how much [N] noise and smoothing may have moved that force to either side, and by how much it may be too large
+    where the mass is not known; the threshold [m/s] of the speed."""
+
+    times: np.ndarray
+    places: np.ndarray
+    directions: np.ndarray
+    forces: np.ndarray
+    rates: np.ndarray
+    unsure: np.ndarray
+    late: np.ndarray
+    threshold: float
+    notes: tuple[str, ...]
+
+
+def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
+    """The ramps in a log, each from rest of the body on the bearing.
+
+    With the `mass` [kg] that moves, a break-away force is the greatest friction, force less inertia, as motion begins
+    (the published definition); without, the force where motion begins to be visible, which contains inertia. Raises
+    InputError for a missing channel.
+    """
+    force, body = channel(log, "force"), on_bearing(log)
+    rows: list[tuple[float, ...]] = []
+    threshold, quick, stops = 0.0, 0, 0
+    for part in log.segments:
+        if part.stop - part.start < LEAST:
+            continue
+        breaks = slips(body[part], log.sample_time, CUTOFF)
+        threshold = max(threshold, breaks.threshold)
+        pushed = low_pass(force[part], log.sample_time, CUTOFF)
+        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
+        for onset, start, rest, fastest, direction in marks:
+            push = direction * force[part][rest : start + 1]
+            if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
+                stops += 1
+                continue
+            begin = rest + _half(push)
+            if start - begin < max(SMEARED / (CUTOFF * log.sample_time), SAMPLES):
+                quick += 1
+                continue
+            rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
+            at, level, unsure, late = onset, float(direction * pushed[onset]), 0.0, 0.0
+            if rising > 0:
+                # friction opposes the motion: the impulse of the force gives the mass its speed at least
+                heaviest = direction * float(pushed[onset:fastest].sum()) * log.sample_time / abs(breaks.speed[fastest])
+                signals = direction * force[part], direction * body[part]
+                top = peak(*signals, mass or heaviest, log.sample_time, rising, (begin, start), CUTOFF)
+                if mass:
+                    at, level, unsure = top.at, top.level, top.unsure
+                else:
+                    late = max(level - top.level + top.unsure, 0.0)
+            first = part.start + at
+            place = float(log.time[first]), float(body[first]), float(direction)
+            rows.append((*place, level, float(rising), unsure, late))
+    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 7).T
+    notes = []
+    if quick:
+        notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
+    if stops:
+        notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
+    if len(rows) > table.shape[1]:
+        notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
+    times, places, directions, forces, rates, unsure, late = table
+    return Ramps(times, places, directions, forces, rates, unsure, late, threshold, tuple(notes))
+
+
+def _lowest(push: np.ndarray) -> float:
+    """The least value of a push, shape (n,), over the rest before a motion, seen without noise."""
+    return float(smoothed(push, len(push) / BROAD).min())
+
+
+def _half(push: np.ndarray) -> int:
+    """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
+    smooth = smoothed(push, len(push) / BROAD)
+    return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])
