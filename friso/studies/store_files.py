@@ -17,6 +17,7 @@ import numpy as np
 
 from friso.bounded_file import content_of
 from friso.errors import StoreError
+from friso.system import shell_word
 from friso.whole_file import PARTIAL, whole_file
 
 MOST_BYTES = 64 << 20
@@ -121,7 +122,9 @@ def refuse_foreign(path: Path, files: Collection[str]) -> None:
         else:
             continue
         expected = f"files of the store alone, of at most {MOST_BYTES / 1e6:.3g} MB: remove that one"
-        raise StoreError("", f"a store whose {name} {actual}", expected, f"{remove} {name}", str(path))
+        raise StoreError(
+            "", f"a store whose {name} {actual}", expected, f"{remove} {shell_word(str(path / name))}", str(path)
+        )
 
 
 def _entries(folder: Path | str, levels: int = 2) -> Iterator[os.DirEntry[str]]:
