@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from scipy.io import loadmat
 from scipy.signal import lfilter
 
 import friso
+from friso.errors import LogError
 from friso.identification.combine import combined
 from friso.identification.estimate import Estimate
 from friso.identification.experiments.break_away import static_from_ramps
@@ -153,7 +155,31 @@ def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Sta
         assert steps.up.value == pytest.approx(steps.down.value, rel=5e-3)
         assert steps.cart_fixed is None
         wording(steps.warnings[0])
-        assert recognised(log, Path("steps.csv"))[0] == ("steps" if leave_out else "moves")
+
+
+@pytest.mark.parametrize(
+    "levels", [[0.5, *[0, 1] * 4], [1, *[2, 3, 2, 1, 0, 1] * 2], [1, 2, 3, 1, 2, 3]], ids=["two", "stairs", "one side"]
+)
+@pytest.mark.parametrize("push", [9.0, -6.0])
+def test_friction_that_holds_a_stage_at_rest_is_no_spring(levels: list[float], push: float) -> None:
+    """At rest a force of the sign of the last motion is left, which follows the place where there are two."""
+    rng, ramp = np.random.default_rng(3), np.linspace(0, 1, 200)
+    pairs = list(pairwise(levels))
+    position = np.concatenate([np.r_[a + (b - a) * ramp, np.full(800, b)] for a, b in pairs]) * 1e-3
+    force = np.concatenate(
+        [np.r_[20 * np.sign(b - a) + 0 * ramp, np.full(800, push * np.sign(b - a))] for a, b in pairs]
+    )
+    log = record("moves", DT, position=measured(position, 1e-7, rng), force=measured(force, 0.05, rng))
+    assert recognised(log, Path("moves.csv"))[0] == "moves"
+
+
+def test_steps_against_a_spring_without_a_reference_are_asked_for(rig: friso.Stage) -> None:
+    """Moves without a reference may look the same, where a cable pulls at them."""
+    signals = stairs(rig, 2400.0, (1, 1, 1, -1, -1, -1))
+    del signals["reference"]
+    with pytest.raises(LogError, match="moves, steps") as caught:
+        recognised(record("steps", DT, **signals), Path("steps.csv"))
+    assert caught.value.example == "--as moves"
 
 
 def test_hysteresis_shows_in_steps(rig: friso.Stage) -> None:

@@ -35,11 +35,11 @@ RESTS = 0.1
 
 
 def _claims(course: Course) -> str | None:
-    """A reference moves; or it is no series of constant speeds, no spring holds the position, and nothing repeats, the
-    position rests in between, or the force turns seldom and holds few frequencies."""
+    """A reference moves; or it is no series of constant speeds, and nothing repeats, the position rests in between, or
+    the force turns seldom and holds few frequencies."""
     if course.reference_moves:
         return "its reference moves"
-    if distinct(course.speeds) >= STRAIGHT or course.against_a_spring:
+    if distinct(course.speeds) >= STRAIGHT:
         return None
     repetition = course.repetition
     if repetition is None:

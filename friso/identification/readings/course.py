@@ -23,9 +23,13 @@ STILL = 0.01
 MOSTLY = 0.75
 """Share of the way that is most of it (our choice; of moves it is a sixth to a half that goes at constant speed)."""
 
-AGAINST, PLATEAUS = 0.99, 4
-"""Share of the force's variance from rest to rest that the place explains at least where a spring holds it, and rests
-that it takes."""
+AGAINST, PLACES = 0.99, 4
+"""Share of the force's variance from rest to rest that the place explains at least where a spring holds it, and
+different places that it takes."""
+
+HYSTERESIS, RETURNS = 0.05, 2
+"""By what share of its range the force at a place may depend on the side from which it was reached, and how many places
+have to be reached from both: friction at rest follows the last motion, and with it the place."""
 
 LONG = 0.01
 """Share of a log for which a position that rests does so."""
@@ -96,12 +100,8 @@ class Course:
         later = [
             slice((rest.start + rest.stop) // 2, rest.stop) for rest in runs(still) if rest.stop - rest.start > size
         ]
-        if len(later) < PLATEAUS:
-            return False
         places, forces = (np.array([values[rest].mean() for rest in later]) for values in (position, force))
-        if not (np.ptp(places) > 0 and np.ptp(forces) > 0):
-            return False
-        return bool(np.corrcoef(places, forces)[0, 1] ** 2 > AGAINST)
+        return _on_a_spring(places, forces)
 
     @property
     def repeats(self) -> str:
@@ -117,6 +117,21 @@ class Course:
             return "a log whose reference stands still, with nothing periodic in it"
         between = f"has about {repetition.harmonics:.0f} harmonics and {repetition.turns} reversals per period"
         return f"a log in which {self.repeats}, {between}"
+
+
+def _on_a_spring(places: np.ndarray, forces: np.ndarray) -> bool:
+    """Whether the forces at the places of successive rests, each shape (n,), rise as those of a spring do, from
+    whichever side a place was reached."""
+    if len(places) < PLACES or not (np.ptp(places) > 0 and np.ptp(forces) > 0):
+        return False
+    order = np.argsort(places)
+    alike = np.split(order, np.flatnonzero(np.diff(places[order]) > 2 * STILL * np.ptp(places)) + 1)
+    upward = np.diff(places, prepend=np.nan)
+    sides = [(forces[here[upward[here] > 0]], forces[here[upward[here] < 0]]) for here in alike]
+    apart = [abs(float(np.median(up) - np.median(down))) for up, down in sides if len(up) and len(down)]
+    if len(alike) < PLACES or len(apart) < RETURNS or max(apart) > HYSTERESIS * np.ptp(forces):
+        return False
+    return float(np.corrcoef(places, forces)[0, 1]) > np.sqrt(AGAINST)
 
 
 def external(log: Log) -> str | None:
