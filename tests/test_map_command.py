@@ -234,7 +234,9 @@ def test_a_store_is_checked(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     assert "--check" in friso_inside(tmp_path, "map", RIG, "--check").stderr
 
 
-def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, dict], tmp_path: Path) -> None:
+def test_a_figure_beside_a_store_that_it_has_not_made_stays(
+    mapped: tuple[Path, dict], tmp_path: Path, undrawn: None
+) -> None:
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
     (tmp_path / "a.zarr").rename(tmp_path / "b.zarr")
     (tmp_path / "b.png").write_text("precious")
@@ -244,7 +246,11 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, 
     assert (tmp_path / "b.png").read_text() == "precious"
     drawn = ("map", "b.zarr", "--export", "b.csv")
     assert friso_inside(tmp_path, *drawn, "--overwrite").returncode == 0
-    assert friso_inside(tmp_path, *drawn).returncode == 0  # they are its own from then on
+    # they are its own from then on, also where a call between wrote others
+    for options in ((), ("--export", "c.csv", "--out", "figures"), ("--export", "c.csv", "--out", "figures")):
+        done = friso_inside(tmp_path, "map", "b.zarr", *options)
+        assert done.returncode == 0, done.stderr
+    assert friso_inside(tmp_path, *drawn).returncode == 0
     (tmp_path / "b.csv").write_text("precious")
     assert friso_inside(tmp_path, *drawn).returncode == 2
     (tmp_path / "b.html").write_text("mine, under a name that was friso's")
@@ -296,8 +302,19 @@ def test_a_store_is_drawn_elsewhere_also_where_nothing_can_be_written_into_it(
     assert {file.name for file in (tmp_path / "figures").iterdir()} > {"map.png", "map.html"}
     assert "wrote figures/map.html" in done.stdout
     assert {file: file.read_bytes() for file in kept} == kept
-    for out in ("a.zarr", "figures/map.png"):
+    for out in ("a.zarr", "figures/map.png", "a.zarr/figures"):
         assert friso_inside(tmp_path, "map", "a.zarr", "--out", out, "--overwrite").returncode == 2
+    done = friso_inside(
+        tmp_path, "map", RIG, "--x", "controller.crossover=7 Hz, 8 Hz", "--out", "a.zarr", "--overwrite"
+    )
+    assert (done.returncode, "cannot be written to" in done.stderr) == (2, True)  # not the runs of the other study
+    (tmp_path / "a.png").unlink()
+    beside = ("map", "a.zarr", "--export", "a.csv", "--verify", "0")
+    assert friso_inside(tmp_path, *beside).returncode == 0
+    assert friso_inside(tmp_path, *beside).returncode == 2  # that it wrote these it could not note
+    assert {file: file.read_bytes() for file in kept if file.parent != tmp_path} == {
+        file: content for file, content in kept.items() if file.parent != tmp_path
+    }
     next((tmp_path / "a.zarr" / ".blocks").iterdir()).unlink()
     assert friso_inside(tmp_path, "map", "a.zarr", "--out", "more").returncode == 2
     assert not (tmp_path / "more").exists()

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -200,7 +201,7 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
     check_store_folder(store)
     if not overwrite and is_store(store):
         refuse_other(store, study)
-    own = _own_files(store, exports) if beside else []
+    own = _own_files(store, exports)
     for view in _views(store) if beside else ():
         check_file("--out", view, overwrite, [store], is_own=view in own, example=beside)
     for path in exports:
@@ -208,24 +209,38 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
 
 
 def write_beside(files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress) -> list[Path]:
-    """Write files beside a store, all of them or none; their paths. Of what is there by then, only what the store wrote
-    gives way, unless `overwrite`; that it writes these, it notes first.
+    """Write figure, page and exports of a store, all of them or none; their paths. Of what is there by then, only what
+    the store wrote gives way, unless `overwrite`; that it writes these, it notes first, unless it can only be read.
 
     Raises StoreError where another process holds the store, OSError where a file cannot be written.
     """
     from friso.studies.metadata import annotate_metadata
-    from friso.studies.store_folder import lock_store
 
-    with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE):
+    with drafts_of(files, progress) as drafts, _held(store) as can_note:
         own = _own_files(store, files)
-        digests = {
-            path.name: sorted({str(_digest(file)) for file in ([draft, path] if path in own else [draft])})
-            for draft, path in drafts.drafts
-            if draft is not None
-        }
-        annotate_metadata(store, notes={"views": digests})
+        if can_note:
+            digests = {
+                path.name: sorted({str(_digest(file)) for file in ([draft, path] if path in own else [draft])})
+                for draft, path in drafts.drafts
+                if draft is not None
+            }
+            annotate_metadata(store, notes={"views": {**_noted_digests(store), **digests}})
         drafts.put_in_place([*files] if overwrite else own)
     return written(files)
+
+
+@contextmanager
+def _held(store: Path) -> Iterator[bool]:
+    """Keep other processes out of a store; whether anything can be noted in it."""
+    from friso.studies.store_folder import ReadOnlyStoreError, lock_store
+
+    with ExitStack() as held:
+        try:
+            held.enter_context(lock_store(store, PATIENCE))
+            can_note = True
+        except ReadOnlyStoreError:
+            can_note = False
+        yield can_note
 
 
 PATIENCE = 10.0
@@ -242,16 +257,21 @@ def _views(store: Path) -> list[Path]:
 def _own_files(store: Path, exports: Iterable[Path]) -> list[Path]:
     """Those among the figure and the page beside a store, and its exports, that are as it wrote files of these names,
     by the digests that it notes."""
+    noted = _noted_digests(store)
+    named = {path: noted[path.name] for path in (*_views(store), *exports) if path.name in noted}
+    return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]
+
+
+def _noted_digests(store: Path) -> dict[str, list[object]]:
+    """The digests that a store notes, which may be of others, by the names of the files."""
     from friso.studies.metadata import checked_metadata
 
     try:
         noted = checked_metadata(store).notes.get("views")
     except StoreError:
-        return []
+        return {}
     digests = noted if isinstance(noted, dict) else {}
-    lists = {name: digest for name, digest in digests.items() if isinstance(digest, list)}  # a store may be of others
-    named = {path: lists[path.name] for path in (*_views(store), *exports) if path.name in lists}
-    return [path for path, earlier in named.items() if (digest := _digest(path)) is not None and digest in earlier]
+    return {name: digest for name, digest in digests.items() if isinstance(digest, list)}
 
 
 def _digest(file: Path) -> str | None:

@@ -119,9 +119,15 @@ class OutputFolder:
 
 
 def refuse_place(option: str, path: Path) -> None:
-    """Raises InputError where nothing can be written to a path, whatever is there (`paths.unwritable`)."""
+    """Raises InputError where nothing can be written to a path, whatever is there (`paths.unwritable`), or nothing but
+    a store's own files, being within it."""
+    from friso.studies.metadata import is_store
+
+    example = f"{option} report" if option.startswith("--") else ""
     if why := paths.unwritable(path):
-        raise InputError(option, *why, f"{option} report" if option.startswith("--") else "")
+        raise InputError(option, *why, example)
+    if any(is_store(folder) for folder in Path(os.path.abspath(path)).parents):
+        raise InputError(option, f"{path}, in a store of friso map", "a place outside of it", example)
 
 
 def check_store_folder(folder: Path) -> None:

@@ -22,6 +22,7 @@ from friso.answers.map_study import (
     refuse_overwriting,
     stored_study,
     study_for,
+    write_beside,
 )
 from friso.answers.output_folder import OVERWRITE, check_file, refuse_place, write
 from friso.axis import speak_of
@@ -32,7 +33,7 @@ from friso.stage import Stage
 from friso.studies.axes import AxisValues
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
-from friso.studies.store import Store, check_store, in_memory, read_store
+from friso.studies.store import Store, check_store, holds_all, in_memory, read_store
 from friso.studies.store_folder import ReadOnlyStoreError
 from friso.studies.study import Study
 from friso.studies.sweep import fill, run_in_memory
@@ -243,8 +244,10 @@ def sweep(
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             runs = _filled(study, store, crew, share, overwrite, metric, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
-    if not beside:
+    if store is None:
         write(export_files(held, exports), exports if overwrite else ())
+    elif exports and not beside:
+        write_beside(export_files(held, exports), store, overwrite, progress)
     return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
 
 
@@ -319,7 +322,7 @@ def _filled(
             opened.note(metric=opened.notes.get("metric", metric))
             return fill(opened, crew, share, counted)
     except ReadOnlyStoreError:
-        if not check_store(store).is_whole:
+        if not holds_all(store, study):
             raise
         runs = read_store(store)
         runs.attrs |= verify_cells(study, runs, crew, share)

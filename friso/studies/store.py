@@ -290,6 +290,15 @@ def check_store(path: Path) -> StoreState:
     return Store(path, study_of(read_store(path))).state()
 
 
+def holds_all(path: Path, study: Study) -> bool:
+    """Whether the store at `path` is whole, and of this study."""
+    try:
+        refuse_other(path, study)
+        return check_store(path).is_whole
+    except StoreError:
+        return False
+
+
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
     """The study of an opened store in memory, each text once: as stored, a status takes a hundred times the room."""
     words = [name for name in WORDS if name in runs]
