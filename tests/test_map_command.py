@@ -244,6 +244,7 @@ def test_a_figure_beside_a_store_that_it_has_not_made_stays(
     assert done.returncode == 2
     assert "--overwrite" in done.stderr
     assert (tmp_path / "b.png").read_text() == "precious"
+    assert "--out b-2.zarr" in friso_inside(tmp_path, "map", RIG, *SMALL, "--out", "b.zarr").stderr
     drawn = ("map", "b.zarr", "--export", "b.csv")
     assert friso_inside(tmp_path, *drawn, "--overwrite").returncode == 0
     # they are its own from then on, also where a call between wrote others

@@ -24,7 +24,7 @@ from friso.answers.map_study import (
     study_for,
     write_beside,
 )
-from friso.answers.output_folder import OVERWRITE, check_file, refuse_place, write
+from friso.answers.output_folder import check_file, refuse_place, write
 from friso.axis import speak_of
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -240,7 +240,7 @@ def sweep(
                 check_file("export", path, overwrite)
             runs = run_in_memory([study], crew, share, progress)[0]
         else:
-            example = OVERWRITE if resumed is None else "--out figures"
+            example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
             runs = _filled(study, store, crew, share, overwrite, metric, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
