@@ -77,12 +77,28 @@ def test_a_log_in_si_units(tmp_path: Path, wording: Wording) -> None:
         )),
         ("Force_d", "force"), ("speed", "velocity"), ("sp_velocity", None), ("d", None),
         ("position_ref", "reference"), ("stage_pos", "position"), ("total", None), ("composition", None),
-        ("v_ist", "velocity"), ("xSoll", "reference"), ("v_soll", None), ("F_ist_N", "force"), ("Strom_ist_A", "force"),
-        ("Motorstrom", "force"), ("Posizione comandata", "reference"), ("Posizione reale", "position"),
+        *((name, "reference") for name in (
+            "xSoll", "x_m_soll", "Weg_m_soll", "Axis A target", "Axis_A_cmd", "A_soll", "Posizione comandata"
+        )),
+        *((name, "force") for name in ("Strom_ist_A", "Motorstrom", "Motorstromistwert", "Corrente motore")),
+        *((name, None) for name in (
+            "v_soll", "F_cmd", "Motorstromsollwert", "Sollmotorstrom", "Motorstromsoll", "Comando", "Comando tensione",
+            "Corrente comandata", "Valore corrente", "Weg_m_ist", "Axis A actual", "A_act",
+        )),
+        ("Tempo corrente", "time"), ("Temps courant", "time"), ("Posizione reale", "position"),
     ],
 )  # fmt: skip
 def test_roles_by_name(name: str, role: str | None) -> None:
     assert (role_of(name) or (None,))[0] == role
+
+
+@pytest.mark.parametrize(
+    ("position", "reference"), [("Axis A actual [mm]", "Axis A target [mm]"), ("x_ist [mm]", "V_soll [mm]")]
+)
+def test_a_letter_that_names_an_axis(tmp_path: Path, position: str, reference: str) -> None:
+    time, moved, _, force, *_ = columns()
+    log = log_of(tmp_path, ["time [s]", position, reference, "Kraft [N]"], [time, moved, moved, force])
+    assert {"position", "reference", "force"} <= {*log.signals}
 
 
 def test_two_candidates_are_listed(tmp_path: Path, wording: Wording) -> None:

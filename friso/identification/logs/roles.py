@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
@@ -88,9 +87,6 @@ _KEYS = {
             "forza",
             "fuerza",
             "forca",
-            "corrente",
-            "corriente",
-            "courant",
             "coppia",
         ]
     ),
@@ -98,8 +94,16 @@ _KEYS = {
 }
 """Words in a name that tell what a channel is."""
 
-_LETTERS = {"position": "sxyz", "velocity": "v", "acceleration": "a", "force": "fim"}
-"""Symbols in a name that tell what a channel is where a word of what is wanted or what is stands behind them."""
+_CURRENTS = frozenset(["corrente", "corriente", "courant"])
+"""Words of a current at the beginning of a name; behind another word they mean what is now: Tempo corrente."""
+
+_OTHERS_WANTED = frozenset(
+    ["voltage", "tensione", "tension", "spannung", "moment", "comando", "comandata", "comandada"]
+)
+"""Words of something else that may be wanted than a position, where no word of a position stands beside them."""
+
+_LETTERS = frozenset("vfi")
+"""Symbols of what may be wanted and is no position, directly before the word of what is wanted: v_soll."""
 
 MEASURED = frozenset(
     ["ist", "act", "actual", "fbk", "meas", "measured", "mes", "mesure", "mesuree", "real", "reale", "reel", "reelle"]
@@ -138,22 +142,24 @@ def words(name: str) -> list[str]:
 def _compound(word: str) -> list[str]:
     """The parts of a German compound, or the word alone."""
     match = _GERMAN.fullmatch(word)
-    return [word] if match is None else [part for part in match.groups() if part]
+    return [word] if match is None else [own for part in match.groups() if part for own in _compound(part)]
 
 
-def role_of(name: str) -> tuple[str, str] | None:
-    """Role that a name stands for, and the word that shows it; None for a name that shows none."""
+def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
+    """Role that a name stands for, and the word that shows it; None for a name that shows none. In a `unit` of a
+    position a symbol is the name of an axis: V_soll in mm."""
     parts = words(name)
     name_words = set(parts)
     if name_words & _NOT_MEASURED:
         return None
     key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
-    key |= {} if any(key.values()) else _symbol(parts)
+    key["force"] = key["force"] or next((part for part in parts[:1] if part in _CURRENTS), "")
     if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
         return "time", key["time"]
     wanted = next((part for part in parts if part in _SET), "d" if key["position"] and parts[-1] == "d" else "")
     if wanted:
         others = key["velocity"] or key["acceleration"] or key["force"] or key["disturbance"]
+        others = others or (not key["position"] and (name_words & _OTHERS_WANTED or _is_symbol(parts, unit)))
         return None if others else ("reference", wanted)
     if key["position"] or "actpos" in name_words:
         word = key["position"] or "actpos"
@@ -162,13 +168,10 @@ def role_of(name: str) -> tuple[str, str] | None:
     return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
 
 
-def _symbol(parts: Sequence[str]) -> dict[str, str]:
-    """What a symbol before a word of what is wanted or what is tells, by its role: v_ist, xSoll."""
-    for letter, word in pairwise(parts):
-        role = next((role for role, letters in _LETTERS.items() if letter in letters), "")
-        if role and len(letter) == 1 and word in _SET | MEASURED:
-            return {role: f"{letter} {word}"}
-    return {}
+def _is_symbol(parts: Sequence[str], unit: str) -> bool:
+    """Whether a name is the symbol of what is no position and the word of what is wanted: v_soll."""
+    of_position = bool(unit) and any(unit_factor(unit, own) is not None for own in _TOLD_BY_UNIT["position"])
+    return len(parts) > 1 and parts[0] in _LETTERS and parts[1] in _SET and not of_position
 
 
 def is_wanted(name: str) -> bool:
@@ -223,7 +226,7 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
     by_user = {id(choice.channel) for choice in chosen.values()}
     candidates: dict[str, list[tuple[Channel, str]]] = {}
     for channel in table.channels:
-        role = role_of(channel.name)
+        role = role_of(channel.name, channel.unit)
         if role is not None and role[0] not in assigned and id(channel) not in by_user:
             candidates.setdefault(role[0], []).append((channel, role[1]))
     rivals = {}
