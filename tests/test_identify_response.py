@@ -195,6 +195,19 @@ def test_a_generator_whose_clock_is_not_that_of_the_recorder(faster: float) -> N
         assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
 
 
+def test_one_period_sampled_at_two_rates() -> None:
+    """Two samples more in a period make one more line: those that both have are used."""
+    rng, lines = np.random.default_rng(33), np.arange(2, 60)
+    record = played(rng, rig, lines, 6)
+    instants = np.arange(6 * (PERIOD + 2)) / (PERIOD + 2)
+    phases = 2j * np.pi * np.outer(lines, instants)
+    spectra = [np.fft.rfft(signal[:PERIOD])[lines] for signal in (record.input, record.output)]
+    signals = [2 / PERIOD * np.real(spectrum @ np.exp(phases)) for spectrum in spectra]
+    noisy = [one * (1 + 1e-5 * rng.standard_normal(len(one))) for one in signals]
+    response = multisine([record, ResponseRecord(noisy[0], noisy[1], DT * PERIOD / (PERIOD + 2))])
+    assert np.abs(response.response / rig(response.frequency) - 1).max() < 0.02
+
+
 @pytest.mark.parametrize(
     "spoilt",
     [

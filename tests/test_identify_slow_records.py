@@ -106,13 +106,18 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
     static = Estimate("friction.static", "N", 11.3, 10.7, 11.9, "output error")
     bias = Estimate("bias.cart", "N", 1.0, 0.9, 1.1, "output error")
 
+    curve = {"friction.static": 11.3, "friction.coulomb": 10.3, "friction.viscous": 10.0}
+    curve["friction.stribeck_velocity"] = 2e-3
+
     def ramps(level: float, count: int = 6) -> Ramps:
         directions = np.where(np.arange(count) % 2, 1.0, -1.0)
         forces = level * np.array([1, 1.01, 0.8, 0.99, 1, 1.02])[:count] - directions
         rest = [np.zeros(count)] * 2
-        return Ramps(*rest, directions, forces, np.ones(count), np.full(count, 0.1), np.zeros(count), 0.0, ())
+        unsure = np.full(count, 0.1)
+        return Ramps(*rest, directions, forces, np.ones(count), unsure, np.zeros(count), np.full(count, 0.05), 0.0, ())
 
-    assert exceeded_at_break_away([static, bias], ramps(13.9), "N").keys() == {RATIO, STRIBECK.name}
-    assert not exceeded_at_break_away([static, bias], ramps(11.9), "N")
-    assert not exceeded_at_break_away([static, bias], ramps(13.9, 2), "N")
-    assert not exceeded_at_break_away([bias], ramps(13.9), "N")
+    assert exceeded_at_break_away([static, bias], curve, ramps(13.9), "N").keys() == {RATIO, STRIBECK.name}
+    assert not exceeded_at_break_away([static, bias], curve, ramps(11.9), "N")
+    assert not exceeded_at_break_away([static, bias], curve, ramps(13.9, 2), "N")
+    assert not exceeded_at_break_away([bias], curve, ramps(13.9), "N")
+    assert not exceeded_at_break_away([static, bias], {**curve, "friction.viscous": 60.0}, ramps(13.9), "N")

@@ -187,6 +187,12 @@ def test_time_is_never_proposed_for_another_role(tmp_path: Path) -> None:
     assert not caught.value.example
 
 
+def test_a_torque_whose_name_is_that_of_a_time_is_read_where_it_is_mapped(tmp_path: Path) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["x [mm]", "T [N]"], [columns()[1], columns()[3]])
+    log = read_log(path, from_options(["position=x", "force=T"], dt="1 ms"), needed=("position", "force"))
+    assert log["force"] == pytest.approx(M["force"])
+
+
 def test_a_unit_tells_the_role_of_the_only_channel_that_has_it(tmp_path: Path) -> None:
     names = ["t/s", "x_soll/mm", "x/mm", "F/N"]
     log = log_of(tmp_path, names, [columns()[0], *2 * [columns()[1]], columns()[3]])

@@ -119,9 +119,8 @@ def identify_moves(
     answer = replace(answer, fit=fit)
     estimates, correlation = estimates_of(answer, covered)
     if not (is_free(flat) or (fit.problem.closed and fit.explains(noise))):
-        refuted = exceeded_at_break_away(
-            estimates, force_ramps(log.per_unit_of_force(), fit.value(MASS)), log.unit("force")
-        )
+        ramps = force_ramps(log.per_unit_of_force(), fit.value(MASS))
+        refuted = exceeded_at_break_away(estimates, fit.stage, ramps, log.unit("force"))
         estimates, correlation = estimates_of(replace(answer, refuted=refuted), covered)
     if quality.failed:
         estimates, correlation = not_described(estimates)

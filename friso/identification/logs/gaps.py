@@ -58,7 +58,8 @@ class GapsError(LogError):
 def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> None:
     """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
     table, origin = reading.table, reading.origin
-    signals = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
+    named = {id(choice.channel) for role, choice in proposal.chosen.items() if choice.by_user and role != "time"}
+    signals = [c for c in table.channels if id(c) in named or (role_of(c.name) or ("",))[0] != "time"]
     if len(signals) < len(needed):
         names = ", ".join(channel.name for channel in signals) or "none"
         expected = f"channels for {' and '.join(needed)}: export the log with these"

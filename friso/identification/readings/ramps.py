@@ -36,8 +36,8 @@ goes on has its bristles bent already."""
 @dataclass(frozen=True)
 class Ramps:
     """Per ramp, shape (n,): time [s], place [m], direction, break-away force [N] in that direction, force rate [N/s],
-    by how much [N] noise and smoothing may have moved that force to either side, and by how much it may be too large
-    where the mass is not known; the threshold [m/s] of the speed."""
+    by how much [N] noise and smoothing may have moved that force to either side, by how much it may be too large where
+    the mass is not known, and the speed [m/s] that the body has at most by then; the threshold [m/s] of the speed."""
 
     times: np.ndarray
     places: np.ndarray
@@ -46,6 +46,7 @@ class Ramps:
     rates: np.ndarray
     unsure: np.ndarray
     late: np.ndarray
+    speeds: np.ndarray
     threshold: float
     notes: tuple[str, ...]
 
@@ -89,8 +90,8 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
                     late = max(level - top.level + top.unsure, 0.0)
             first = part.start + at
             place = float(log.time[first]), float(body[first]), float(direction)
-            rows.append((*place, level, float(rising), unsure, late))
-    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 7).T
+            rows.append((*place, level, float(rising), unsure, late, abs(float(breaks.speed[start]))))
+    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 8).T
     notes = []
     if quick:
         notes.append(f"{quick} ramps rise too fast for a low-pass at {CUTOFF:g} Hz (or the sampling) and are left out.")
@@ -98,8 +99,7 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
         notes.append(f"{stops} motions continued after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
         notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
-    times, places, directions, forces, rates, unsure, late = table
-    return Ramps(times, places, directions, forces, rates, unsure, late, threshold, tuple(notes))
+    return Ramps(*table, threshold, tuple(notes))
 
 
 def _lowest(push: np.ndarray) -> float:

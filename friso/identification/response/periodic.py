@@ -72,10 +72,10 @@ def _together(records: list[Spectra]) -> tuple[list[Spectra], list[str]]:
     if apart > CLOCKS or np.ptp(counts) > 1 + CLOCKS * counts.min():
         text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
         raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
+    records = [_first_lines(realisation, int(counts.min())) for realisation in records]
     if apart <= EQUAL:
         return records, []
     mean = float(spacings.mean())
-    records = [_first_lines(realisation, int(counts.min())) for realisation in records]
     lines = np.arange(1, counts.min() + 1) * mean
     remark = f"the periods of the records differ by {1e6 * apart:.3g} ppm, as clocks do: {1 / mean:.6g} s is used"
     return [replace(realisation, frequency=lines) for realisation in records], [remark]
