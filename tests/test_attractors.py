@@ -16,7 +16,8 @@ import friso.hunting.cycle.hunting
 from friso.engine.allowance import allowance
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
-from friso.hunting.attractors.rounds import TIGHT, Pending, lengthened
+from friso.hunting.attractors.rounds import Pending, lengthened
+from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
 from friso.hunting.cycle.rest import stuck, wait
@@ -510,10 +511,9 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
         assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["failed"]
 
 
-def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_may_come_to_rest() -> None:
-    """The swings repeat themselves every 174 s, but no orbit can be closed from them. Released from 18.7 mm the stage
-    swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it is at rest from 2000 s on."""
-    stage = Stage(
+def asymmetric_stage() -> Stage:
+    """A stage whose swings repeat themselves every 174 s, though no orbit can be closed from them."""
+    return Stage(
         masses={"cart": "31.1481 kg", "stage": "34.1805 kg"},
         friction={
             "model": "lugre",
@@ -542,11 +542,28 @@ def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_ma
         },
         motion={"kind": "release", "displacement": "0.0187486 m", "duration": "20 s"},
     )
+
+
+def test_a_motion_that_swings_beside_what_was_observed_for_six_of_its_periods_may_come_to_rest() -> None:
+    """Released from 18.7 mm the stage swings like them, at 1e-6, for up to 5000 s; at 1e-8 to 1e-10 it is at rest from
+    2000 s on."""
+    stage = asymmetric_stage()
     target = attractors(held(stage), thorough=True).target.of(0)
     assert 2 * target.amplitude == pytest.approx(3.4929e-3, rel=1e-3)
-    own = own_motion(stage, target, np.inf, TIGHT)
+    own = own_motion(stage, target, np.inf)
     assert own.completed
     assert not own.ends
+    assert own.swing < 1e-9
+
+
+def test_a_motion_that_swings_less_often_than_what_was_observed_is_not_told_at_rest() -> None:
+    """The same stage: released from 12.09817 mm it swings as far, but every 1215 s, with pauses of 940 s."""
+    seldom = asymmetric_stage().replace({"motion.displacement": "12.09817 mm"})
+    target = attractors(held(seldom), thorough=True).target.of(0)
+    ends, completed, swing = ends_in(seldom.flat(), 1, target)
+    assert completed[0]
+    assert ends[0] or swings_seldom(target, ends, swing)[0]
+    assert own_motion(seldom, target, np.inf).swing > target.amplitude
 
 
 def test_a_swing_that_grows_without_bound_has_no_size() -> None:

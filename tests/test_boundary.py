@@ -141,6 +141,17 @@ def test_what_is_simulated_within_the_error_of_a_flip_tells_nothing_of_it(over_c
     assert [change for change in stability_changes(doubtful) if not change.begins] == [first]
 
 
+def test_a_window_within_the_error_of_a_special_point_is_told(over_crossover: Diagram) -> None:
+    places = over_crossover.places
+    attracts = np.abs(places - 0.8) < 0.05
+    spot = replace(over_crossover.special[0][0], error=0.15)
+    wide = replace(spot, point=replace(spot.point, place=0.8))
+    branch = replace(over_crossover.branches[0], points=over_crossover.branches[0].points[-2:])
+    verdicts = {"attracts": attracts, "decided": np.ones(len(places), bool)}
+    window = replace(over_crossover, branches=(branch,), special=((wide,),), **verdicts)
+    assert [change.begins for change in stability_changes(window)] == [True, False]
+
+
 def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagram) -> None:
     """Subcritical: the pair ends in the flip of the symmetric cycle, and folds at 8.47 Hz."""
     points = special(over_crossover, symmetric=False)

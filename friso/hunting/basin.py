@@ -14,10 +14,12 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import CRUISE, last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
+from friso.hunting.attractors.rounds import TIGHT
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble, without_motion
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.measures import swing_of
+from friso.hunting.motions import some_of
 from friso.shares import share_interval
 from friso.stage import Stage
 
@@ -29,7 +31,10 @@ CAUGHT = 0.003
 followed for as long as the slowest."""
 
 RTOL = 1e-6
-"""Relative tolerance of these runs."""
+"""Relative tolerance of these runs where a closed orbit attracts; where swings were observed it is `TIGHT`."""
+
+OBSERVED = 0.5
+"""Share of a run at its end for which a motion stands still that has come to rest where swings were observed."""
 
 RANGE, POINTS = (1 / 30, 300.0), 128
 """Smallest and largest kick in units of the least motion that attracts, and kicks tried in between."""
@@ -85,41 +90,71 @@ class MoveShare:
 
 
 def ends_in(
-    flat: Mapping[str, Any],
-    count: int,
-    target: Target,
-    starts: np.ndarray | None = None,
-    rtol: float = RTOL,
-    **options: Any,
+    flat: Mapping[str, Any], count: int, target: Target, starts: np.ndarray | None = None, **options: Any
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in one of the motions that attract
     the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; which
     were completed; and how far they swing at the end, peak to peak [m]; all of shape (count,). The target is the same
-    for all, or there is one for each. `options`: `RunOptions`."""
+    for all, or there is one for each. Where its swings were observed, a motion that does not end in them is looked at
+    for half of its run: it may swing less often. `options`: `RunOptions`."""
+    ends, completed, swing = np.zeros(count, bool), np.zeros(count, bool), np.zeros(count)
+    observed = np.broadcast_to(target.observed, (count,))
+    for runs in (np.flatnonzero(~observed), np.flatnonzero(observed)):
+        if runs.size:
+            part = some_of(flat, runs), target.of(runs) if np.ndim(target.amplitude) else target
+            begin = None if starts is None else starts[runs]
+            find = _ends_observed if observed[runs[0]] else _ends_closed
+            ends[runs], completed[runs], swing[runs] = find(*part, begin, len(runs), **options)
+    return ends, completed, swing
+
+
+def _ends_closed(
+    flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     corner, size = np.max(last_corner(flat)), np.broadcast_to(2 * target.amplitude, (count,))
     early, after = (np.broadcast_to(corner + time, (count,)) for time in (target.early, target.lasting))
-    swing, completed = _last_swing(flat, early, target, starts, rtol, **options)
+    swing, completed = _last_swing(flat, early, LAST * target.period, starts, RTOL, **options)
     ends = completed & np.where(early < after, np.abs(swing / size - 1) <= CAUGHT, lasts(swing, 0.0, size / 4))
     if (unfinished := np.flatnonzero(completed & ~ends & (early < after))).size:
-        part = {key: value[unfinished] if np.ndim(value) else value for key, value in flat.items()}
         aims = target.of(unfinished) if np.ndim(target.amplitude) else target
         begin = None if starts is None else starts[unfinished]
-        swing[unfinished], completed[unfinished] = _last_swing(part, after[unfinished], aims, begin, rtol, **options)
+        swing[unfinished], completed[unfinished] = _last_swing(
+            some_of(flat, unfinished), after[unfinished], LAST * aims.period, begin, RTOL, **options
+        )
         ends[unfinished] = lasts(swing[unfinished], 0.0, size[unfinished] / 4) & completed[unfinished]
     return ends, completed, swing
+
+
+def _ends_observed(
+    flat: Mapping[str, Any], target: Target, starts: np.ndarray | None, count: int, **options: Any
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    after = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
+    swing, completed = _last_swing(flat, after, LAST * target.period, starts, TIGHT, **options)
+    ends = completed & lasts(swing, 0.0, np.broadcast_to(target.amplitude, (count,)) / 2)
+    if (others := np.flatnonzero(completed & ~ends)).size:
+        begin = None if starts is None else starts[others]
+        part = some_of(flat, others), after[others], OBSERVED * after[others]
+        swing[others], completed[others] = _last_swing(*part, begin, TIGHT, **options)
+    return ends, completed, swing
+
+
+def swings_seldom(target: Target, ends: np.ndarray, swing: np.ndarray) -> np.ndarray:
+    """Which runs (see `ends_in`) swing as far as what was observed, but not in the last of its periods: what becomes of
+    them is not known."""
+    return ~ends & np.asarray(target.observed) & lasts(swing, 0.0, np.asarray(target.amplitude) / 2)
 
 
 def _last_swing(
     flat: Mapping[str, Any],
     end: np.ndarray,
-    target: Target,
+    last: Any,
     starts: np.ndarray | None,
     rtol: float,
     **run_options: Any,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Peak to peak at the ends of runs [s], (count,), and which runs were completed."""
+    """Peak to peak in the last time [s] before the ends of runs [s], (count,), and which runs were completed."""
     long, count = {**flat, "motion.duration": end}, len(end)
-    window = float(np.min(1 - LAST * target.period / end))
+    window = float(np.min(1 - last / end))
     options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **run_options)
     swing, completed = np.zeros(count), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
@@ -132,9 +167,9 @@ def _caught(
     flat: Mapping[str, Any], count: int, target: Target, widest: float, starts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which runs end in what attracts, and of which that is known: one that swings by more than the `widest` at its
-    end, peak to peak [m], may grow or die out."""
+    end, peak to peak [m], may grow or die out, and one that swings less often than what was observed, too."""
     ends, completed, swing = ends_in(flat, count, target, starts)
-    return ends, completed & ~(swing > widest)
+    return ends, completed & ~(swing > widest) & ~swings_seldom(target, ends, swing)
 
 
 def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:

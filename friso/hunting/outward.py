@@ -18,7 +18,7 @@ from friso.hunting.boundary.branch import END_OF_RANGE, NO_FARTHER, REACHED, Poi
 from friso.hunting.boundary.crossing import ENOUGH, SPREAD, crossing
 from friso.hunting.boundary.locate import TIGHTER, Bifurcation, changes, last_inside, smoothed, towards, turned
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import RTOL, Cycles, described, families, hunting_cycles
+from friso.hunting.cycle.find import RTOL, Cycles, described, families, hunting_cycles, kept
 from friso.hunting.cycle.held import held_beside
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.shooting import close, swings_of_simplest
@@ -330,7 +330,9 @@ class Outward:
         through = polynomial.polyfit(np.log(factors[closed]) - scale, np.column_stack([states, np.log(times)]), CURVE)
         guess = polynomial.polyval(np.log(wanted) - scale, through).T
         stages = self._stages(wanted)
-        return described(stages, close(stages, guess[:, :-1], np.exp(guess[:, -1]), parts[0].sign, RTOL), RTOL)
+        orbits = close(stages, guess[:, :-1], np.exp(guess[:, -1]), parts[0].sign, RTOL)
+        orbits.closed[~kept(stages, orbits, guess[:, stages.sticking])] = False
+        return described(stages, orbits, RTOL)
 
     def _simulated(
         self, at: float, motions: tuple[Swinging, ...], outside: float

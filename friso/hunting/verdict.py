@@ -16,16 +16,16 @@ from friso.engine.batch import RunOptions
 from friso.equations.bandwidth import faster
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
-from friso.hunting.attractors.rounds import RESOLVED, TIGHT
+from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.basin import (
     MOVES,
-    RTOL,
     Kick,
     MoveShare,
     displacements_that_hunt,
     ends_in,
     moves_that_hunt,
     pushes_that_hunt,
+    swings_seldom,
 )
 from friso.hunting.criteria import Verdict, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
@@ -204,7 +204,7 @@ def _with_a_target(
     work: float,
 ) -> Judgement:
     with allowance() as spent:
-        own = own_motion(stage, target, REST * work, TIGHT if attraction.observed else RTOL)
+        own = own_motion(stage, target, REST * work)
         if not own.completed:
             return Judgement("failed", attraction)
         within = float(motions.settling[0])
@@ -241,12 +241,12 @@ class OwnMotion:
     doubt: str = ""
 
 
-def own_motion(stage: Stage, target: Target, work: float, rtol: float = RTOL) -> OwnMotion:
-    """Where the stage's own motion ends (see `ends_in`), at a relative tolerance. One that still swings then, by less
-    than what attracts, is followed for longer, if that takes no more than so much work: it may be dying out."""
+def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
+    """Where the stage's own motion ends (see `ends_in`). One that still swings then, by less than what attracts, or
+    less often, is followed for longer, if that takes no more than so much work: it may be dying out."""
     flat = stage.flat()
     changed = {key: value * CHANGED for key, value in flat.items() if key in ("masses.cart", "masses.stage")}
-    ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target, rtol=rtol)
+    ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target)
     doubt = BY_CHANCE if np.any(ends[completed] != ends[0]) else "" if completed.all() else UNCHECKED
     own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
     if own.ends or own.doubt or not own.completed or own.swing <= _resting(flat)[0]:
@@ -254,7 +254,7 @@ def own_motion(stage: Stage, target: Target, work: float, rtol: float = RTOL) ->
     longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
     try:
         with allowance(work):
-            last = OwnMotion(*(column[0] for column in ends_in(flat, 1, longer, rtol=rtol)))
+            last = OwnMotion(*(column[0] for column in ends_in(flat, 1, longer)))
     except Exhausted:
         return own
     return last if last.completed else own
@@ -380,9 +380,11 @@ def judge_runs(
     run_options = measuring_options(rtol, threads, cancel)
     attracted = np.flatnonzero(decided & attracts)
     if survey is not None and attracted.size:
-        ends, completed, _ = ends_in(
-            some_of(flat, attracted), attracted.size, survey.take(attracted).target, threads=threads, cancel=cancel
+        target = survey.take(attracted).target
+        ends, completed, swing = ends_in(
+            some_of(flat, attracted), attracted.size, target, threads=threads, cancel=cancel
         )
+        completed &= ~swings_seldom(target, ends, swing)
         in_cycle[attracted], decided[attracted] = ends, completed
         restless = attracted[completed & ~ends & ~np.isfinite(motions.settling[attracted])]
         if restless.size:  # something may attract them that swings less than what was found

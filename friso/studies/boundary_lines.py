@@ -150,13 +150,19 @@ class StabilityChange(NamedTuple):
 
 
 def stability_changes(result: Diagram) -> list[StabilityChange]:
-    """Where hunting begins and ends over the range, in order. Verdicts within the error of a special point tell nothing
-    of that: there cycles repel so little that runs may stay on them."""
+    """Where hunting begins and ends over the range, in order. Verdicts within the error of a special point do not tell
+    where: there cycles repel so little that runs may stay on them. They do tell that there is hunting between stages
+    that nothing attracts."""
     special = [spot for own in result.special for spot in own if np.isfinite(spot.error)]
-    clear = ~np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
-    values = _values(result.space, result.places[:, None])[:, 0]
-    verdicts = zip(values.tolist(), place_verdicts(result), np.broadcast_to(clear, len(values)), strict=True)
-    decided = [(value, word == ATTRACTS) for value, word, apart in verdicts if apart and word in (ATTRACTS, REPELS)]
+    doubtful = np.any([np.abs(result.places - spot.point.place) < spot.error for spot in special], axis=0)
+    values = _values(result.space, result.places[:, None])[:, 0].tolist()
+    verdicts = zip(values, place_verdicts(result), np.broadcast_to(doubtful, len(values)), strict=True)
+    decisive = [(value, word == ATTRACTS, unclear) for value, word, unclear in verdicts if word in (ATTRACTS, REPELS)]
+    decided = [(value, attracts) for value, attracts, unclear in decisive if not unclear]
+    quiet = [(-np.inf, False), *decided, (np.inf, False)]
+    apart = [(low, high) for (low, before), (high, after) in pairwise(quiet) if not before and not after]
+    hunting = [value for value, attracts, unclear in decisive if attracts and unclear]
+    decided = sorted(decided + [(value, True) for value in hunting if any(a < value < b for a, b in apart)])
     turns = followed_changes(result)
     changes = []
     for (low, before), (high, after) in pairwise(decided):

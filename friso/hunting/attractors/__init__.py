@@ -37,12 +37,14 @@ that it is not known how slowly motions leave what is beside it."""
 class Target:
     """What all motions of stages end in that do not come to rest, arrays of shape (count,) or numbers: they swing by
     the `amplitude` [m], half of peak to peak, at least; the `period` is not longer than this [s]; and they do so once
-    the time `lasting` has passed [s]. One that swings by that amplitude after the time `early` [s] will do so."""
+    the time `lasting` has passed [s]. One that swings by that amplitude after the time `early` [s] will do so. Where
+    some of them were `observed`, and not closed, there may be others beside them that swing as far, less often."""
 
     amplitude: Any
     period: Any
     lasting: Any
     early: Any
+    observed: Any = False
 
     def of(self, numbers: Any) -> Target:
         """That of the stages with these numbers, or of one."""
@@ -77,7 +79,9 @@ class Attractors:
     def target(self) -> Target:
         """What the stages' motions end in, arrays of shape (count,): NaN where nothing attracts."""
         amplitude, period, lasting, early = (np.full(len(self.decided), np.nan) for _ in range(4))
+        observed = np.zeros(len(self.decided), bool)
         for motion in self.motions:
+            observed[motion.stage] |= motion.cycles is None
             k, unit = motion.stage, min(motion.period, PATIENT * self.typical[motion.stage])
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
@@ -86,7 +90,7 @@ class Attractors:
             until = max(np.clip(np.nan_to_num(constants), *PERIODS) * unit, waited)
             lasting[k] = np.fmax(lasting[k], until)
             early[k] = np.fmax(early[k], EARLY * until if constants < PERIODS[1] else until)
-        return Target(amplitude, period, lasting, early)
+        return Target(amplitude, period, lasting, early, observed)
 
     def take(self, numbers: np.ndarray) -> Attractors:
         """Those of the stages with these numbers."""

@@ -54,10 +54,6 @@ CONVERGED, APPROACHES = 1e-4, 0.7
 """The same where nothing has to be proved, and the share of what it was some swings before below which it does for
 motions that are about to repeat themselves (`SETTLED`)."""
 
-GROWS = 1.02
-"""How many times as large as some swings before a deviation is at least that grows as from a cycle that repels: about
-another that attracts nearby it would soon grow no more."""
-
 MOST_ORBITS = 3
 """Orbits that are tried to be closed for a stage after one round of a thorough survey, of others one."""
 
@@ -154,7 +150,6 @@ class Survey:
     left: np.ndarray = field(init=False)
     _attracting_kinds: list[_Kind] = field(default_factory=list)
     _closed: list[_Kind] = field(default_factory=list)
-    _alternating: list[_Kind] = field(default_factory=list)
     _unclosed: list[_Kind] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -180,9 +175,7 @@ class Survey:
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
-            kinds = [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
-            self._closed += kinds
-            self._alternating += kinds if cycles.multiplier[k] < 0 else []
+            self._closed += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
@@ -204,7 +197,7 @@ class Survey:
                 return
             if number > 0:
                 still = swinging[~ends.swing[swinging]]  # each of them somewhere else
-                moving = self._farthest(np.setdiff1d(swinging, still), owners, ends)
+                moving = np.setdiff1d(swinging, still)
                 kinds = moving[self._kinds(owners[moving], ends.take(moving), self._affordable(owners, ends)[moving])]
                 swinging = np.union1d(kinds, still)
             if number == ROUNDS - 1:
@@ -238,15 +231,6 @@ class Survey:
         spent = self.left[owners[swinging]] <= 0
         self.unknown[owners[swinging[spent]]] = True
         return swinging[~spent]
-
-    def _farthest(self, moving: np.ndarray, owners: np.ndarray, ends: Ends) -> np.ndarray:
-        """The numbers of the runs `moving` but those that go the same way as another one: deviations from a cycle that
-        repels, and that change sides with every return, all grow along one line, and the run that has come farthest
-        shows what the others come to."""
-        repeats, away = ends.repeats, _like(self._alternating, owners, ends)
-        leaving = moving[(away & (repeats.deviation > GROWS * repeats.earlier))[moving]]
-        farthest = {owners[k]: k for k in leaving[np.argsort(repeats.deviation[leaving])]}
-        return np.setdiff1d(moving, np.setdiff1d(leaving, list(farthest.values())))
 
     def _affordable(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """How many kinds of runs of its stage may be followed on, for each run."""

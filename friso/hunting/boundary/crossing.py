@@ -51,8 +51,8 @@ class FoldBack(NamedTuple):
 
 def turn(lengths: np.ndarray, places: np.ndarray) -> FoldBack | None:
     """Where the cubic through places, (n,), over lengths turns, nearest to length 0. The place may be off by twice what
-    they scatter about it; None if that is more than half of their range, or if it does not turn among them, or there
-    are too few."""
+    they scatter about it; None if it does not turn among them, from either end by more than that, or there are too
+    few."""
     if len(places) < ENOUGH:
         return None
     curve = np.polynomial.Polynomial.fit(lengths, places, 3)

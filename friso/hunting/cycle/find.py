@@ -186,10 +186,14 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
     return described(stages, orbits, rtol, reasons)
 
 
+def kept(stages: Ensemble, orbits: Orbits, distances: np.ndarray) -> np.ndarray:
+    """Which orbits stick about where they were guessed to, at distances [m], shape (count,)."""
+    return np.abs(orbits.states[:, stages.sticking] / distances - 1) < KEPT
+
+
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, trial: Orbits, guess: Guess) -> None:
     """Take over the orbits that are closed where they were expected."""
-    sticks = np.abs(trial.states[:, stages.sticking] / guess.distances[which] - 1) < KEPT
-    good = trial.closed & sticks
+    good = trial.closed & kept(stages, trial, guess.distances[which])
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(trial, name)[good]
 
