@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -208,15 +208,19 @@ def refuse_overwriting(study: Study, store: Path, exports: list[Path], overwrite
         check_file("--export", path, overwrite, [store], is_own=path in own)
 
 
-def write_beside(files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress) -> list[Path]:
+def write_beside(
+    files: Mapping[Path, Content], store: Path, overwrite: bool, progress: Progress, can_note: bool = True
+) -> list[Path]:
     """Write figure, page and exports of a store, all of them or none; their paths. Of what is there by then, only what
-    the store wrote gives way, unless `overwrite`; that it writes these, it notes first, unless it can only be read.
+    the store wrote gives way, unless `overwrite`; that it writes these, it notes first, if it can.
 
-    Raises StoreError where another process holds the store, OSError where a file cannot be written.
+    Raises StoreError where another process holds the store, or nothing can be noted after all, OSError where a file
+    cannot be written.
     """
     from friso.studies.metadata import annotate_metadata
+    from friso.studies.store_folder import lock_store
 
-    with drafts_of(files, progress) as drafts, _held(store) as can_note:
+    with drafts_of(files, progress) as drafts, lock_store(store, PATIENCE) if can_note else nullcontext():
         own = _own_files(store, files)
         if can_note:
             digests = {
@@ -227,20 +231,6 @@ def write_beside(files: Mapping[Path, Content], store: Path, overwrite: bool, pr
             annotate_metadata(store, notes={"views": {**_noted_digests(store), **digests}})
         drafts.put_in_place([*files] if overwrite else own)
     return written(files)
-
-
-@contextmanager
-def _held(store: Path) -> Iterator[bool]:
-    """Keep other processes out of a store; whether anything can be noted in it."""
-    from friso.studies.store_folder import ReadOnlyStoreError, lock_store
-
-    with ExitStack() as held:
-        try:
-            held.enter_context(lock_store(store, PATIENCE))
-            can_note = True
-        except ReadOnlyStoreError:
-            can_note = False
-        yield can_note
 
 
 PATIENCE = 10.0

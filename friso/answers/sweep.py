@@ -26,7 +26,7 @@ from friso.answers.map_study import (
 )
 from friso.answers.output_folder import check_file, refuse_place, write
 from friso.axis import speak_of
-from friso.errors import InputError
+from friso.errors import InputError, StoreError
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
@@ -238,16 +238,16 @@ def sweep(
         if store is None:
             for path in exports:
                 check_file("export", path, overwrite)
-            runs = run_in_memory([study], crew, share, progress)[0]
+            runs, can_note = run_in_memory([study], crew, share, progress)[0], False
         else:
             example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
-            runs = _filled(study, store, crew, share, overwrite, metric, progress)
+            runs, can_note = _filled(study, store, crew, share, overwrite, metric, beside, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
     if store is None:
         write(export_files(held, exports), exports if overwrite else ())
     elif exports and not beside:
-        write_beside(export_files(held, exports), store, overwrite, progress)
+        write_beside(export_files(held, exports), store, overwrite, progress, can_note)
     return SweepAnswer(study, held, coloured_by(study, metric), store, exports)
 
 
@@ -306,10 +306,11 @@ def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
 
 
 def _filled(
-    study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, progress: Progress
-) -> xr.Dataset:
-    """Run what the store lacks, and note there what is drawn of it. Whatever ends it early, the message says where the
-    rest is. One in which nothing can be written is read, if it lacks nothing."""
+    study: Study, store: Path, crew: Crew, share: float, overwrite: bool, metric: str, beside: bool, progress: Progress
+) -> tuple[xr.Dataset, bool]:
+    """Run what the store lacks, and note there what is drawn of it; the runs, and whether anything can be noted there.
+    Whatever ends it early, the message says where the rest is. One in which nothing can be written is read, if it lacks
+    nothing, and unless figures are to be written `beside` it, which it has to note."""
     stored = 0
 
     def counted(done: int, total: int, what: str, /) -> None:
@@ -320,13 +321,18 @@ def _filled(
     try:
         with Store.opened(store, study, overwrite) as opened:
             opened.note(metric=opened.notes.get("metric", metric))
-            return fill(opened, crew, share, counted)
-    except ReadOnlyStoreError:
+            return fill(opened, crew, share, counted), True
+    except ReadOnlyStoreError as error:
         if not holds_all(store, study):
             raise
+        if beside:
+            elsewhere = f"friso map {shell_word(str(store))} --out figures"
+            raise StoreError(
+                "", error.actual, f"{error.expected}, or figures elsewhere", elsewhere, str(store)
+            ) from None
         runs = read_store(store)
         runs.attrs |= verify_cells(study, runs, crew, share)
-        return runs
+        return runs, False
     except (KeyboardInterrupt, OSError, RuntimeError):
         if store.exists():
             resumed = f"friso map {shell_word(str(store))}"
