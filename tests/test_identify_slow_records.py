@@ -109,9 +109,9 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
     curve = {"friction.static": 11.3, "friction.coulomb": 10.3, "friction.viscous": 10.0}
     curve["friction.stribeck_velocity"] = 2e-3
 
-    def ramps(level: float, count: int = 6) -> Ramps:
-        directions = np.where(np.arange(count) % 2, 1.0, -1.0)
-        forces = level * np.array([1, 1.01, 0.8, 0.99, 1, 1.02])[:count] - directions
+    def ramps(level: float, count: int = 6, more: float = 0.0, backward: int = 2) -> Ramps:
+        directions = np.where(np.arange(count) % backward, 1.0, -1.0)
+        forces = level * np.array([1, 1.01, 0.98, 0.99, 1, 1.02])[:count] + (more - 1) * directions
         rest = [np.zeros(count)] * 2
         unsure = np.full(count, 0.1)
         return Ramps(*rest, directions, forces, np.ones(count), unsure, np.zeros(count), np.full(count, 0.05), 0.0, ())
@@ -120,4 +120,5 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
     assert not exceeded_at_break_away([static, bias], curve, ramps(11.9), "N")
     assert not exceeded_at_break_away([static, bias], curve, ramps(13.9, 2), "N")
     assert not exceeded_at_break_away([bias], curve, ramps(13.9), "N")
+    assert not exceeded_at_break_away([static, bias], curve, ramps(11.5, more=3, backward=5), "N")
     assert not exceeded_at_break_away([static, bias], {**curve, "friction.viscous": 60.0}, ramps(13.9), "N")

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identification.estimate import Estimate
 from friso.identification.output_error.identifiable import STRIBECK
-from friso.identification.readings.common import robust, stribeck_curve
+from friso.identification.readings.common import by_direction, robust, stribeck_curve
 from friso.identification.readings.ramps import Ramps
 from friso.intervals import COVERAGE
 
@@ -34,12 +34,16 @@ def exceeded_at_break_away(
     """
     names = {estimate.name: estimate for estimate in estimates if estimate.determined}
     static = names.get("friction.static")
-    if static is None or len(ramps.forces) < FEW:
+    sides = [side for _, side in by_direction(ramps.directions)]
+    if static is None or len(ramps.forces) < FEW or not all(side.any() for side in sides):
         return {}
     bias = sum(one.value for name, one in names.items() if name.startswith("bias."))
     friction = ramps.forces + ramps.directions * bias - _rises(flat, ramps.speeds)
-    middle = float(np.median(friction))
-    unsure = COVERAGE * MEDIAN * robust(friction) / np.sqrt(len(friction)) + float(np.median(ramps.unsure))
+    medians = [float(np.median(friction[side])) for side in sides]
+    middle = float(np.mean(medians))
+    apart = robust(friction - np.where(sides[0], *medians))
+    scatter = MEDIAN * apart * np.sqrt(sum(1 / side.sum() for side in sides)) / len(sides)
+    unsure = COVERAGE * scatter + float(np.median(ramps.unsure))
     if middle - unsure <= static.high:
         return {}
     why = f"motions begin with {middle:.3g} {unit} of friction, more than the {static.value:.3g} {unit} of the fit"
@@ -50,6 +54,7 @@ def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:
     """By how much [N] friction at speeds up to these [m/s], shape (n,), exceeds static friction at most."""
     static, coulomb = flat["friction.static"], flat["friction.coulomb"]
     up_to = np.linspace(0, 1, STEPS)[:, None] * speeds
-    curve = stribeck_curve(up_to, coulomb, static, flat["friction.stribeck_velocity"])
+    exponent = flat.get("friction.stribeck_exponent", 2.0)
+    curve = stribeck_curve(up_to, coulomb, static, flat["friction.stribeck_velocity"], exponent)
     viscous = flat["friction.viscous"] * (1 + abs(flat.get("friction.viscous_asymmetry", 0.0)))
     return (curve + viscous * up_to).max(axis=0) - static
