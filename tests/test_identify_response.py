@@ -508,6 +508,10 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
         assert bench.two_masses is not None
         assert all(bench.two_masses[name].value == pytest.approx(value, rel=1e-3) for name, value in truth.items())
         assert bool(KINDS["frequency"].doubts(bench)) is (sign < 0)
+    above = 1.1 * bench.two_masses["antiresonance frequency"].value
+    cut = analyse((), (above, 100.0), measured=MeasuredResponse(frequency, values, None, "", unit="m/N")).two_masses
+    assert cut is not None, "the resonance lies in the band that the user gave"
+    assert all(cut[name].value == pytest.approx(value, rel=1e-2) for name, value in truth.items())
 
 
 def test_intervals_grow_where_realisations_scatter(refused: Refused) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +19,7 @@ from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.identification.stage_file import made_up
+from friso.views.identify.kinds.moves import FALLING, _inverse_text
 
 FLAT = {"friction.stribeck_velocity": 1e-3, "axis.kind": "linear"}
 MASSES = Estimate.normal("masses.cart", "kg", 3.0, 0.1, "drawn")
@@ -122,3 +124,17 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
     assert not exceeded_at_break_away([bias], curve, ramps(13.9), "N")
     assert not exceeded_at_break_away([static, bias], curve, ramps(11.5, more=3, backward=5), "N")
     assert not exceeded_at_break_away([static, bias], {**curve, "friction.viscous": 60.0}, ramps(13.9), "N")
+
+
+def test_falling_friction_is_told_where_no_other_sign_is_possible() -> None:
+    """Noise puts viscous friction a little below zero."""
+    rng, phase = np.random.default_rng(5), 2 * np.pi * np.arange(6000) / 1000
+    position, acceleration = 0.02 * np.sin(phase), -0.02 * (2 * np.pi) ** 2 * np.sin(phase)
+    force = 20 * acceleration + 20 * np.tanh(50 * np.cos(phase)) + rng.standard_normal(len(phase))
+    model = inverse_model(record("moves", 1e-3, position=position, force=force))
+    viscous = next(one for one in model.estimates if one.name == "viscous")
+    for low, high, falls in ((-5.0, 4.0, False), (-5.0, -1.0, True)):
+        changed = replace(viscous, value=-0.5, low=low, high=high)
+        solution = {**model.solution, "viscous": changed.value}
+        others = tuple(changed if one is viscous else one for one in model.estimates)
+        assert (FALLING in _inverse_text(replace(model, estimates=others, solution=solution))) == falls

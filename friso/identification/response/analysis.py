@@ -75,12 +75,12 @@ def analyse(
     first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
     model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
     if model and band is None and _below(model, first):
-        model = _attempt(warnings, "two masses", fit_two_mass, driven, other, None)
+        model = _attempt([], "two masses", fit_two_mass, driven, other, None) or model
     departs = _attempt(warnings, "departure", departure, driven, model.predict) if model else None
     used = band or _above(driven, departs)
     if model and len(logs) > 1:
         model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
-    if model and _below(model, used):
+    if model and band is None and other is None and _below(model, used):
         place = f"an antiresonance at {model['antiresonance frequency'].value:.3g} Hz"
         warnings.append(f"no two masses: {place}, below the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
         model = None
@@ -161,7 +161,8 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
 
 
 def _below(model: TwoMass, band: FrequencyRange) -> bool:
-    """Whether a two-mass model puts its antiresonance below a band [Hz], where nothing of the response tells of it."""
+    """Whether a two-mass model puts its antiresonance below a band [Hz], where what it leaves out, such as bristles,
+    may stand for it."""
     return not model["antiresonance frequency"].value >= band[0]
 
 

@@ -77,7 +77,7 @@ def _errors(moves: IdentifiedMoves) -> str:
 
 def _inverse_text(model: InverseModel) -> str:
     text = f"{estimates_in_words(model.estimates)}; force error {percent(model.error, 3)}"
-    falling = any(name.startswith("viscous") and value < 0 for name, value in model.solution.items())
+    falling = any(one.name.startswith("viscous") and one.high < 0 for one in model.estimates)
     return f"{text}; {FALLING}" if falling else text
 
 
