@@ -303,6 +303,22 @@ def test_a_user_without_a_home_has_a_passing_folder(monkeypatch: pytest.MonkeyPa
     assert not folder.exists()
 
 
+def test_the_folder_is_one_as_users_write_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With ~ for the user's own; why a file is none is told in words."""
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    monkeypatch.setenv(cache.FOLDER_VARIABLE, os.path.join("~", "kept"))
+    assert cache.cache_folder.__wrapped__() == tmp_path / "kept" / "kernels"
+    (tmp_path / "kept" / "file").touch()
+    monkeypatch.setenv(cache.FOLDER_VARIABLE, os.path.join("~", "kept", "file"))
+    cache.remove_if_passing(cache.cache_folder.__wrapped__())
+    (warning,) = caplog.messages
+    assert "Errno" not in warning
+    assert str(tmp_path / "kept" / "file") in warning
+
+
 def test_what_a_killed_process_left_where_it_tried_to_write_goes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -39,7 +39,7 @@ from friso.engine.private import make_private
 from friso.engine.processor import processor
 from friso.engine.seal import read_sealed, write_sealed
 from friso.leftovers import locked_folder, temporary_folder
-from friso.system import remove_folder
+from friso.system import cause_of, path_of, remove_folder
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")
@@ -57,14 +57,15 @@ DAY = 86_400.0
 def cache_folder() -> Path:
     """The folder of compiled code, mode 0700; a temporary one, with a warning, where that cannot be had."""
     try:
-        folder = (Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels").absolute()
+        chosen = Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")).expanduser()
+        folder = (chosen / "kernels").absolute()
         make_private(folder)
         with locked_folder(folder, "trial-", "lock"):
             return folder
     except (OSError, RuntimeError) as error:  # the latter of a user without a home
         logger.warning(
             "kernels are compiled into a temporary folder and not kept: %s; %s names another folder",
-            error,
+            _in_words(error),
             FOLDER_VARIABLE,
         )
         held = ExitStack()
@@ -72,6 +73,13 @@ def cache_folder() -> Path:
         folder.mkdir(mode=0o700)
         atexit.register(held.close)
         return folder
+
+
+def _in_words(error: OSError | RuntimeError) -> str:
+    """Why a folder cannot be had, without a number of the system's."""
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{cause_of(error)} ({path_of(error)})"
+    return str(error)
 
 
 _PASSING = "friso-kernels-"
