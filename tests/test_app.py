@@ -35,6 +35,7 @@ from friso.app.server import application
 from friso.app.work import Work, Workshop
 from friso.engine.overtaken import Overtaken, ended_by, go_on
 from friso.errors import InputError, LogError
+from friso.identification.logs.mapping import sidecar
 from friso.studies.execute import local_crew
 from friso.studies.request import Request
 from friso.studies.sweep import run_in_memory
@@ -263,7 +264,8 @@ def test_no_mapping_of_the_user_s_has_a_say_in_what_was_dropped(
     served: Served, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A mapping is kept beside a log of the same name, in the folder where the server was started."""
-    (tmp_path / "mine.csv.friso.toml").write_text('not = "a mapping"', encoding="utf-8")
+    for place in (tmp_path / "mine.csv.friso.toml", sidecar(tmp_path / "elsewhere" / "mine.csv", tmp_path)):
+        place.write_text('not = "a mapping"', encoding="utf-8")
     monkeypatch.chdir(tmp_path)
     log = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
     with pytest.raises(LogError, match=r"mine\.csv\.friso\.toml"):

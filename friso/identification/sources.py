@@ -13,7 +13,7 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.assemble import read_log
 from friso.identification.logs.gaps import GapsError
 from friso.identification.logs.log import Log
-from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, place_for
+from friso.identification.logs.mapping import SUFFIX, Mapping, load_mapping, place_for, sidecar
 from friso.identification.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identification.logs.roles import find
 from friso.identification.readings.course import Course
@@ -38,8 +38,8 @@ class LogFile:
     @property
     def reused(self) -> str:
         """A sentence on what nobody said this time; "" for nothing."""
-        words = self.earlier.words
-        return f"{self.path.name}: read as kept in {self.path.name}{SUFFIX}: {words}" if words else ""
+        words, place = self.earlier.words, self.mapping_file or sidecar(self.path)
+        return f"{self.path.name}: read as kept in {place.name}: {words}" if words else ""
 
 
 class OpenQuestions(GapsError):
