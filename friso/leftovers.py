@@ -14,7 +14,7 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from friso.system import MOVES_OPEN_FOLDERS, foreign_writers, is_users_own, remove_folder
+from friso.system import DRAFT_MODE, MOVES_OPEN_FOLDERS, foreign_writers, is_users_own, remove_folder
 
 _TRIES = 3
 
@@ -41,7 +41,7 @@ def _made_and_locked(root: Path, prefix: str, lock: str, tries: int) -> tuple[Pa
     """The folder and its lock. Before that is held another process may remove the folder, and filelock makes it again,
     for others to read: then it is another folder that is tried."""
     folder = root / f"{prefix}{uuid.uuid4().hex[:12]}"
-    folder.mkdir(mode=0o700)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
+    folder.mkdir(mode=DRAFT_MODE)  # mkdtemp tries for ever where Windows lets no folder be made (python/cpython#66305)
     held = FileLock(folder / lock)
     try:
         made = folder.lstat()

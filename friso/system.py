@@ -332,6 +332,14 @@ MODES_TELL = sys.platform != "win32"
 MOVES_OPEN_FOLDERS = sys.platform != "win32"
 """Whether a folder can be renamed, or deleted, in which a file is open: not on Windows."""
 
+DRAFT_MODE = 0o700 if sys.platform != "win32" else 0o777
+"""Mode of a folder in which files are made that are then moved elsewhere: on Windows 0o700 would give them an access
+list that keeps everybody else out, wherever they are (python/cpython#118486)."""
+
+HAS_JIT_LINK = sys.platform != "win32"
+"""Whether llvmlite has the linker of LLVM that places code and its constants close to each other (JITLink): not on
+Windows. The older one aborts a large process where they come to lie too far apart (numba/numba#8567, #9001)."""
+
 MOST_PROCESSES = 61 if sys.platform == "win32" else 10_000
 """How many processes one can wait for at a time."""
 

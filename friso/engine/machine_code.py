@@ -13,6 +13,7 @@ from llvmlite import ir
 
 from friso.engine.kinds import CompiledKind, Packing
 from friso.engine.processor import processor
+from friso.system import HAS_JIT_LINK
 
 
 def object_code(module: ir.Module) -> bytes:
@@ -51,7 +52,7 @@ _libraries: list[llvm.ResourceTracker] = []
 
 @cache
 def _linker() -> llvm.LLJIT:
-    return llvm.create_lljit_compiler(processor().target_machine())
+    return llvm.create_lljit_compiler(processor().target_machine(), use_jit_link=HAS_JIT_LINK)
 
 
 class Loops:

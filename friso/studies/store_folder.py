@@ -20,7 +20,7 @@ from friso.errors import StoreError
 from friso.interrupts import hold_interrupts
 from friso.leftovers import is_leftover, remove_leftover
 from friso.studies.store_files import is_of_store
-from friso.system import MOVES_OPEN_FOLDERS, cause_of, delete_file, remove_folder, rename_folder
+from friso.system import DRAFT_MODE, MOVES_OPEN_FOLDERS, cause_of, delete_file, remove_folder, rename_folder
 from friso.whole_file import PARTIAL, is_partial
 
 LOCK = ".friso.lock"
@@ -138,7 +138,7 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
     into what is deleted here."""
     draft = _free_name(path)
     try:
-        draft.mkdir(mode=0o700, parents=True)
+        draft.mkdir(mode=DRAFT_MODE, parents=True)
         with FileLock(draft / LOCK):  # locked, it is no leftover
             new = draft / "store"
             with hold_interrupts():
