@@ -177,7 +177,11 @@ def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
     gains |= {"STEPGEN_MAXVEL": 104.17, "ENCODER_SCALE": 4000.0, "HOME_OFFSET": 2.0}
     gains |= {"OUTPUT_SCALE": 250.0, "BACKLASH": 0.01, "FF9": 3.0, "DEDBAND": 0.1}
     loop = {"controller.kp": "900 N*s/m", "controller.velocity_integral_time": "8 ms"}
-    drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop})
+    with pytest.raises(InputError, match=r"drive\.sample_time"):  # the drive's own, which no INI file has
+        stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop})
+    drawn = stage_from(ini(tmp_path, gains), None, {**MACHINE, **loop, "drive.sample_time": "125 us"})
+    times = [drawn.stage.flat()[f"drive.{name}"] for name in ("sample_time", "position_sample_time")]
+    assert times == pytest.approx([125e-6, 1e-3])
     for beginning in (
         "BIAS = 0.5",
         "BACKLASH = 0.01",
@@ -197,7 +201,7 @@ def test_velocity_mode_there_and_back(tmp_path: Path) -> None:
 def test_an_output_in_volts_has_a_scale(tmp_path: Path) -> None:
     """P and FF1 of an output of which 1 makes 5 mm/s; without the scale they are not known."""
     path = ini(tmp_path, {"P": 50.0, "I": 10.0, "FF1": 0.2})
-    labels = {**MACHINE, "controller.kp": "900 N*s/m"}
+    labels = {**MACHINE, "controller.kp": "900 N*s/m", "drive.sample_time": "125 us"}
     with pytest.raises(InputError, match="velocity_per_output"):
         stage_from(path, None, labels)
     scale = {"velocity_per_output": "5 mm/s"}
@@ -340,6 +344,11 @@ def test_what_export_cannot_do(answers: dict[str, Any], to: str | None, part: st
 def test_a_controller_that_a_drive_does_not_have(name: str) -> None:
     with pytest.raises(InputError, match="a cascade, the only structure"):
         gains_of(friso.load(EXAMPLES / f"{name}.toml"), {"travel_per_turn": "10 mm"}, "odrive")
+
+
+def test_a_travel_other_than_that_of_the_screw_is_refused() -> None:
+    with pytest.raises(InputError, match="that of the transmission"):
+        gains_of(friso.load(EXAMPLES / "ball_screw_axis.toml"), {"travel_per_turn": "5 mm"}, None)
 
 
 @pytest.mark.parametrize("to", [*FORMATS])

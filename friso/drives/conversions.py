@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from math import isfinite, pi
+from math import isclose, isfinite, pi
 from typing import Any
 
 from friso.axis import KINDS, LINEAR, AxisKind, axis_of
@@ -58,9 +58,16 @@ class Turn:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], answers: UserAnswers) -> Turn:
-        """As the transmission or the user says. Raises InputError for an answer in another unit."""
-        kind = axis_of(flat)
-        travel = answers.value(TRAVEL, TRAVELS[kind]) if TRAVEL in answers else travel_of(flat)
+        """As the transmission or the user says. Raises InputError for an answer in another unit, or other than that of
+        the transmission."""
+        kind, travel = axis_of(flat), travel_of(flat)
+        if TRAVEL in answers:
+            answer = answers.value(TRAVEL, TRAVELS[kind])
+            if travel is not None and not isclose(answer, travel, rel_tol=1e-6):
+                unit = kind.unit("m")
+                expected = f"that of the transmission, {travel:.6g} {unit}, which is enough"
+                raise InputError(TRAVEL, f"{answer:.6g} {unit}", expected)
+            travel = answer
         per_ampere = None
         if MOTOR_CONSTANT in answers and travel is not None:
             per_ampere = answers.value(MOTOR_CONSTANT, TORQUE_PER_AMPERE) * 2 * pi / travel

@@ -154,15 +154,22 @@ def questions(axis: AxisParameters, answers: UserAnswers) -> tuple[OpenQuestion,
         example = '"mm"' if kind == LINEAR else '"deg"'
         meaning = "unit of the gains: [TRAJ] has no LINEAR_UNITS or ANGULAR_UNITS, or the axis has other UNITS"
         asked.append(OpenQuestion(UNIT, meaning, example))
-    if "SERVO_PERIOD" not in axis.machine and "drive.sample_time" not in answers:
-        asked.append(OpenQuestion("drive.sample_time", "period of the servo thread", '"1 ms"'))
-    if "controller.kp" in answers and FORCE not in answers and VELOCITY not in answers and not _unity(axis):
+    in_velocity = "controller.kp" in answers and FORCE not in answers
+    if "SERVO_PERIOD" not in axis.machine:
+        thread = "drive.position_sample_time" if in_velocity else "drive.sample_time"
+        asked += [] if thread in answers else [OpenQuestion(thread, "period of the servo thread", '"1 ms"')]
+    if in_velocity and "drive.sample_time" not in answers:
+        meaning = "period of the drive's own velocity loop, of which that of the servo thread is a multiple"
+        asked.append(OpenQuestion("drive.sample_time", meaning, '"125 us"'))
+    if in_velocity and VELOCITY not in answers and not _unity(axis):
         meaning = "velocity that an output of 1 makes: FF1 is not about 1, so it is not one machine unit per second"
         asked.append(OpenQuestion(VELOCITY, meaning, VELOCITY_FIELD.on(kind).written_example))
     if FORCE not in answers and "controller.kp" not in answers:
         meaning = "force that an output of 1 makes (torque mode); in velocity mode, instead, --set controller.kp="
         gain = Quantity("N*s/m", positive, "500 N*s/m").on(kind).written_example
-        meaning += f'{gain} and --set controller.velocity_integral_time="10 ms" of the drive'
+        meaning += (
+            f'{gain}, --set controller.velocity_integral_time="10 ms" and --set drive.sample_time="125 us" of the drive'
+        )
         asked.append(OpenQuestion(FORCE, meaning, FORCE_FIELD.on(kind).written_example))
     moved = axis.is_set("MAX_ACCELERATION") and axis.is_set("MAX_VELOCITY")
     return (*asked, *of_the_machine(answers, kind, moved))
@@ -187,7 +194,7 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
     if not in_torque and VELOCITY not in answers:
         drive[VELOCITY] = si(unit, kind.unit("m/s"))
     if "SERVO_PERIOD" in axis.machine:
-        drive["sample_time"] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
+        drive["sample_time" if in_torque else "position_sample_time"] = si(axis.number("SERVO_PERIOD") * 1e-9, "s")
     tables: dict[str, Mapping[str, object]] = {"controller": controller, "drive": drive}
     if kind != LINEAR:
         tables["axis"] = {"kind": kind.name}
