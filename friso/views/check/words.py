@@ -157,8 +157,15 @@ def _settling_sentence(case: Case) -> str:
         return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}."
     if coarse is not None:
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}"
-        return f"{within}, but does not stay within {band_text(_MICRON)}."
+        return f"{within}, but does not stay within {band_text(_MICRON)}{_small_swing(case)}."
     return f"settles, but not to within {band_text(_TEN_MICRON)} ({_end(case)})."
+
+
+def _small_swing(case: Case) -> str:
+    """How a motion that stays within 10 um swings there at its end; "" if it does not."""
+    if not case.period or case.peak_to_peak < _MICRON:
+        return ""
+    return f": at its end it swings by {at_the_end(case)} peak to peak every {with_unit(case.period, 's')}"
 
 
 def _doubts(case: Case) -> list[str]:
