@@ -416,11 +416,11 @@ def test_break_away_falls_with_the_rate_as_published() -> None:
     rates = [1.0, 1.0, 10.0, 10.0, 20.0, 20.0]
     for noise in ((0.0, 0.0), (1e-7, 5e-3)):
         result = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(1), 1.15, noise), 1.0)
-        published = np.interp(result.rates, [1.0, 10.0, 20.0], [1.42, 1.21, 1.09])
-        own = result.unsure if any(noise) else 0.0
-        assert np.all(np.abs(result.forces - published) < 0.03 * published + own)
-        assert np.all(result.unsure < 0.05 * result.forces)
-        assert result.rates == pytest.approx(rates, rel=0.01)
+        published = np.interp(result.ramps.rates, [1.0, 10.0, 20.0], [1.42, 1.21, 1.09])
+        own = result.ramps.unsure if any(noise) else 0.0
+        assert np.all(np.abs(result.ramps.forces - published) < 0.03 * published + own)
+        assert np.all(result.ramps.unsure < 0.05 * result.ramps.forces)
+        assert result.ramps.rates == pytest.approx(rates, rel=0.01)
         assert result.static.holds(1.5)
 
 
@@ -432,9 +432,9 @@ def test_noise_does_not_raise_the_break_away() -> None:
         static_from_ramps(ramps(heavy, rates, 8.0, np.random.default_rng(4), 1.15, noise), 8.0)
         for noise in ((0.0, 0.0), (4e-7, 5e-3))
     )
-    assert len(noisy.forces) == len(clean.forces) == 6
-    assert np.all(np.abs(noisy.forces - clean.forces) <= noisy.unsure + 3 * 5e-3)
-    assert abs(np.mean(noisy.forces / clean.forces) - 1) < 0.01
+    assert len(noisy.ramps.forces) == len(clean.ramps.forces) == 6
+    assert np.all(np.abs(noisy.ramps.forces - clean.ramps.forces) <= noisy.ramps.unsure + 3 * 5e-3)
+    assert abs(np.mean(noisy.ramps.forces / clean.ramps.forces) - 1) < 0.01
     assert noisy.static.holds(2.0)
     assert noisy.static.half_width < 0.1 * 2.0
 
@@ -489,7 +489,7 @@ def test_the_bound_on_the_rate_effect_holds() -> None:
     assert by_rate == sorted(by_rate, reverse=True)
     assert by_rate[-1] == 1.0
     result = static_from_ramps(ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3)), 1.0)
-    for level, force_rate in zip(result.forces, result.rates, strict=True):
+    for level, force_rate in zip(result.ramps.forces, result.ramps.rates, strict=True):
         assert break_away(force_rate, 1.5, 1.0, 1e5, 1e-3) < level < 1.5
         assert level > 1.5 * (1 - share_below(force_rate))
     small = np.array([share_below(r) for r in (1e-2, 1e-1)])

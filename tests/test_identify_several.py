@@ -36,7 +36,7 @@ def test_ramps_of_one_break_away_each_are_one_experiment() -> None:
     result = identify([(log, "break-away") for log in single])
     (experiment,) = result.experiments
     (estimate,) = result.estimates
-    assert len(experiment.result.times) == 4
+    assert len(experiment.result.ramps.times) == 4
     assert estimate.value == pytest.approx(static_from_ramps(whole).static.value, rel=1e-3)
     assert estimate.holds(LUGRE[0])
 
@@ -116,7 +116,7 @@ def test_stops_within_a_ramp_are_no_break_aways() -> None:
     rng = np.random.default_rng(1)
     log = record("ramp", DT, position=place + 1e-8 * rng.standard_normal(len(time)), force=push)
     result = static_from_ramps(log)
-    assert result.forces == pytest.approx([1.5], rel=0.05)
+    assert result.ramps.forces == pytest.approx([1.5], rel=0.05)
     assert any("2 motions" in line for line in result.warnings) or "2 motions" in result.static.reason
 
 

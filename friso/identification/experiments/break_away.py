@@ -14,7 +14,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import by_direction
-from friso.identification.readings.ramps import force_ramps
+from friso.identification.readings.ramps import Ramps, force_ramps
 from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
 
 FEW = 3
@@ -23,20 +23,12 @@ FEW = 3
 
 @dataclass(frozen=True)
 class BreakAway:
-    """Static friction [N] in all and per direction, of break-away forces at rate 0. Per ramp, shape (n,): time [s],
-    place [m], direction, break-away force [N] in that direction, force rate [N/s], and by how much [N] noise and
-    smoothing may have moved that force to either side; the threshold [m/s] of the speed."""
+    """Static friction [N] in all and per direction, of the break-away forces of `ramps` at rate 0."""
 
     static: Estimate
     forward: Estimate
     backward: Estimate
-    times: np.ndarray
-    places: np.ndarray
-    directions: np.ndarray
-    forces: np.ndarray
-    rates: np.ndarray
-    unsure: np.ndarray
-    threshold: float
+    ramps: Ramps
     warnings: tuple[str, ...]
 
 
@@ -65,8 +57,7 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
     together = static(np.ones(len(ramps.forces), dtype=bool))
     if forward.determined and backward.determined and (forward.low > backward.high or backward.low > forward.high):
         notes.append(f"The directions differ: {forward.value:.3g} N forward, {backward.value:.3g} N backward.")
-    readings = (ramps.times, ramps.places, ramps.directions, ramps.forces, ramps.rates, ramps.unsure)
-    return BreakAway(together, forward, backward, *readings, ramps.threshold, tuple(notes))
+    return BreakAway(together, forward, backward, ramps, tuple(notes))
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
@@ -81,5 +72,5 @@ KIND = ExperimentKind[BreakAway](
     after=("frequency", "moves"),
     foreign=("force",),
     per_unit=True,
-    partial=lambda log: len(static_from_ramps(log).times) < FEW,
+    partial=lambda log: len(static_from_ramps(log).ramps.times) < FEW,
 )

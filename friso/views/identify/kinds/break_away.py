@@ -21,30 +21,32 @@ def _facts(result: BreakAway) -> Facts:
         ("Static friction", with_interval(result.static)),
         ("Forward", with_interval(result.forward)),
         ("Backward", with_interval(result.backward)),
-        ("Ramps", str(len(result.times))),
+        ("Ramps", str(len(result.ramps.times))),
     ]
-    if len(result.rates):
-        facts.append(("Force rates", range_with_unit(float(result.rates.min()), float(result.rates.max()), "N/s")))
+    if len(rates := result.ramps.rates):
+        facts.append(("Force rates", range_with_unit(float(rates.min()), float(rates.max()), "N/s")))
     return tuple(facts)
 
 
 def _numbers(result: BreakAway) -> dict[str, Any]:
     several = {"static": result.static, "forward": result.forward, "backward": result.backward}
     estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
-    ramps = {"forces_n": result.forces, "rates_n_per_s": result.rates, "directions": result.directions}
-    return {**estimates, **ramps, "warnings": list(result.warnings)}
+    ramps = result.ramps
+    readings = {"forces_n": ramps.forces, "rates_n_per_s": ramps.rates, "directions": ramps.directions}
+    return {**estimates, **readings, "warnings": list(result.warnings)}
 
 
 def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:
     """Break-away force over force rate."""
-    if not len(result.times):
+    ramps = result.ramps
+    if not len(ramps.times):
         return []
     points = tuple(
-        Markers(result.rates[chosen], result.forces[chosen], word, WAYS[word])
-        for word, chosen in (("forward", result.directions > 0), ("backward", result.directions < 0))
+        Markers(ramps.rates[chosen], ramps.forces[chosen], word, WAYS[word])
+        for word, chosen in (("forward", ramps.directions > 0), ("backward", ramps.directions < 0))
         if chosen.any()
     )
-    low, high = float(result.rates.min()) / 1.3, float(result.rates.max()) * 1.3
+    low, high = float(ramps.rates.min()) / 1.3, float(ramps.rates.max()) * 1.3
     bands, limits = (), ()
     if np.isfinite([result.static.low, result.static.high]).all():
         ends = np.array([low, high])
