@@ -32,7 +32,7 @@ export function typing() {
 
 export function keys(place, machine, part, changed, wrong, tell) {
   const about = PARTS.find((item) => item.id === part);
-  const held = place.contains(document.activeElement) ? document.activeElement.id : "";
+  const before = place.contains(document.activeElement) ? document.activeElement : null;
   const opened = new Set([...place.querySelectorAll("details[open]")].map((item) => item.dataset.table));
   const tables = about.tables.map((name) => machine.tables.find((table) => table.name === name));
   const text = el("button", { id: "keys-text", type: "button", class: "plain", onclick: () => tell.edit() }, "Edit as text");
@@ -55,7 +55,14 @@ export function keys(place, machine, part, changed, wrong, tell) {
   }
   place.append(text);
   refuse(place, wrong);
-  if (held) ($(held) ?? $(held.replace(SLIDER, "")))?.focus();
+  if (before?.id) focusAgain(before);
+}
+
+/** What is drawn again has the focus that it had, and selects what was selected: that may be about to be typed over. */
+function focusAgain(before) {
+  const item = $(before.id) ?? $(before.id.replace(SLIDER, ""));
+  item?.focus();
+  if (item?.type === "text" && before.type === "text") item.setSelectionRange(before.selectionStart, before.selectionEnd);
 }
 
 /** Say what is wrong at its keys, and of no other one; they are not drawn again. */
