@@ -247,7 +247,9 @@ def test_a_slider_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
     height = place["y"] + place["height"] / 2
     page.mouse.move(place["x"] + 0.6 * place["width"], height)  # not where it stands: nothing would be set
     try:
-        with page.expect_request(lambda request: "ask/verdict" in request.url and "3 kg" not in (request.post_data or "")):
+        with page.expect_request(
+            lambda request: "ask/verdict" in request.url and "3 kg" not in (request.post_data or "")
+        ):
             page.mouse.down()  # the verdict is asked for once the machine is right again
         assert same.evaluate("slider => slider.isConnected")
         there = page.input_value(f"{row} input[type=text]")
