@@ -406,6 +406,10 @@ def finished(rig: Stage, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+SEALED = (".zmetadata", ".zmetadata.copy")
+"""The metadata, in the order in which they are looked for."""
+
+
 @pytest.fixture
 def stored(finished: Path, tmp_path: Path) -> Path:
     """A copy of the finished store."""
@@ -461,16 +465,33 @@ def test_a_damaged_block_is_run_again(
 
 
 @pytest.mark.parametrize("place", np.linspace(0.01, 0.99, 25))
-def test_damaged_metadata_are_refused(stored: Path, place: float) -> None:
+def test_metadata_that_are_damaged_like_their_copy_are_refused(stored: Path, place: float) -> None:
     before = read_store(stored).attrs
-    flip(stored / ".zmetadata", place)
+    for name in SEALED:
+        flip(stored / name, place)
     with suppress(StoreError):
         assert read_store(stored).attrs == before  # blank space
 
 
-@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b"null", b'{"metadata": 3}', b"\xff\x00", b"[" * 100_000])
-def test_metadata_of_any_content_are_refused(stored: Path, content: bytes, refused: Refused) -> None:
-    (stored / ".zmetadata").write_bytes(content)
+CUT = b"cut"
+
+
+@pytest.mark.parametrize("content", [CUT, b"", b"{}", b"[1]", b"null", b'{"metadata": 3}', b"\xff\x00", b"[" * 100_000])
+def test_metadata_of_any_content_are_written_anew_from_their_copy(
+    stored: Path, rig: Stage, content: bytes, refused: Refused, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Where that is damaged too they are refused."""
+    runs, file = read_store(stored).load(), stored / ".zmetadata"
+    whole = file.read_bytes()
+    damaged = whole[: len(whole) // 2] if content == CUT else content
+    file.write_bytes(damaged)
+    xr.testing.assert_identical(read_store(stored).load(), runs)
+    assert (check_store(stored).files, check_store(stored).damaged) == ([".zmetadata"], [])
+    with Store.opened(stored, Request(rig, AXES).study()):
+        assert [(stored / name).read_bytes() for name in SEALED] == [whole, whole]
+    assert ".zmetadata was damaged" in caplog.text
+    for name in SEALED:
+        (stored / name).write_bytes(damaged)
     with refused(kind=StoreError):
         read_store(stored)
 
@@ -479,7 +500,8 @@ def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Re
     flip(stored / "joint.stroke" / "0", 0.8)
     with refused(kind=StoreError):
         read_store(stored)
-    (stored / ".zmetadata").unlink()
+    for name in SEALED:
+        (stored / name).unlink()
     with refused(kind=StoreError):
         read_store(stored)
 
@@ -496,9 +518,7 @@ def test_a_store_once_checked_pickles_and_its_metadata_are_not_read_again(stored
 
 
 @posix
-@pytest.mark.parametrize(
-    "name", [".zmetadata", ".zattrs", "peaks/.zarray", "joint.stroke/0", ".blocks/0.0", "peaks/0.0"]
-)
+@pytest.mark.parametrize("name", [*SEALED, ".zattrs", "peaks/.zarray", "joint.stroke/0", ".blocks/0.0", "peaks/0.0"])
 @pytest.mark.parametrize("kind", ["pipe", "device", "link", "huge"])
 def test_what_is_no_file_of_a_store_is_not_read(stored: Path, name: str, kind: str, tmp_path: Path) -> None:
     file = stored / name
@@ -576,7 +596,8 @@ def sealed_again(stored: Path) -> Iterator[dict[str, Any]]:
     yield document["metadata"]
     entry = document["friso"]
     entry["sha256"] = digest([document["metadata"], {key: entry[key] for key in entry if key != "sha256"}])
-    (stored / ".zmetadata").write_text(json.dumps(document))
+    for name in SEALED:
+        (stored / name).write_text(json.dumps(document))
 
 
 @pytest.mark.parametrize("name", ["joint.stroke", "peaks"])
@@ -650,17 +671,20 @@ def test_a_store_of_a_newer_friso_says_so(stored: Path, refused: Refused) -> Non
     document = json.loads((stored / ".zmetadata").read_text())
     document["friso"]["format"] += 1
     document["metadata"][".zattrs"]["friso"] = "9.9.9"
-    (stored / ".zmetadata").write_text(json.dumps(document))
+    for name in SEALED:
+        (stored / name).write_text(json.dumps(document))
     with refused(kind=StoreError) as error:
         read_store(stored)
     assert "newer friso (9.9.9)" in str(error.value)
 
 
-@pytest.mark.parametrize("damage", ["", ".zmetadata"])
-def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(stored: Path, rig: Stage, damage: str) -> None:
+@pytest.mark.parametrize("damaged", [(), SEALED])
+def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(
+    stored: Path, rig: Stage, damaged: tuple[str, ...]
+) -> None:
     other = Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
-    if damage:
-        flip(stored / damage, 0.5)
+    for name in damaged:
+        flip(stored / name, 0.5)
     with pytest.raises(StoreError), Store.opened(stored, other):
         pass
     with Store.opened(stored, other, overwrite=True) as store:

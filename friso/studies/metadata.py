@@ -1,7 +1,8 @@
-"""The metadata of a store: one file (.zmetadata), written at once, with the digest of what it says.
+"""The metadata of a store: one file (.zmetadata), written at once, with the digest of what it says, and a copy of it,
+which is read where that one is damaged.
 
-Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs, and
-are written anew from it where they do not. What friso notes for itself stands there too: the digests of the axes, and
+Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs. These
+and the copy are written anew from it where they do not. What friso notes for itself stands there too: the digests of the axes, and
 for what the figures beside the store are coloured by.
 """
 
@@ -9,10 +10,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import logging
 import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,11 +26,13 @@ from friso.studies.cells import METRICS
 from friso.studies.store_files import digest_of, put, stored
 from friso.system import cause_of
 
+logger = logging.getLogger("friso")
+
 FORMAT = 2
 """Version of what friso writes into a store."""
 
-_FILE, _OWN, _ATTRIBUTES = ".zmetadata", "friso", ".zattrs"
-"""The file, friso's own entry in it, and the entry with the attributes of the study."""
+_FILE, _COPY, _OWN, _ATTRIBUTES = ".zmetadata", ".zmetadata.copy", "friso", ".zattrs"
+"""The file, its copy, friso's own entry in it, and the entry with the attributes of the study."""
 
 _NAMES = re.compile(r"(?:\w[\w.-]*/)?\.z(?:array|attrs|group)"), re.compile(r"\w[\w.-]*/\d+")
 """Names of files beside the arrays and of those of axes: all of them in the store, whatever metadata of others say."""
@@ -37,6 +42,7 @@ _KIND, _CODECS = re.compile(r"[<>|](?P<letter>[bfiuU])(?P<size>[0-9]{1,4})"), {"
 _CHUNK = 1 << 30
 """Size of a chunk in memory at most: the longest axis has no larger one."""
 
+_EXPECTED = "a store made by friso map, or a new name"
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
 
@@ -57,8 +63,8 @@ class Metadata:
 
     @property
     def all_files(self) -> dict[str, Any]:
-        """The same with the file that holds them all."""
-        return {**self.files, _FILE: self.document}
+        """The same with the file that holds them all, and its copy."""
+        return {**self.files, _FILE: self.document, _COPY: self.document}
 
     @property
     def attributes(self) -> dict[str, Any]:
@@ -66,18 +72,20 @@ class Metadata:
         return dict(self.files[_ATTRIBUTES])
 
     def damaged_files(self, path: Path) -> list[str]:
-        """The files beside the arrays of the store at `path` that do not say the same."""
-        return [name for name, content in self.files.items() if not _says(path / name, content)]
+        """The files of metadata of the store at `path` that do not say the same."""
+        return [name for name, content in self.all_files.items() if not _says(path / name, content)]
 
     def damaged_axes(self, path: Path) -> list[str]:
         """The files of the axes that are not what was written."""
         return [name for name, written in self.axes.items() if digest_of(path / name) != written]
 
     def mend(self, path: Path) -> None:
-        """Write the files beside the arrays anew that do not say the same. Raises OSError."""
+        """Write the files of metadata anew that do not say the same. Raises OSError."""
         for name in self.damaged_files(path):
+            if name == _FILE:
+                logger.warning("%s: %s was damaged, and is written anew from its copy", path, name)
             (path / name).parent.mkdir(exist_ok=True)
-            put(path / name, json.dumps(self.files[name], indent=1).encode())
+            put(path / name, _text(self.all_files[name]))
 
 
 def seal_metadata(path: Path, axes: Iterable[str]) -> None:
@@ -100,25 +108,44 @@ def annotate_metadata(
         files = {**metadata.files, _ATTRIBUTES: {**metadata.attributes, **attributes}}
         metadata = replace(metadata, document={**metadata.document, "metadata": files})
     _write(path, replace(metadata, notes={**metadata.notes, **(notes or {})}))
-    metadata.mend(path)
 
 
 def _write(path: Path, metadata: Metadata) -> None:
     entry = {"format": FORMAT, "study": metadata.study, "axes": dict(metadata.axes), "notes": dict(metadata.notes)}
     entry["sha256"] = digest([metadata.files, entry])
-    put(path / _FILE, json.dumps({**metadata.document, _OWN: entry}, indent=1, sort_keys=True).encode())
+    sealed = replace(metadata, document={**metadata.document, _OWN: entry})
+    put(path / _FILE, _text(sealed.document))
+    sealed.mend(path)
+
+
+def _text(content: Any) -> bytes:
+    """What stands in a file of metadata."""
+    return json.dumps(content, indent=1, sort_keys=True).encode()
 
 
 def checked_metadata(path: Path) -> Metadata:
     """What the metadata of the store at `path` say. Raises StoreError where there is no store, or it is damaged or of
     another version."""
-    expected = "a store made by friso map, or a new name"
     if not path.exists():
-        raise StoreError("", "nothing there", expected, _EXAMPLE, str(path))
+        raise StoreError("", "nothing there", _EXPECTED, _EXAMPLE, str(path))
     if not path.is_dir():
-        raise StoreError("", "a file; nothing was overwritten", expected, "--out study.zarr", str(path))
+        raise StoreError("", "a file; nothing was overwritten", _EXPECTED, "--out study.zarr", str(path))
     try:
-        document = json.loads(stored(path / _FILE))
+        return _metadata_in(path, _FILE)
+    except _DamagedError:
+        with suppress(StoreError):
+            return _metadata_in(path, _COPY)
+        raise
+
+
+class _DamagedError(StoreError):
+    """A file with the metadata of a store is damaged or missing: its copy may not be."""
+
+
+def _metadata_in(path: Path, file: str) -> Metadata:
+    """What the metadata in this file of the store at `path` say. Raises StoreError."""
+    try:
+        document = json.loads(stored(path / file))
         entry, metadata = document.get(_OWN), document["metadata"]
         attributes = dict(metadata[_ATTRIBUTES])
         sealed = digest([metadata, {key: value for key, value in entry.items() if key != "sha256"}]) if entry else ""
@@ -128,14 +155,15 @@ def checked_metadata(path: Path) -> Metadata:
         if is_store(path):
             raise _damaged(path, "is missing") from None
         actual = "a folder with other things in it; nothing was overwritten"
-        raise StoreError("", actual, expected, "--out study.zarr", str(path)) from None
+        raise StoreError("", actual, _EXPECTED, "--out study.zarr", str(path)) from None
     except OSError as error:
-        raise _damaged(path, f"cannot be read ({cause_of(error)})") from None
+        raise StoreError.of(_damaged(path, f"cannot be read ({cause_of(error)})")) from None
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
     if number is not None and number > FORMAT:
         actual = f"a store of a newer friso ({one_line(str(attributes.get('friso', 'unknown')))})"
-        raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
+        error = StoreError if entry.get("sha256") == sealed else _DamagedError
+        raise error("", actual, "a store of this friso, or that one to read it", origin=str(path))
     if number == FORMAT:
         study, axes, notes = (entry.get(name) for name in ("study", "axes", "notes"))
         complete = isinstance(study, str) and isinstance(axes, dict) and isinstance(notes, dict)
@@ -144,9 +172,9 @@ def checked_metadata(path: Path) -> Metadata:
         return Metadata(document, study, axes, notes)
     if "equations" in attributes:
         actual, expected = "a store of an earlier friso, or a damaged one", "to run the study again under a new name"
-        raise StoreError("", actual, expected, _EXAMPLE, str(path))
+        raise _DamagedError("", actual, expected, _EXAMPLE, str(path))
     actual = "a Zarr store that friso map has not made; nothing was overwritten"
-    raise StoreError("", actual, expected, "--out study.zarr", str(path))
+    raise StoreError("", actual, _EXPECTED, "--out study.zarr", str(path))
 
 
 _WORDS = (b'"equations"', f'"{_OWN}"'.encode())
@@ -155,7 +183,7 @@ _WORDS = (b'"equations"', f'"{_OWN}"'.encode())
 
 def is_store(path: Path) -> bool:
     """Whether friso made the folder, as far as its metadata tell, damaged or not."""
-    return any(all(_mentions(path / name, words) for words in _WORDS) for name in (_FILE, _ATTRIBUTES))
+    return any(all(_mentions(path / name, words) for words in _WORDS) for name in (_FILE, _COPY, _ATTRIBUTES))
 
 
 def _says(file: Path, content: Any) -> bool:
@@ -213,9 +241,9 @@ def _chunks(array: Mapping[str, Any]) -> int:
     return math.prod(-(-length // size) for length, size in zip(array["shape"], array["chunks"], strict=True))
 
 
-def _damaged(path: Path, damage: str) -> StoreError:
+def _damaged(path: Path, damage: str) -> _DamagedError:
     expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
-    return StoreError("", f"a store whose {_FILE} {damage}", expected, _EXAMPLE, str(path))
+    return _DamagedError("", f"a store whose {_FILE} {damage}", expected, _EXAMPLE, str(path))
 
 
 def digest(content: Any) -> str:

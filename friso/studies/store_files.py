@@ -88,8 +88,8 @@ def put(file: Path, content: bytes) -> None:
 BLOCKS, ANSWERS = ".blocks", ".answers"
 """Folders of a store besides those of its arrays: what was written of each block, what is kept of a refined study."""
 
-_OF_ARRAY = re.compile(rf"\.z[a-z]+|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
-"""Whether a name is one that Zarr gives, or of a file that was being written."""
+_OF_ARRAY = re.compile(rf"\.z[a-z]+(\.copy)?|[0-9]+(\.[0-9]+)*|.*{re.escape(PARTIAL)}").fullmatch
+"""Whether a name is one that Zarr gives, of a copy of its metadata, or of a file that was being written."""
 
 
 def is_of_store(name: str) -> bool:
