@@ -1,9 +1,9 @@
 """The metadata of a store: one file (.zmetadata), written at once, with the digest of what it says, and a copy of it,
 which is read where that one is damaged.
 
-Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs. These
-and the copy are written anew from it where they do not. What friso notes for itself stands there too: the digests of the axes, and
-for what the figures beside the store are coloured by.
+Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs.
+These files and the copy are written anew where they do not. What friso notes for itself stands there too: the digests of the axes,
+and for what the figures beside the store are coloured by.
 """
 
 from __future__ import annotations
