@@ -2,8 +2,8 @@
 which is read where that one is damaged.
 
 Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs.
-These files and the copy are written anew where they do not. What friso notes for itself stands there too: the digests of the axes,
-and for what the figures beside the store are coloured by.
+These files and the copy are written anew where they do not. What friso notes for itself stands there too: the digests
+of the axes, and for what the figures beside the store are coloured by.
 """
 
 from __future__ import annotations
