@@ -452,17 +452,21 @@ def test_a_contradiction_is_robust_or_arbitrary(small: Reproduction) -> None:
     assert verdict(claims()[0], "5", {}, finding(False), tried, undrawn="the rail").contradiction == "open"
     ways = {COUNT: finding(True), SWING: finding(True), CYCLE: finding(False)}
     cycle = verdict(claims()[0], "5", ways, weakest(ways), tried, {"a grid": finding(True)})
-    assert (cycle.judgement, cycle.contradiction, cycle.turned) == ("differs", "open", ())
+    assert (cycle.judgement, cycle.contradiction, cycle.turned) == ("differs", "open", {})
     assert "an attracting cycle only" in cycle.dependence
-    assert verdict(claims()[0], "5", {}, finding(True), space).contradiction == ""
+    for missed in (0, 1):  # an agreement that other draws remove says so
+        held = replace(tried, count=13 - missed, seeds=tried.seeds[:1] * 13, failures={})
+        agreed = verdict(claims()[0], "5", {}, finding(True), held)
+        assert agreed.contradiction == ""
+        assert ("rests on friso's choice" in agreed.dependence) == bool(missed)
     assert verdict(claims()[0], "5", {}, finding(False)).contradiction == "open"
 
 
 def test_another_method_is_mentioned_where_it_turns_a_part() -> None:
     others = {"a grid": finding(True), "a tolerance": finding(False)}
     judged = verdict(claims()[0], "5", {COUNT: finding(False)}, finding(False), None, others)
-    assert len(judged.turned) == 1
-    assert judged.turned[0].startswith("with a grid")
+    assert judged.turned.keys() == {"a grid"}
+    assert "With a grid a criterion is judged otherwise" in judged.dependence
 
 
 def test_limits_do_not_depend_on_the_number_of_points() -> None:
@@ -690,6 +694,11 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
     assert resumed.maps.keys() == {"friction", "isolator-friction"}
     assert (resumed.linear, resumed.experiments) == (None, None)
     assert [item.claim.id for item in resumed.verdicts if item.finding] == ["F15B"]
+    mine = Finding(tuple(replace(part, holds=not part.holds) for part in resumed.plausible.own["F15B"].parts))
+    finer = replace(resumed.plausible, own={"F15B": mine})
+    with patched({import_module("friso.studies.thesis.reproduce"): {"plausible": lambda *_: finer}}):
+        told = next(item for item in reproduce(**orders, kept=kept).verdicts if item.finding)
+    assert any("21 x 21" in method for method in told.turned)  # three values per axis may miss what finer maps have
     for file in [file for suffix in ("json", "npz") for file in [*(tmp_path / "kept").glob(f"*.{suffix}")][:2]]:
         content = file.read_bytes()
         others = next(other for other in file.parent.iterdir() if other.suffix == file.suffix and other != file)
@@ -755,7 +764,7 @@ def test_a_draw_that_decides_nothing_says_why() -> None:
     with patched({import_module("friso.studies.thesis.plausible"): {"POINTS": 3, "ways_of": stopped}}):
         space = plausible({"F15B": registered()["F15B"]}, 1).claims["F15B"]
     assert (space.undecided, space.count, space.failures) == (1, 0, {0: "ValueError: the loop stops"})
-    undecided: Any = SimpleNamespace(finding=None, space=space, reason="", turned=())
+    undecided: Any = SimpleNamespace(finding=None, space=space, reason="", turned={})
     assert details(undecided) == [("Draw 1, undecided", "ValueError: the loop stops")]
 
 

@@ -76,6 +76,16 @@ class ClaimInSpace:
         """Draws tried."""
         return len(self.seeds)
 
+    @property
+    def misses(self) -> int:
+        """In how many draws it could be computed and does not hold."""
+        return self.draws - self.undecided - self.count
+
+    def met(self, part: int) -> int:
+        """In how many draws a part holds."""
+        share = self.parts[part].probability
+        return round(share * (self.draws - self.undecided)) if self.draws > self.undecided else 0
+
 
 @dataclass(frozen=True)
 class PrintedNumber:
@@ -101,11 +111,13 @@ class BestFit:
 
 @dataclass(frozen=True)
 class Plausible:
-    """All claims over the space, by their name, and the best fit (None without draws)."""
+    """All claims over the space, by their name, the best fit (None without draws), and the findings at friso's `own`
+    choice by the runs, on maps of `POINTS` values per axis."""
 
     draws: tuple[Draw, ...]
     claims: Mapping[str, ClaimInSpace]
     fit: BestFit | None
+    own: Mapping[str, Finding]
 
 
 def plausible(
@@ -118,7 +130,7 @@ def plausible(
     cheap = {name: entry for name, entry in entries.items() if entry.needs and not entry.needs & PARTS.keys()}
     costly = {name: entry for name, entry in entries.items() if entry.needs & PARTS.keys()}
     drawn = tuple(draw(number) for number in range(draws))
-    own: dict[str, Finding] = {}
+    own: dict[str, dict[str, Finding]] = {}
     by_claim_tried: dict[str, list[tuple[Draw, dict[str, Finding]]]] = {name: [] for name in (*cheap, *costly)}
     failures: dict[str, dict[int, str]] = {name: {} for name in by_claim_tried}
     pieces = [(one, cheap, MAP_WORK) for one in (*drawn, baseline()) if drawn and cheap]
@@ -138,12 +150,13 @@ def plausible(
             if one in drawn:
                 by_claim_tried[name].append((one, ways))
                 failures[name] |= {} if ways else {one.number: findings[f"{name} {FAILED}"].parts[0].number}
-            elif COUNT in ways:
-                own[name] = ways[COUNT]
+            elif ways:
+                own[name] = ways
     by_claim = {
         name: _in_space(entries[name], tried, failures[name]) for name, tried in by_claim_tried.items() if tried
     }
-    return Plausible(drawn, by_claim, _fit({name: by_claim_tried[name] for name in cheap}, own))
+    fit = _fit({name: by_claim_tried[name] for name in cheap}, own)
+    return Plausible(drawn, by_claim, fit, {name: weakest(ways) for name, ways in own.items()})
 
 
 def work_of(entries: Mapping[str, Registered], draws: int) -> int:
@@ -241,12 +254,13 @@ def _separations(entry: Registered, drawn: Sequence[Draw], holds: np.ndarray) ->
 
 
 def _fit(
-    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Mapping[str, Finding]]]], own: Mapping[str, Finding]
+    by_claim_tried: Mapping[str, Sequence[tuple[Draw, Mapping[str, Finding]]]],
+    own: Mapping[str, Mapping[str, Finding]],
 ) -> BestFit | None:
     """The draw, or friso's `own` choice, that fits the printed numbers best, by the thesis's own count; one of which
     not all of them are known is none."""
     first = baseline()
-    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name])]
+    at_baseline = [item for name in by_claim_tried if name in own for item in numbers_of(name, own[name][COUNT])]
     by_draw: dict[int, list[PrintedNumber]] = {first.number: at_baseline}
     drawn: dict[int, Draw] = {first.number: first}
     for name, tried in by_claim_tried.items():

@@ -21,6 +21,7 @@ from friso.studies.thesis.experiments import EXPERIMENTS, Experiments
 from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.linear import NEEDS, Linear
 from friso.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
+from friso.studies.thesis.plausible import POINTS as DRAW_POINTS
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 from friso.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
@@ -129,8 +130,9 @@ def reproduce(
 
     def behind(study: ThesisStudy) -> tuple[Surveyed, CyclesOnMap]:
         surveyed = survey(maps[study.name], kept)
+        tally.add(SURVEY_WORK // 2, f"what attracts, map {study.panel}")
         cycles = map_cycles(study, maps[study.name], surveyed, kept)
-        tally.add(SURVEY_WORK, f"what attracts, map {study.panel}")
+        tally.add(SURVEY_WORK // 2, f"edges of hunting, map {study.panel}")
         return surveyed, cycles
 
     studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
@@ -139,6 +141,9 @@ def reproduce(
     ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
+    if points < DRAW_POINTS:
+        finer = {name: finding for name, finding in space.own.items() if entries[name].needs & STUDIES.keys()}
+        others[f"maps of {DRAW_POINTS} x {DRAW_POINTS} values"] = finer
     verdicts = tuple(_verdict(claim, entries, ways, space, others, chosen) for claim in claims())
     curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
     shown = by_way(base, by_peak_count)

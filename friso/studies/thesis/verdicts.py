@@ -27,7 +27,7 @@ class ClaimVerdict:
     `ways` are the findings by the way in which hunting is judged, of which the finding is the weakest; `space` the
     claim over joint draws of the values that the thesis leaves open, None where none enters or no draw was made;
     `undrawn` what else is assumed that decides on it, and is in no draw;
-    `turned` is what a coarser grid, or the thesis's tolerance, does to the judgement.
+    `turned` is what another grid, or the thesis's tolerance, does to the judgement, by the name of that method.
     """
 
     claim: Claim
@@ -37,7 +37,7 @@ class ClaimVerdict:
     reason: str
     ways: Mapping[str, Finding] = field(default_factory=lambda: NO_WAYS)
     space: ClaimInSpace | None = None
-    turned: tuple[str, ...] = ()
+    turned: Mapping[str, str] = field(default_factory=dict)
     undrawn: str = ""
 
     @property
@@ -80,13 +80,17 @@ class ClaimVerdict:
             )
             sentence += f"{_HANGS[bool(self.space.hangs_on)]}{_listed(self.space)}."
             sentence += _KINDS.get(self.contradiction, "")
+            sentence += _CHOSEN if self.judgement == "holds" and self.space.misses else ""
         if self.by_cycle_only:
             sentence += " It does not hold by an attracting cycle only, which was not tried in draws."
+        if self.turned:
+            sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise by the runs."
         if self.undrawn:
             sentence += f" It hangs also on what is assumed and not drawn: {self.undrawn}."
         return sentence
 
 
+_CHOSEN = " The agreement rests on friso's choice: other values, as plausible, remove it."
 _HANGS = {True: "; that hangs on ", False: ""}
 _KINDS = {
     "robust": " The contradiction is robust: no choice of the unstated values tried removes it.",
@@ -128,9 +132,11 @@ def verdict(
     another method, by its name, in the ways that need the runs alone, which are mentioned where other parts hold than
     in these ways here."""
     runs = _by_runs(ways) or together
-    turned = tuple(
-        f"with {name} {_change(runs, finding)}" for name, finding in others.items() if finding.pattern != runs.pattern
-    )
+    turned = {
+        name: f"with {name} {_change(runs, finding)}"
+        for name, finding in others.items()
+        if finding.pattern != runs.pattern
+    }
     reasons = (
         () if together.judgement == "holds" else dict.fromkeys(p.why for p in together.judged if not p.holds and p.why)
     )

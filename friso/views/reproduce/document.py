@@ -87,7 +87,7 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
         "reason": verdict.reason or None,
         "contradiction": verdict.contradiction or None,
         "hangs_on_undrawn": verdict.undrawn or None,
-        "method": list(verdict.turned),
+        "method": list(verdict.turned.values()),
         "space": _space(verdict.space) if verdict.space else None,
     }
 

@@ -57,6 +57,14 @@ def share(verdict: ClaimVerdict) -> str:
     return f"{space.count} of {space.draws} ({interval})"
 
 
+def in_draws(verdict: ClaimVerdict, part: int) -> str:
+    """In how many draws one of several criteria is met; empty of a single one, which the claim's own share tells."""
+    space = verdict.space
+    if space is None or len(space.parts) < 2:
+        return ""
+    return f"met in {space.met(part)} of {space.draws} draws"
+
+
 def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     """The word of agreement by each way of judging, where there are several."""
     if len(verdict.ways) < 2:
@@ -79,7 +87,7 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     rows += [("Reason", verdict.reason)] if reason(verdict) != verdict.reason else []
     failures = verdict.space.failures if verdict.space else {}
     rows += [(f"{draw_name(number).capitalize()}, undecided", text) for number, text in failures.items()]
-    return rows + [("Method", text) for text in verdict.turned]
+    return rows + [("Method", text) for text in verdict.turned.values()]
 
 
 def self_tests(verdicts: Iterable[ClaimVerdict]) -> list[tuple[str, Part]]:

@@ -38,13 +38,17 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
 def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
     """Cells that keep moving with the isolator, and the behaviour of those that do with the joint locked."""
     axes = ("friction.static", "friction.coulomb")
-    static, coulomb, moving, valid = verdict_table(evidence.maps["isolator-friction"], *axes)
+    runs = evidence.maps["isolator-friction"]
+    static, coulomb, moving, valid = verdict_table(runs, *axes)
     _, _, locked, _ = verdict_table(evidence.maps["friction"], *axes)
     back = moving & valid
     where = ""
     if back.any():
         s, c = static[np.nonzero(back)[0]], coulomb[np.nonzero(back)[1]]
+        lasting = int((runs["lasts"].transpose(*axes).values & back).sum())
         where = f"runs keep moving at F_s {s.min():.2g} to {s.max():.2g} N with F_c {c.min():.2g} to {c.max():.2g} N"
+        if lasting < back.sum():
+            where += f"; {lasting} of these {back.sum()} still swing at their end, the others are long transients"
     return Finding(
         (
             Part(
