@@ -697,8 +697,8 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
     mine = Finding(tuple(replace(part, holds=not part.holds) for part in resumed.plausible.own["F15B"].parts))
     finer = replace(resumed.plausible, own={"F15B": mine})
     with patched({import_module("friso.studies.thesis.reproduce"): {"plausible": lambda *_: finer}}):
-        told = next(item for item in reproduce(**orders, kept=kept).verdicts if item.finding)
-    assert any("21 x 21" in method for method in told.turned)  # three values per axis may miss what finer maps have
+        coarse = next(item for item in reproduce(**orders, kept=kept).verdicts if item.finding)
+    assert any("21 x 21" in method for method in coarse.turned)  # three values per axis may miss what finer maps have
     for file in [file for suffix in ("json", "npz") for file in [*(tmp_path / "kept").glob(f"*.{suffix}")][:2]]:
         content = file.read_bytes()
         others = next(other for other in file.parent.iterdir() if other.suffix == file.suffix and other != file)
