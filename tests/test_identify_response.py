@@ -514,6 +514,19 @@ def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -
     assert all(cut[name].value == pytest.approx(value, rel=1e-2) for name, value in truth.items())
 
 
+def test_one_mass_without_a_joint_is_not_told_as_two() -> None:
+    """Its force is held between samples of 1 ms: a resonance near or above the band explained that, with certainty."""
+    frequency, mass = np.geomspace(1.0, 100.0, 150), 10.0
+    s = 2j * np.pi * frequency
+    held = -np.expm1(-1e-3 * s) / (1e-3 * s)
+    for seed, (drag, spring) in enumerate(((30.0, 0.0), (300.0, 0.0), (3000.0, 0.0), (30.0, 4000.0))):
+        truth = held / (mass * s**2 + drag * s + spring)
+        values = exact(lambda _, truth=truth: truth, frequency, 1e-3, np.random.default_rng(seed)).response
+        bench = analyse((), measured=MeasuredResponse(frequency, values, None, "", unit="m/N"))
+        assert bench.two_masses is None
+        assert all(line.value.holds(mass) for line in bench.lines)
+
+
 def test_intervals_grow_where_realisations_scatter(refused: Refused) -> None:
     frequency, rng = np.arange(3.0, 40.0, 1.0), np.random.default_rng(27)
     softer = TRUE + np.array([0, 0, 0.2, 0, 0, 0, 0])

@@ -18,6 +18,7 @@ from friso.identification.response.departure import Departure, Drag, departure, 
 from friso.identification.response.limit_cases import Visible, visible
 from friso.identification.response.mass_line import StraightLine, mass_lines
 from friso.identification.response.modes import Modes, fit_modes
+from friso.identification.response.one_mass import needs_two
 from friso.identification.response.period import find_periods
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, from_log, relative_error
@@ -86,6 +87,9 @@ def analyse(
         model = None
     upper = driven.between(*used)
     drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
+    if model and not needs_two(model, driven, other):
+        warnings.append("no two masses: one mass, with viscous friction and a spring to ground, explains the response")
+        model = None
     modes = _attempt(warnings, "modes", fit_modes, upper)
     warnings += model.warnings if model else ()
     return Bench(

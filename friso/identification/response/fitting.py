@@ -9,6 +9,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from friso.identification.estimate import Estimate
+from friso.identification.response.response import FrequencyResponse
 
 ResponseModel = Callable[[np.ndarray], np.ndarray]
 """From parameters (p,) to complex responses (outputs, lines)."""
@@ -59,6 +60,11 @@ class ResponseFit:
             reason = f"its interval spans more than a factor of {LOOSE:g} to either side"
             return Estimate.unknown(name, unit, method, reason, 0.0)
         return Estimate(name, unit, value, value / factor, value * factor, method)
+
+
+def deviations(response: FrequencyResponse) -> np.ndarray:
+    """Deviations as weights, (lines,): not below a thousandth of the response, which no model is right to."""
+    return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
 
 def refined(

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
-from friso.identification.response.fitting import ResponseFit, refined
+from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
 from friso.intervals import COVERAGE
@@ -86,7 +86,7 @@ def fit_two_mass(
     if len(responses) > 1 and not np.array_equal(frequency, responses[1].frequency):
         raise InputError("response", "responses on different lines", "both outputs of the same records", "one period")
     values = np.stack([response.response for response in responses])
-    deviation = np.stack([_deviation(response) for response in responses])
+    deviation = np.stack([deviations(response) for response in responses])
     sign = _sign(values[0])
     options = [(sign, sign), (sign, -sign)][: len(responses)]
     seen = cache(lambda: _from_modes(responses[0]))
@@ -125,11 +125,6 @@ def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
         estimate.value + ratio * (estimate.high - estimate.value),
     )
     return replace(estimate, low=low, high=high, method=f"{estimate.method}, scatter of {len(others)} realisations")
-
-
-def _deviation(response: FrequencyResponse) -> np.ndarray:
-    """Deviations as weights: not below a thousandth of the response, which no model is right to."""
-    return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
 
 
 def _sign(response: np.ndarray) -> float:

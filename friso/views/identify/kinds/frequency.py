@@ -40,8 +40,9 @@ def _friction(bench: Bench) -> str:
 def _facts(bench: Bench) -> Facts:
     """Lines, modes, masses and joint, friction, and how one log predicts the other."""
     facts = [("Band of the models", range_with_unit(*bench.band, "Hz"))]
-    facts += [(f"{line.kind[0].upper()}{line.kind[1:]}, {range_with_unit(line.low, line.high, 'Hz')}",
-               f"{with_interval(line.value)}; level {with_interval(line.level)}") for line in bench.lines]  # fmt: skip
+    for line in bench.lines:
+        place = _place(line)
+        facts.append((place[0].upper() + place[1:], f"{with_interval(line.value)}; level {with_interval(line.level)}"))
     facts += [
         (name_of(estimate.name), with_interval(estimate)) for estimate in (bench.modes.estimates if bench.modes else ())
     ]
@@ -58,21 +59,25 @@ def _facts(bench: Bench) -> Facts:
     return tuple(facts)
 
 
+def _place(line: StraightLine) -> str:
+    return f"{line.kind}, {range_with_unit(line.low, line.high, 'Hz')}"
+
+
 def _headline(bench: Bench) -> str:
-    """The modes of a frequency response, and what its units keep from the stage file."""
+    """The masses and modes of a frequency response, and what its units keep from the stage file."""
     sentences = []
     names = ("total mass", "antiresonance frequency", "resonance frequency")
     if bench.two_masses is not None:
         sentences = [f"{name} {with_interval(bench.two_masses[name])}" for name in names]
-    elif bench.modes is not None:
-        sentences = [
-            f"{estimate.name} {with_interval(estimate)}" for estimate in bench.modes.estimates if estimate.unit == "Hz"
-        ]
+    else:
+        sentences = [f"{_place(line)} {with_interval(line.value)}" for line in bench.lines]
+        modes = bench.modes.estimates if bench.modes is not None else ()
+        sentences += [f"{estimate.name} {with_interval(estimate)}" for estimate in modes if estimate.unit == "Hz"]
     units = bench.driven.channels.input_unit, bench.driven.channels.output_unit
-    modes = f"Frequency response: {'; '.join(sentences)}." if sentences else ""
+    seen = f"Frequency response: {'; '.join(sentences)}." if sentences else ""
     if units == ("N", "m"):
-        return modes
-    return f"{modes} {_without_units(*units)}".strip()
+        return seen
+    return f"{seen} {_without_units(*units)}".strip()
 
 
 def _without_units(force: str, motion: str) -> str:
