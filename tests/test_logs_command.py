@@ -64,6 +64,19 @@ def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
     assert log_content(bare, options).kind == "moves"
 
 
+def test_a_log_that_no_option_completes_has_no_command(tmp_path: Path) -> None:
+    """A force alone, of which no option makes a position. Beside a velocity nothing is open."""
+    time = ["time [s]"]
+    alone = log_files.write_text(tmp_path / "a.csv", [*time, "force [N]"], [M["time"], M["force"]])
+    content = log_content(alone, Mapping())
+    (gap,) = content.gaps
+    assert gap.expected.endswith("export the log with position")
+    assert next_command(content) is None
+    names = [*time, "v_ist [m/s]", "F_ist [N]"]
+    speed = log_files.write_text(tmp_path / "b.csv", names, [M["time"], np.gradient(M["position"], 1e-3), M["force"]])
+    assert not log_content(speed, Mapping()).gaps
+
+
 def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
     """The kind is recognised from the channels that are proposed, and no scale is asked for."""
     rng, count = np.random.default_rng(1), 500

@@ -93,6 +93,18 @@ def test_roles_by_name(name: str, role: str | None) -> None:
 
 
 @pytest.mark.parametrize(
+    ("name", "unit", "role"),
+    [
+        ("v_ist", "mm/s", "velocity"), ("vIst", "m/s", "velocity"), ("F_ist", "N", "force"), ("i_act", "A", "force"),
+        ("a_ist", "m/s^2", "acceleration"), ("M_ist", "N m", "force"), ("v_ist", "mm", None), ("v_ist", "", None),
+        ("A_act", "mm", None), ("v_soll", "mm/s", None),
+    ],
+)  # fmt: skip
+def test_a_symbol_is_told_by_its_unit(name: str, unit: str, role: str | None) -> None:
+    assert (role_of(name, unit) or (None,))[0] == role
+
+
+@pytest.mark.parametrize(
     ("position", "reference"), [("Axis A actual [mm]", "Axis A target [mm]"), ("x_ist [mm]", "V_soll [mm]")]
 )
 def test_a_letter_that_names_an_axis(tmp_path: Path, position: str, reference: str) -> None:

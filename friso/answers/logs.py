@@ -54,10 +54,10 @@ class LogsAnswer(Answer):
         return [AnswerTable(item.path.name, COLUMNS, channel_rows(item)) for item in self.result if item.channels]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """How each file is identified."""
+        """How each file is identified that can be."""
         from friso.views.logs.words import next_command
 
-        return [next_command(content) for content in self.result]
+        return [command for content in self.result if (command := next_command(content))]
 
     def figures(self) -> Sequence[Figure]:
         """The channels over time."""

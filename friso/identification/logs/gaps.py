@@ -62,7 +62,8 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
     signals = [c for c in table.channels if id(c) in named or (role_of(c.name) or ("",))[0] != "time"]
     if len(signals) < len(needed):
         names = ", ".join(channel.name for channel in signals) or "none"
-        expected = f"channels for {' and '.join(needed)}: export the log with these"
+        missing = [role for role in needed if role not in {*proposal.chosen, *proposal.rivals}] or needed
+        expected = f"channels for {' and '.join(needed)}: export the log with {' and '.join(missing)}"
         raise LogError("log", f"too few channels of signals: {names}", expected, "", origin)
     chosen = {role: choice for role, choice in proposal.chosen.items() if role in (*needed, "force")}
     gaps: list[LogError] = []

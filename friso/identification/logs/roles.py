@@ -113,6 +113,16 @@ MEASURED = frozenset(
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A")}
 """Units that tell a role where a single channel without one has them."""
 
+_SYMBOLS = {
+    "v": ("velocity", ("m/s", "rad/s")),
+    "a": ("acceleration", ("m/s^2", "rad/s^2")),
+    "f": ("force", ("N",)),
+    "m": ("force", ("N*m",)),
+    "i": ("force", ("A",)),
+}
+"""Symbols whose unit tells that they are no names of axes, with their role, directly before the word of what is:
+v_ist in mm/s."""
+
 _GERMAN = re.compile(
     r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?"
     r"|(?:motor|antriebs?)(?P<of_motor>strom|kraft|drehmoment)"
@@ -146,8 +156,8 @@ def _compound(word: str) -> list[str]:
 
 
 def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
-    """Role that a name stands for, and the word that shows it; None for a name that shows none. In a `unit` of a
-    position a symbol is the name of an axis: V_soll in mm."""
+    """Role that a name stands for, and the word that shows it; None for a name that shows none. The `unit` tells a
+    symbol from the name of an axis: V_soll in mm, v_ist in mm/s."""
     parts = words(name)
     name_words = set(parts)
     if name_words & _NOT_MEASURED:
@@ -165,7 +175,16 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
         word = key["position"] or "actpos"
         kind = "relative_position" if name_words & _RELATIVE else "cart_position" if name_words & _CART else "position"
         return kind, word
-    return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
+    named = ((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role])
+    return next(named, _of_symbol(parts, unit))
+
+
+def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
+    """Role and letter of a name that is a symbol and the word of what is, in a unit of that symbol; else None."""
+    if len(parts) != 2 or parts[0] not in _SYMBOLS or parts[1] not in MEASURED or not unit:
+        return None
+    role, units = _SYMBOLS[parts[0]]
+    return (role, parts[0]) if any(unit_factor(unit, own) is not None for own in units) else None
 
 
 def _is_symbol(parts: Sequence[str], unit: str) -> bool:

@@ -34,7 +34,8 @@ def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyRespons
 
     The one mass has viscous friction and a spring to ground, a delay, and for each output the constant compliance that
     modes above the band add to it, as a force that is held between samples does (1/(m s^2) (1 + (s T)^2/24)). An F-test
-    says whether chance explains the difference; since the mode may lie at any line, its level is divided by their number.
+    says whether chance explains the difference; since the mode may lie at any line, its level is divided by their
+    number.
     """
     responses = [response.between(*model.band) for response in (driven, other) if response is not None]
     one, two = fit_one_mass(responses, model.signs), model.fit

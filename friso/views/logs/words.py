@@ -40,9 +40,12 @@ def open_questions(content: LogContent) -> list[str]:
     ]
 
 
-def next_command(content: LogContent) -> str:
-    """The command that identifies the file, with the options that are still needed."""
-    options = dict.fromkeys(gap.example for gap in content.gaps if gap.example.startswith("--"))
+def next_command(content: LogContent) -> str | None:
+    """The command that identifies the file, with the options that are still needed; None where no option tells what the
+    file lacks."""
+    options = dict.fromkeys(gap.example for gap in content.gaps)
+    if "" in options:
+        return None
     return " ".join(["friso identify", shell_word(str(content.path)), *options])
 
 
