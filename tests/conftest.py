@@ -12,6 +12,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from hypothesis import settings
 from patched import patched
 from refusals import Refused, Wording
 from snapshots import Snapshots
@@ -23,6 +24,12 @@ from friso.stage import Stage
 FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
 BLAS = "OPENBLAS_NUM_THREADS"
+
+# The same examples for the same test, however slow the machine is: a change is refused for what it did. Others are
+# drawn by `pytest --hypothesis-profile random`.
+settings.register_profile("random", deadline=None)
+settings.register_profile("repeatable", deadline=None, derandomize=True)
+settings.load_profile("repeatable")
 
 sys.path.append(str(Path(__file__).parents[1]))  # for benchmarks; last, so that friso is the one installed
 

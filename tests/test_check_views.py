@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from browser import browsed, needs_browser
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_up import (
     NO_RETURN,
@@ -509,7 +509,6 @@ def test_windows_are_told_beside_the_edge() -> None:
     assert "40.04 Hz" in unsure
 
 
-@settings(deadline=None)
 @given(st.floats(0.02, 50), st.floats(6e-4, 9e-3))
 def test_an_edge_lies_where_it_is_told(factor: float, reserve: float) -> None:
     """What is told holds the whole of what is known, rounding and all."""

@@ -256,7 +256,7 @@ def words(deviation: np.ndarray, within: float) -> list[str]:
     return outcomes(end_of_traces(TIME, deviation, within), within).tolist()
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(frequencies, sizes, st.floats(0.05, 2.0), st.floats(-1e-3, 1e-3))
 def test_what_goes_to_and_fro_swings(frequency: float, size: float, within: float, offset: float) -> None:
     swing = offset + size * np.sin(2 * np.pi * frequency * TIME)[None]
@@ -264,7 +264,7 @@ def test_what_goes_to_and_fro_swings(frequency: float, size: float, within: floa
     assert words(swing, 1.1 * size) != ["swings"]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(frequencies, sizes, st.floats(1.0, 5.0), st.floats(-1e-3, 1e-3))
 def test_what_dies_out_or_creeps_does_not(frequency: float, size: float, decay: float, offset: float) -> None:
     dying = size * np.exp(-TIME / decay) * np.cos(2 * np.pi * frequency * TIME)
@@ -272,7 +272,7 @@ def test_what_dies_out_or_creeps_does_not(frequency: float, size: float, decay: 
     assert "swings" not in words(np.array([dying, creeping, offset + 0 * TIME]), 1e-6)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.floats(0.01, 15.0), st.floats(0.1, 100.0), st.floats(0.0, 4.0))
 def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> None:
     deviation = factor * np.where(until > TIME, 1.0, 0.5)[None]
@@ -283,7 +283,7 @@ def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> 
     assert settling_time(TIME, np.full((1, len(TIME)), np.nan), corner, factor)[0] == np.inf
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(np.inf), min_size=20, max_size=200))
 def test_medians_with_infinite_values(values: list[float]) -> None:
     result, array = median(np.array(values)), np.array(values)

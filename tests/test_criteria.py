@@ -122,7 +122,7 @@ def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: flo
         assert outcomes(one(end, k), band, hold)[0] == words[k]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.floats(0.3, 5.0), st.floats(1e-5, 1e-2), st.floats(-1e-3, 1e-3), st.floats(0.5, 50.0), st.floats(1e-7, 1e-2))
 def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay: float, band: float) -> None:
     """What swings, drifts, stands or dies out, and the mirror image of each."""
@@ -210,7 +210,7 @@ def sampled_peaks(values: np.ndarray) -> list[float]:
 waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats(0, 6.28)), min_size=1, max_size=4)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(waves, st.floats(-1e-3, 1e-3))
 def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float, float]], offset: float) -> None:
     """The thesis's rule is that of findpeaks: it asks for no prominence."""

@@ -49,7 +49,7 @@ LAWS = {
 STICKING = {"maxwell_slip", "elasto_plastic", "gms"}
 """Those of which all or a part follows small motions as a spring."""
 
-STEADY = settings(max_examples=25, deadline=None, derandomize=True)
+STEADY = settings(max_examples=25)
 DESCRIBING = pytest.mark.xdist_group("describing")
 pytestmark = DESCRIBING
 

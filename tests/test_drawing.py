@@ -112,7 +112,6 @@ def test_shares_in_percent_have_no_exponents():
 values = st.one_of(st.floats(-1e6, 1e6), st.just(np.nan))
 
 
-@settings(deadline=None)
 @given(arrays(float, st.integers(1, 900), elements=values), st.integers(1, 12), st.booleans())
 def test_thinning_keeps_order_ends_extremes_and_gaps(y, buckets, loop):
     x = np.cos(np.arange(len(y))) if loop else np.arange(len(y), dtype=float)
@@ -133,7 +132,7 @@ def test_thinning_keeps_order_ends_extremes_and_gaps(y, buckets, loop):
         assert len(kept_y) <= (KEPT + 1) * buckets + 2
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.integers(0, 199_999), st.floats(1.1, 1e6), st.sampled_from([-1, 1]))
 def test_a_spike_of_one_sample_survives_where_it_is(place, height, sign):
     y = np.sin(np.linspace(0, 50, 200_000))

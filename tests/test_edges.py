@@ -236,7 +236,7 @@ KEYS = sorted(numeric_keys(loads(RIG).flat()))
 
 
 @given(key=st.sampled_from(KEYS), number=NUMBERS, unit=st.sampled_from(["", "m", "N"]))
-@settings(deadline=None, max_examples=200)
+@settings(max_examples=200)
 def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, unit: str) -> None:
     field = numeric_keys(loads(RIG).flat())[key]
     try:
@@ -249,7 +249,6 @@ def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, un
 
 
 @given(text=st.text(st.characters(), max_size=20))
-@settings(deadline=None)
 def test_any_text_can_be_saved_and_read_again(text: str) -> None:
     try:
         stage: Stage = loads(RIG).replace({"name": text, "source": text})

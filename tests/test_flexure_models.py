@@ -23,8 +23,8 @@ from friso.leaf_springs.evaluation import VISIBLE
 from friso.leaf_springs.joint import first_interfering, parasitic_mode
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 
-MANY = settings(max_examples=40, deadline=None, derandomize=True)
-FEW = settings(max_examples=10, deadline=None, derandomize=True)
+MANY = settings(max_examples=40)
+FEW = settings(max_examples=10)
 
 
 def mechanism(

@@ -8,7 +8,7 @@ from ritz import plate as ritz
 
 from friso.leaf_springs import plate
 
-FEW = settings(max_examples=12, deadline=None, derandomize=True)
+FEW = settings(max_examples=12)
 SLENDER = st.floats(0.8, 6.0)
 """Length over width, where the shares that converge are known."""
 POISSON = st.floats(0.0, 0.45)
@@ -37,7 +37,7 @@ def test_share_that_converges(ratio: float, poisson: float) -> None:
     assert (ritz(ratio, 1.0, poisson).stiffening - 1) / expected == pytest.approx(plate.CONVERGED, abs=0.025)
 
 
-@settings(max_examples=6, deadline=None, derandomize=True)
+@settings(max_examples=6)
 @given(ratio=SLENDER, poisson=METAL)
 def test_stress_at_mid_width(ratio: float, poisson: float) -> None:
     largest = plate.stress_factors(ratio, 1.0, poisson)[1]
@@ -51,7 +51,7 @@ def test_ritz_converges() -> None:
 
 
 @given(poisson=POISSON)
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 @pytest.mark.parametrize("odd", [True, False])
 def test_limits(poisson: float, odd: bool) -> None:
     """A narrow leaf is a beam, a wide one bends into a cylinder."""
@@ -76,7 +76,7 @@ def test_without_lateral_contraction_a_leaf_is_a_beam() -> None:
 
 
 @given(ratio=SLENDER, poisson=POISSON)
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 def test_profile_has_the_stiffness_of_the_plate(ratio: float, poisson: float) -> None:
     """The compliance along the leaf, weighted by the square of the moment, is that of the whole."""
     nodes, weights = np.polynomial.legendre.leggauss(80)
@@ -87,7 +87,7 @@ def test_profile_has_the_stiffness_of_the_plate(ratio: float, poisson: float) ->
 
 
 @given(ratio=SLENDER, poisson=POISSON)
-@settings(max_examples=30, deadline=None, derandomize=True)
+@settings(max_examples=30)
 def test_curl_vanishes_at_the_clamps(ratio: float, poisson: float) -> None:
     for odd in (True, False):
         curl = plate.Curl.of(ratio, 1.0, poisson, odd)
@@ -100,7 +100,7 @@ def test_curl_vanishes_at_the_clamps(ratio: float, poisson: float) -> None:
 
 
 @given(thickness=st.floats(0.02, 0.2), poisson=POISSON)
-@settings(max_examples=20, deadline=None, derandomize=True)
+@settings(max_examples=20)
 def test_torsion(thickness: float, poisson: float) -> None:
     """Far from its clamps a leaf twists as Saint-Venant's; the clamps of a short one forbid it to warp."""
     shear, length = 8e10, 1e4

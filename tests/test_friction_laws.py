@@ -25,7 +25,7 @@ from friso.stage.tables import FRICTION
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
 GROUND = ("cases", "component", "conditions", "friction")
 RIGID = pytest.mark.xdist_group("rigid")
-STEADY = settings(max_examples=25, deadline=None, derandomize=True)
+STEADY = settings(max_examples=25)
 
 
 @pytest.mark.parametrize("law", FRICTION.classes)

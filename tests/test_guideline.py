@@ -113,7 +113,7 @@ def test_groups_and_back() -> None:
 
 
 @RIGID
-@settings(max_examples=8, deadline=None, derandomize=True)
+@settings(max_examples=8)
 @given(*[st.floats(-3, 3)] * 3)
 def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: float) -> None:
     """Whatever mass, stiffness and force are, to a thousandth and a thousand times as large."""

@@ -47,7 +47,7 @@ def test_estimates_far_beyond_their_intervals_disagree() -> None:
 
 
 @given(st.integers(0, 2**31), st.integers(3, 8))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -> None:
     """Places that scatter by far more than their own errors, one known much less: the mean of all is held as often as
     95 % intervals should, and the one that is not known does not widen it."""
@@ -69,7 +69,7 @@ def test_what_is_systematic_does_not_average_out() -> None:
 
 
 @given(st.integers(0, 2**31), st.integers(2, 6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, count: int) -> None:
     """1 in 100 disagrees by chance: of 200 cases more than 12 have a probability below 1e-6."""
     rng = np.random.default_rng(seed)
@@ -99,7 +99,7 @@ def test_a_value_beyond_what_another_leaves_possible_is_told() -> None:
 
 
 @given(st.integers(0, 2**31))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_correlations_of_means_are_those_of_drawn_means(seed: int) -> None:
     """Against weighted means of errors drawn from each log's own distribution."""
     rng = np.random.default_rng(seed)

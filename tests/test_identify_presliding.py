@@ -56,7 +56,7 @@ def shown(result: Presliding) -> list[float]:
 
 
 @given(st.integers(0, 2**31), st.floats(1.0, 1e6))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_bristles_bend_as_the_differential_equation_says(seed: int, bending: float) -> None:
     """Against scipy; the path being straight between samples, the closed form is exact."""
     rng = np.random.default_rng(seed)

@@ -314,7 +314,7 @@ def test_units_as_prefixes_know_them(unit: str, prefixed: str) -> None:
 
 
 @given(st.floats(1e-7, 1e7), st.floats(1e-5, 0.9), st.sampled_from(["kg", "N", "m", "N s/m", "Hz"]), st.booleans())
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_rounding_hides_less_than_a_twentieth_of_half_the_interval(
     size: float, share: float, unit: str, negative: bool
 ) -> None:

@@ -93,7 +93,7 @@ def test_what_is_expected_names_unit_and_forms() -> None:
     assert "0 to 1" in SHARE.expected
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(low=st.floats(1e-6, 1e6), width=st.floats(0, 1e6), share=st.floats(0, 1))
 def test_places_between(low: float, width: float, share: float) -> None:
     value = FORCE.read(f"{low!r} N .. {low + width!r} N")
@@ -104,7 +104,7 @@ def test_places_between(low: float, width: float, share: float) -> None:
     assert value.at(0.5) == pytest.approx(value.centre, rel=1e-12)
 
 
-@settings(max_examples=50, deadline=None, derandomize=True)
+@settings(max_examples=50)
 @given(value=st.floats(1e-6, 1e6), percent=st.floats(0, 99))
 def test_tolerance(value: float, percent: float) -> None:
     result = FORCE.read(f"{value!r} N +/- {percent!r} %")

@@ -40,7 +40,7 @@ def values(log: Log, bandwidth: float | None = 10.0, by_direction: bool = False)
     return {estimate.name: estimate.value for estimate in inverse_model(log, bandwidth, by_direction).estimates}
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(SIZES, SIZES, SIZES, st.floats(-1.0, 1.0))
 def test_without_noise_all_is_found(mass: float, viscous: float, coulomb: float, offset: float) -> None:
     """But for the filters, which smear the turning points."""

@@ -335,7 +335,7 @@ def test_a_stroke_within_a_unit_is_not_the_one_before_a_unit(heading: str, name:
     assert split_heading(heading) == (name, unit)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.integers(8, 24), st.integers(0, 2**24), st.integers(1, 20))
 def test_a_counter_that_overflows_is_unwrapped(bits: int, start: int, turns: int) -> None:
     size = 2**bits
@@ -560,7 +560,7 @@ def test_no_common_span(refused: Refused) -> None:
         resample_tracks({"a": track("a", t, t), "b": track("b", t + 5, t)})
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(
     st.lists(st.integers(20, 100), min_size=1, max_size=4),
     st.lists(st.integers(20, 100), min_size=1, max_size=4),
@@ -605,7 +605,7 @@ def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
     assert second.scales == first.scales
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(
     st.dictionaries(st.sampled_from(list(ROLES)), st.text(st.characters(codec="utf-8"), min_size=1)),
     st.floats(1e-9, 1e3),

@@ -129,14 +129,12 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
             seen += os.read(terminal, 65536)
         time.sleep(0.5)
         process.send_signal(signal.SIGINT)
-        start = time.monotonic()
         try:
             while chunk := os.read(terminal, 65536):
                 seen += chunk
         except OSError:  # the terminal ends with its process
             pass
         assert process.wait(30) == 130
-    assert time.monotonic() - start < 20
     assert b"to resume: friso map a.zarr" in seen
     with xr.open_zarr(tmp_path / "a.zarr") as stored:
         kept = int((stored.outcome != "").sum())

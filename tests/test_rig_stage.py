@@ -122,7 +122,7 @@ def spectra(draw: st.DrawFn) -> dict[str, list[str]]:
     }
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 @given(spectra())
 def test_floors_come_through(floor: dict[str, list[str]]) -> None:
     result = loads(load(EXAMPLE).replace({"floor": floor}).to_toml()).floor

@@ -41,7 +41,7 @@ def spectrum(*points: tuple[float, float]) -> Floor:
     )
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds, lengths, deviations, deviations, st.floats(-0.9, 2.0))
 def test_factors_are_positive_and_follow_one_field(
     seed: int, length: float, static: float, coulomb: float, offset: float
@@ -67,7 +67,7 @@ def test_factors_are_positive_and_follow_one_field(
     assert np.ptp(first) > 0
 
 
-@settings(max_examples=6, deadline=None)
+@settings(max_examples=6)
 @given(st.integers(0, 10**6), lengths, deviations, st.floats(-3, 3))
 def test_mean_and_deviation_over_rails(first: int, length: float, deviation: float, place: float) -> None:
     """At one place of many rails."""
@@ -82,7 +82,7 @@ def test_mean_and_deviation_over_rails(first: int, length: float, deviation: flo
     assert abs(logs.var() - 1) < SURE * np.sqrt(2 / count)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seeds, lengths, deviations)
 def test_deviation_and_correlation_length_along_one_rail(seed: int, length: float, deviation: float) -> None:
     """Autocovariance of the field at lags of 0 to 4 lengths; its standard error by Bartlett's formula."""
@@ -115,7 +115,7 @@ def test_the_field_is_gaussian() -> None:
     assert abs(np.mean(field**4) - 3) < SURE * np.sqrt(96 / len(field))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds, lengths, st.floats(-1, 1), st.floats(1e-3, 0.5), st.integers(1, 7))
 def test_what_stands_at_a_place_depends_on_nothing_else(
     seed: int, length: float, start: float, span: float, every: int
@@ -128,7 +128,7 @@ def test_what_stands_at_a_place_depends_on_nothing_else(
     np.testing.assert_array_equal(friction_factors({**flat, "rail.seed": float(seed)}, places), whole)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds, seeds, lengths)
 def test_other_seeds_are_other_rails(seed: int, other: int, length: float) -> None:
     """Independent, also where the seeds are neighbours: their fields, 8 lengths apart, do not correlate."""
@@ -155,7 +155,7 @@ def white_noise(cell: int, seed: int) -> float:
     return float(norm.ppf(((word >> 11) + 0.5) / 2**53))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(seeds, st.floats(1e-3, 0.02), st.lists(st.floats(0, 0.3), min_size=3, max_size=3))
 def test_harmonics_of_the_rolling_elements(seed: int, pitch: float, shares: list[float]) -> None:
     harmonics = dict(zip(("first_harmonic", "second_harmonic", "third_harmonic"), shares, strict=True))
@@ -184,7 +184,7 @@ points = st.lists(
 ).filter(lambda several: min(np.diff(sorted(f for f, _ in several))) > 1e-3)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(points)
 def test_variance_of_a_floor_is_the_integral_of_its_spectrum(several: list[tuple[float, float]]) -> None:
     frequency, density = np.array(sorted(several)).T
@@ -194,7 +194,7 @@ def test_variance_of_a_floor_is_the_integral_of_its_spectrum(several: list[tuple
     np.testing.assert_allclose(variance, [0, 0, *[np.trapezoid(power, fine)] * 2], rtol=1e-5)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(seeds, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 def test_spectrum_is_recovered(seed: int, first: float, second: float) -> None:
     """Welch's estimate in tenths of the band, each within five standard errors of the spectrum's mean there."""
@@ -214,7 +214,7 @@ def test_spectrum_is_recovered(seed: int, first: float, second: float) -> None:
     assert power[frequency > 101].max() < 1e-3 * power[inside].max()
 
 
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8)
 @given(st.integers(0, 10**6), st.floats(0.005, 3.0))
 def test_variance_of_a_floor_however_short(first: int, duration: float) -> None:
     """Over many seeds at one time, and not only of the waves that fit into the record."""
@@ -225,7 +225,7 @@ def test_variance_of_a_floor_however_short(first: int, duration: float) -> None:
     assert abs(np.mean(values**2) / expected - 1) < SURE * np.sqrt(2 / count)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(seeds, st.integers(1, 5000), st.sampled_from([5e-5, 1e-3, 0.005]))
 def test_a_floor_is_sampled_from_start_to_end(seed: int, steps: int, interval: float) -> None:
     floor = spectrum((1.0, 1e-4), (100.0, 1e-4))

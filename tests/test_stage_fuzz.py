@@ -164,7 +164,7 @@ scalars = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.sampled_from(TEXTS),
     st.lists(st.tuples(st.floats(0, 1), st.integers(0, 12), snippets), min_size=1, max_size=3),
@@ -185,7 +185,7 @@ def values_for(place: tuple[str, str, str]) -> st.SearchStrategy[tuple[tuple[str
     return st.tuples(st.just(place), fitting | scalars)
 
 
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=500)
 @given(st.sampled_from(KEYS).flatmap(values_for))
 def test_value_mutations(case: tuple[tuple[str, str, str], object]) -> None:
     (text, table, key), value = case
@@ -193,7 +193,7 @@ def test_value_mutations(case: tuple[tuple[str, str, str], object]) -> None:
     check(written(tables))
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.sampled_from(KEYS), st.sampled_from(KEYS), st.sampled_from(["drop", "copy", "move"]))
 def test_key_mutations(place: tuple[str, str, str], other: tuple[str, str, str], edit: str) -> None:
     text, table, key = place
@@ -204,13 +204,13 @@ def test_key_mutations(place: tuple[str, str, str], other: tuple[str, str, str],
     check(written(tables))
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(st.binary(max_size=200) | st.text().map(str.encode))
 def test_noise(content: bytes) -> None:
     check(content.decode(errors="replace"))
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 @given(
     st.sampled_from(KEYS),
     st.one_of(scalars, st.none(), st.lists(scalars, max_size=2), st.dictionaries(st.text(), scalars)),
@@ -227,7 +227,7 @@ def test_changes(place: tuple[str, str, str], value: object) -> None:
         check(changed.to_toml())
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.text() | quantities)
 def test_set_values_come_through(text: str) -> None:
     assert parse_set(f"name={as_toml(text)}") == ("name", text)

@@ -165,7 +165,7 @@ def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
     assert set(runs.data_vars) == {"peaks", "outcome", "status"}
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     shape=st.lists(st.integers(1, 15), min_size=1, max_size=4),
     target=st.integers(1, 300),

@@ -47,7 +47,7 @@ def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
 
 
 @given(count=st.integers(1, 40), points=st.integers(2, 400), modulus=st.integers(1, 4))
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int, modulus: int) -> None:
     stage = friso.load(EXAMPLES / "thesis_rig.toml")
     study = Request(stage, {"controller.crossover": (np.linspace(1, 2, points), "Hz")}).study()

@@ -73,7 +73,7 @@ def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
     assert stage == rig
 
 
-@settings(max_examples=25, deadline=None, derandomize=True)
+@settings(max_examples=25)
 @given(low=st.floats(0.01, 1), width=st.floats(0.001, 1), percent=st.floats(0.1, 99))
 def test_save_and_load(low: float, width: float, percent: float, tmp_path_factory: pytest.TempPathFactory) -> None:
     texts = {
