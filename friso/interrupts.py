@@ -30,6 +30,9 @@ PATIENCE = 10.0
 
 _raising = _said = False
 _bounded = True
+_waits = False
+"""Whether a signal came during an import, after which it is raised."""
+
 _held = 0
 """Blocks in which signals wait for the end (`hold_interrupts`), one within another."""
 
@@ -59,7 +62,7 @@ def answers_interrupts() -> None:
 def raising() -> Iterator[None]:
     """Signals raise KeyboardInterrupt within, one that came before at once. In another thread than the main one they
     are as they were."""
-    global _raising
+    global _raising, _waits
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -74,13 +77,20 @@ def raising() -> Iterator[None]:
             raise KeyboardInterrupt
         yield
     finally:
-        _raising = False
+        _raising = _waits = False
         no_signal_later()
         if not early.IS_COMMAND:  # which ends now, and is not to be interrupted in that
             sys.unraisablehook = ignored
             early.came.clear()
             for number, handler in before.items():
                 signal.signal(number, handler)
+
+
+def raise_what_waits() -> None:
+    """Wait for the KeyboardInterrupt of a signal that came during an import, before anything is done that must be
+    whole, for whose end it would have to wait."""
+    while _waits and not _held:
+        time.sleep(_AGAIN)
 
 
 @contextmanager
@@ -115,11 +125,13 @@ def _take(handler: Callable[[int, FrameType | None], object]) -> dict[int, Any]:
 
 
 def _arrived(number: int, frame: FrameType | None) -> None:
+    global _waits
     if number in SIGNALS:
         early.came.append(number)
     if not _raising:
         return
-    if _imports(frame) or _held:  # one that came during an import comes again
+    _waits = _imports(frame) or bool(_held)
+    if _waits:  # it comes again
         signal_later(_AGAIN, _arrived)
         return
     raise KeyboardInterrupt

@@ -23,6 +23,7 @@ from inside import friso_inside
 from systems import posix
 
 from friso import early, interrupts
+from friso.answers.output_folder import write_file
 from friso.engine import building
 from friso.engine.overtaken import Overtaken, ended_by
 
@@ -130,6 +131,23 @@ def _import_and_write(done: list[str]) -> None:
         done.append("whole")
     time.sleep(10)
     done.append("not interrupted")
+
+
+def test_ctrl_c_that_came_during_an_import_is_not_too_late_for_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which are put in place at once after it."""
+    (tmp_path / "half_there_at_last.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(interrupts, "_AGAIN", 0.3)
+    with pytest.raises(KeyboardInterrupt), interrupts.raising():
+        _import_and_put_in_place(tmp_path / "a.txt")
+    assert not (tmp_path / "a.txt").exists()
+
+
+def _import_and_put_in_place(path: Path) -> None:
+    import_module("half_there_at_last")
+    write_file("FILE", path, "a", False)
 
 
 STUCK = """

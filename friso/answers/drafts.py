@@ -12,7 +12,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from friso.interrupts import hold_interrupts
+from friso.interrupts import hold_interrupts, raise_what_waits
 from friso.leftovers import locked_folder, remove_leftovers
 from friso.system import delete_file, name_new_file, once_free, replace_file
 
@@ -65,6 +65,7 @@ class Drafts:
         way, and all is as it was before; Ctrl-C waits until the drafts are gone. A name always has a file, the earlier
         one or the new. Raises FileExistsError where anything else is in the way by now, another OSError."""
         undo: list[Callable[[], object]] = []
+        raise_what_waits()
         self.held.enter_context(hold_interrupts())
         try:
             for draft, path in self.drafts:
