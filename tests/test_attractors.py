@@ -439,6 +439,29 @@ def test_swings_of_half_a_percent_of_the_deflection(name: str, thorough: bool) -
     assert [1e3 * motion.amplitude for motion in attracted.motions] == pytest.approx([amplitude], rel=0.01)
 
 
+def test_a_small_swing_about_home_is_not_rest() -> None:
+    """A stage that shakes within what its bristles yield, by a sixtieth of the deflection of the loop, was told to
+    settle, for certain. The size is of simulations of 20 s at 1e-9 and 1e-11."""
+    friction = {
+        "static": "0.187335 N",
+        "coulomb": "0.107987 N",
+        "stribeck_velocity": "0.179598 mm/s",
+        "viscous": "0.0203099 N*s/m",
+        "attraction": "862.541 N/s",
+        "element_stiffness": ["163877 N/m", "69959 N/m", "1531.07 N/m"],
+        "element_share": [0.22815, 0.71025, 0.0616],
+        "element_damping": ["9.46938 N*s/m", "4.043 N*s/m", "0.0884707 N*s/m"],
+    }
+    controller = {"crossover": "70.4081 Hz", "alpha": 0.345249, "beta": 3.30941, "tuned_mass": "76.8398 g"}
+    stage = VARIANTS["rigid, GMS"].replace(
+        {f"friction.{name}": value for name, value in friction.items()}
+        | {f"controller.{name}": value for name, value in controller.items()}
+        | {"masses": {"stage": "76.8398 g"}}
+    )
+    attracted = attractors(held(stage))
+    assert [1e9 * motion.amplitude for motion in attracted.motions] == pytest.approx([253.5], rel=0.01)
+
+
 def test_swings_that_repeat_themselves() -> None:
     """A symmetric swing repeats after one turn, mirrored; a leaning one after two; a long-short one after four."""
     rows = [[1.0, -1.0] * 16, [1.2, -0.9] * 16, [1.0, -0.5, 0.6, -0.4] * 8]

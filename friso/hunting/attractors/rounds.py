@@ -144,7 +144,8 @@ def one_round(runs: Pending, budget: float = BUDGET) -> tuple[Pending, Ends]:
     values, times = last_swings(results, np.maximum(LEG * (high - low), least), KEPT)
     standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
-    ends = Ends(results.ends, completed, completed & standing, steps, repeats, values, times)
+    rest = completed & standing & (repeats.swings == 0)  # one that repeats itself may do so about home for ever
+    ends = Ends(results.ends, completed, rest, steps, repeats, values, times)
     return replace(runs, states=results.ends), ends
 
 
