@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import base64
 import errno
+import functools
 import http.client
 import io
 import json
@@ -15,6 +16,7 @@ import threading
 import time
 import zipfile
 from collections.abc import AsyncIterator, Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -26,7 +28,9 @@ import pytest
 import uvicorn
 
 import friso
+from friso.answers.schema import stage_schema
 from friso.app import gate, uploads
+from friso.app import machine as machines
 from friso.app.gate import Access
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
@@ -399,6 +403,26 @@ def test_a_machine_has_the_keys_of_its_file_with_what_they_take(served: Served) 
     assert keys["controller.crossover"]["range"] == {"low": 0.8, "high": 80.0, "log": True}
     assert 0 < keys["controller.alpha"]["range"]["low"] < keys["controller.alpha"]["range"]["high"] < 1
     assert friso.loads(part["toml"]) == friso.load(RIG).replace({"masses.cart": "1.5 kg"})
+
+
+def test_the_schema_is_read_by_one_thread_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python 3.11 cannot parse in several at a time."""
+    reading, most = [0], [0]
+
+    @functools.cache
+    def read() -> dict[str, Any]:
+        reading[0] += 1
+        most[0] = max(most[0], reading[0])
+        time.sleep(0.2)
+        reading[0] -= 1
+        return stage_schema()
+
+    monkeypatch.setattr(machines, "_read_schema", read)
+    machine = Machine.of({"text": RIG.read_text(encoding="utf-8")})
+    with ThreadPoolExecutor(4) as pool:
+        shown = [*pool.map(machine_on_page, 4 * [machine])]
+    assert most == [1]
+    assert shown == 4 * shown[:1]
 
 
 @pytest.mark.parametrize("name", [name for name in friso.answers.starting.example_names() if "/" not in name])

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import json
 import re
-import socket
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -71,13 +70,6 @@ class Browsed:
         finally:
             page.unroute("**/ask/machine")
 
-    def undo_to(self, value: str) -> None:
-        """Undo until the crossover is this one again."""
-        self.page.click("#undo")
-        while self.changes().get("controller.crossover") != value:
-            self.page.click("#undo")
-        self.page.wait_for_function(f"value => document.querySelector('{FIELD}').value === value", arg=value)
-
     def changes(self) -> dict[str, Any]:
         """What is changed of the machine that is shown."""
         return self.page.evaluate("async () => (await import('/state.js')).changes()")
@@ -88,26 +80,69 @@ class Browsed:
             "text => document.getElementById('answer').innerText.includes(text)", arg=text, timeout=180_000
         )
 
+    def begin(self) -> None:
+        """The rig alone, as it was opened, whatever the test before did or left undone."""
+        page = self.page
+        page.unroute_all(behavior="ignoreErrors")
+        page.context.set_offline(False)
+        page.mouse.move(0, 0)
+        page.mouse.up()
+        page.set_viewport_size({"width": 1600, "height": 1000})
+        page.emulate_media(color_scheme="light")
+        page.evaluate(
+            """async text => {
+                const machines = await import('/state.js');
+                document.getElementById('dialog').close();
+                document.getElementById('keys').replaceChildren();
+                machines.state.machines.length = 0;
+                machines.state.pinned = null;
+                machines.add('thesis_rig.toml', text);
+            }""",
+            RIG.read_text(encoding="utf-8"),
+        )
+        page.wait_for_selector("#keys h2")
+        page.click("[data-part=controller]")
+        page.click("#tab-run")
+        page.wait_for_selector("#picture .js-plotly-plot .main-svg")
+
+    def set(self, changes: dict[str, Any]) -> None:
+        """Keys are set, and the picture of their run is there."""
+        self.page.evaluate("async changes => (await import('/state.js')).set(changes)", changes)
+        self.says(friso.simulate(RIG, set=changes).sentences()[0])
+
+    def says(self, text: str) -> None:
+        """Wait until the picture has a text."""
+        self.page.wait_for_function(
+            "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=180_000
+        )
+
 
 @pytest.fixture(scope="module")
-def browsed() -> Iterator[Browsed]:
+def opened() -> Iterator[Browsed]:
     driver = pytest.importorskip("playwright.sync_api")
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser", "--port", str(port)]
+    command = [sys.executable, "-m", "friso", "app", str(RIG), "--no-browser", "--port", "0"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as server, driver.sync_playwright() as play:
-        assert server.stdout is not None
-        address = re.search(r"http://\S+", server.stdout.readline())
-        assert address is not None
-        chromium = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
-        page = chromium.new_page(viewport={"width": 1600, "height": 1000})
-        browsed = Browsed(page, f"http://127.0.0.1:{port}/")
-        page.goto(address[0])
-        page.wait_for_selector(".js-plotly-plot .main-svg", timeout=60_000)
-        yield browsed
-        chromium.close()
-        server.terminate()
+        try:
+            assert server.stdout is not None
+            address = re.search(r"(http://\S+/)\?\S+", server.stdout.readline())
+            assert address is not None
+            chromium = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
+            page = chromium.new_page()
+            page.set_default_timeout(120_000)
+            opened = Browsed(page, address[1])
+            page.goto(address[0])
+            page.wait_for_selector("[data-part=controller]")
+            yield opened
+            chromium.close()
+        finally:
+            server.terminate()
+
+
+@pytest.fixture
+def browsed(opened: Browsed) -> Browsed:
+    """The page as it begins: no test rests on another one."""
+    opened.begin()
+    return opened
 
 
 def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> None:
@@ -128,54 +163,48 @@ def test_the_verdict_of_the_locked_rig_changes_at_its_edge(browsed: Browsed) -> 
 
 def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browsed: Browsed) -> None:
     page = browsed.page
+
+    def about_it(question: str) -> Callable[[Any], bool]:
+        return lambda request: f"ask/{question}" in request.url and "11 Hz" in (request.post_data or "")
+
     page.route("**/ask/run", lambda _: None)
-    try:
-        with page.expect_request(re.compile("ask/verdict")) as verdict:
-            with page.expect_request(re.compile("ask/run")):
-                browsed.type("controller.crossover", "11 Hz")
-            page.click("#tab-bode")
-    finally:
-        page.unroute("**/ask/run")  # the tests after this one ask for runs, too
-    assert "11 Hz" in (verdict.value.post_data or "")
-    page.click("#undo")
-    page.click("#tab-run")
-    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+    with page.expect_request(about_it("verdict")):
+        with page.expect_request(about_it("run")):
+            browsed.type("controller.crossover", "11 Hz")
+        page.click("#tab-bode")
 
 
 def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> None:
-    page, before = browsed.page, browsed.page.input_value(FIELD)
+    page = browsed.page
     browsed.type_meanwhile("11 Hz", "10.5 H")
     page.keyboard.type("z")
     with page.expect_request(re.compile("ask/machine")) as asked:
         page.keyboard.press("Enter")
     assert "10.5 Hz" in (asked.value.post_data or "")
-    browsed.undo_to(before)
 
 
 def test_what_is_selected_to_be_typed_over_stays_selected_when_an_answer_comes(browsed: Browsed) -> None:
-    page, before = browsed.page, browsed.page.input_value(FIELD)
+    page = browsed.page
     browsed.type_meanwhile("11 Hz", "")
     assert page.eval_on_selector(FIELD, "field => field === document.activeElement && field.value") == "11 Hz"
     page.keyboard.type("10.5 Hz")
     assert page.input_value(FIELD) == "10.5 Hz"
     page.keyboard.press("Enter")
-    browsed.undo_to(before)
 
 
 def test_a_refusal_is_said_while_something_else_is_typed(browsed: Browsed) -> None:
-    page, before = browsed.page, browsed.page.input_value(FIELD)
+    page = browsed.page
     browsed.type_meanwhile("3 kg", "10.")
     assert "convertible to Hz" in page.inner_text('[data-path="controller.crossover"] [role=alert]')
     page.keyboard.type("5 Hz")
     page.keyboard.press("Enter")
     page.wait_for_selector('[data-path="controller.crossover"] .wrong', state="detached")
     assert browsed.changes()["controller.crossover"] == "10.5 Hz"
-    browsed.undo_to(before)
 
 
 def test_the_first_click_after_typing_counts(browsed: Browsed) -> None:
     """What is drawn anew while the pointer is pressed is drawn once it has clicked; what has the focus keeps it."""
-    page, before = browsed.page, browsed.page.input_value(FIELD)
+    page = browsed.page
 
     def click(place: str) -> None:
         page.hover(place)
@@ -200,11 +229,53 @@ def test_the_first_click_after_typing_counts(browsed: Browsed) -> None:
     page.wait_for_selector('[data-path="masses.stage"]')
     page.click("[data-part=controller]")
     assert page.input_value(FIELD) == "10 Hz"
-    browsed.undo_to(before)
+
+
+def test_tabs_keep_the_focus_and_a_click_on_one_counts_while_a_value_is_handed_over(browsed: Browsed) -> None:
+    page = browsed.page
+    page.focus("#tab-check")
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.id") == "tab-check"
+    page.focus(FIELD)
+    page.keyboard.press("Control+a")
+    page.keyboard.type("11 Hz")
+    page.hover("#tab-logs")
+    page.mouse.down()
+    page.wait_for_function("async () => (await import('/state.js')).changes()['controller.crossover']")
+    page.mouse.up()
+    page.wait_for_selector("#tab-logs[aria-selected=true]")
+
+
+def test_an_earlier_answer_leads_back_to_its_machine(browsed: Browsed) -> None:
+    """With the keys of that time and no others, and in its tab."""
+    page = browsed.page
+    page.evaluate("document.getElementById('history').replaceChildren()")
+    page.evaluate("async () => (await import('/state.js')).set({ 'controller.crossover': '11 Hz' })")
+    page.wait_for_selector("#history [title*='11 Hz']")
+    page.evaluate("async () => (await import('/state.js')).set({ 'masses.cart': '1.3 kg' })")
+    page.wait_for_selector("#history [title*='1.3 kg']")
+    page.evaluate(
+        "async text => (await import('/state.js')).add('another.toml', text)", RIG.read_text(encoding="utf-8")
+    )
+    page.click("#history [title*='11 Hz']")
+    page.wait_for_selector("#machine-0[aria-selected=true]")
+    assert browsed.changes() == {"controller.crossover": "11 Hz"}
+
+
+def test_a_server_that_is_gone_is_said_so_and_nothing_is_lost(browsed: Browsed) -> None:
+    page, wrong = browsed.page, len(browsed.wrong)
+    page.context.set_offline(True)
+    browsed.type("controller.crossover", "11 Hz")
+    page.wait_for_selector("#trouble:not([hidden])")
+    page.context.set_offline(False)
+    page.wait_for_selector("#trouble", state="hidden")
+    browsed.says(friso.simulate(RIG, set={"controller.crossover": "11 Hz"}).sentences()[0])
+    assert all("ERR_INTERNET_DISCONNECTED" in text for text in browsed.wrong[wrong:])
+    del browsed.wrong[wrong:]
 
 
 def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, tmp_path: Path) -> None:
-    page, before = browsed.page, browsed.page.input_value(FIELD)
+    page = browsed.page
     (tmp_path / "another.toml").write_text(friso.load(RIG).replace({"controller.crossover": "15 Hz"}).to_toml())
     page.focus(FIELD)
     page.keyboard.press("Control+a")
@@ -214,8 +285,8 @@ def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, 
     page.keyboard.press("Enter")
     assert browsed.changes() == {}
     page.click("[aria-label='Close another.toml']")
-    page.wait_for_function(f"value => document.querySelector('{FIELD}').value === value", arg=before)
-    assert browsed.changes()["controller.crossover"] == before
+    page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '8 Hz'")
+    assert browsed.changes() == {}
 
 
 def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
@@ -227,7 +298,7 @@ def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
     page.mouse.move(slider["x"] + 0.5 * slider["width"], slider["y"] + slider["height"] / 2)
     page.mouse.down()
     page.mouse.move(slider["x"] + 0.7 * slider["width"], slider["y"] + slider["height"] / 2, steps=4)
-    page.wait_for_function(f"before => JSON.stringify({last}) !== JSON.stringify(before)", arg=before, timeout=60_000)
+    page.wait_for_function(f"before => JSON.stringify({last}) !== JSON.stringify(before)", arg=before)
     assert page.eval_on_selector(FIELD, "field => field.value === field.defaultValue")  # nothing is being typed
     page.mouse.up()
     page.click("#undo")
@@ -236,11 +307,8 @@ def test_a_slider_is_dragged_and_the_picture_follows(browsed: Browsed) -> None:
 def test_a_slider_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
     """What is right again does not take the slider from under the hand, and one pull is one step."""
     page, row = browsed.page, '[data-path="controller.crossover"]'
-    value = "([field, value]) => document.querySelector(field).value === value"
-    before = [f"{row} input[type=text]", "9.7 Hz"]
-    page.wait_for_function(value, arg=before, timeout=30_000)
     browsed.type("controller.crossover", "3 kg")
-    page.wait_for_selector(f"{row} .wrong", timeout=30_000)
+    page.wait_for_selector(f"{row} .wrong")
     slider = page.locator(f"{row} input[type=range]")
     place, same = slider.bounding_box(), slider.element_handle()
     assert place is not None
@@ -253,52 +321,53 @@ def test_a_slider_goes_on_after_a_wrong_value(browsed: Browsed) -> None:
             page.mouse.down()  # the verdict is asked for once the machine is right again
         assert same.evaluate("slider => slider.isConnected")
         there = page.input_value(f"{row} input[type=text]")
-        assert there not in ("9.7 Hz", "3 kg")
+        assert there not in ("8 Hz", "3 kg")
         page.mouse.move(place["x"] + 0.7 * place["width"], height, steps=3)
         assert page.input_value(f"{row} input[type=text]") != there
         page.mouse.move(place["x"] + 0.7 * place["width"], height + 200)
     finally:
         page.mouse.up()
-    page.wait_for_selector(f"{row} .wrong", state="detached", timeout=30_000)
+    page.wait_for_selector(f"{row} .wrong", state="detached")
     page.click("#undo")
-    page.wait_for_selector(f"{row} .wrong", timeout=30_000)
+    page.wait_for_selector(f"{row} .wrong")
     page.click("#undo")
-    page.wait_for_selector(f"{row} .wrong", state="detached", timeout=30_000)
-    page.wait_for_function(value, arg=before, timeout=30_000)
+    page.wait_for_selector(f"{row} .wrong", state="detached")
+    page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '8 Hz'")
 
 
 def test_an_uncertain_value_has_no_slider_and_its_warning_stays(browsed: Browsed) -> None:
     page, row = browsed.page, '[data-path="masses.stage"]'
     page.click("[data-part=stage]")
     browsed.type("masses.stage", "0.5 kg .. 0.7 kg")
-    page.wait_for_selector(f"{row} .uncertain", timeout=30_000)
+    page.wait_for_selector(f"{row} .uncertain")
     assert page.locator(f"{row} input[type=range]").count() == 0
     browsed.answered("1 key is uncertain (masses.stage)")
     page.click("#undo")
-    page.wait_for_selector(f"{row} input[type=range]", timeout=30_000)
+    page.wait_for_selector(f"{row} input[type=range]")
     page.click("[data-part=controller]")
 
 
 def test_what_is_wrong_is_said_in_place(browsed: Browsed) -> None:
     browsed.type("controller.crossover", "3 kg")
-    browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', timeout=30_000)
+    browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong')
     assert "convertible to Hz" in browsed.page.inner_text('[data-path="controller.crossover"] .wrong')
     assert browsed.page.input_value(FIELD) == "3 kg"
     browsed.page.click("#undo")
-    browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', state="detached", timeout=30_000)
+    browsed.page.wait_for_selector('[data-path="controller.crossover"] .wrong', state="detached")
 
 
 def test_a_pinned_machine_stays_as_a_ghost(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#pin")
     ghost = "document.querySelector('.plot').data.some((line) => line.name === 'pinned')"
-    page.wait_for_function(f"() => {ghost}", timeout=60_000)
+    page.wait_for_function(f"() => {ghost}")
     page.click("#pin")
-    page.wait_for_function(f"() => !({ghost})", timeout=60_000)
+    page.wait_for_function(f"() => !({ghost})")
 
 
 def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
+    browsed.set({"joint.locked": True, "controller.crossover": "9.7 Hz"})
     page.click("#out")
     with page.expect_download() as download:
         page.click("text=Stage file")
@@ -308,29 +377,24 @@ def test_the_exported_stage_gives_the_numbers_of_the_command_line(browsed: Brows
     assert friso.load(tmp_path / "out.toml").controller.crossover == pytest.approx(9.7)
     assert line == 'friso simulate thesis_rig.toml --set joint.locked=true --set controller.crossover="9.7 Hz"'
     page.set_input_files("#file", tmp_path / "out.toml")
-    page.wait_for_function("() => document.querySelectorAll('#machines [role=tab]').length > 1", timeout=30_000)
-    text = friso.simulate(tmp_path / "out.toml").sentences()[0]
-    page.wait_for_function(
-        "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=180_000
-    )
+    page.wait_for_function("() => document.querySelectorAll('#machines [role=tab]').length > 1")
+    browsed.says(friso.simulate(tmp_path / "out.toml").sentences()[0])
 
 
 def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_there(browsed: Browsed) -> None:
     page = browsed.page
     page.click("#tab-map")
-    page.wait_for_selector(".plot .heatmaplayer image", timeout=60_000)
-    before = page.input_value('[data-path="controller.crossover"] input[type=text]')
+    finest = "() => document.querySelector('.plot')?.data?.some((one) => one.z?.length === 41)"
+    page.wait_for_function(finest)  # a finer map under the pointer takes its run away
+    page.wait_for_selector(".plot .heatmaplayer image")
     place = page.locator(".plot .nsewdrag").first.bounding_box()
     assert place is not None
     page.mouse.move(place["x"] + 0.8 * place["width"], place["y"] + 0.4 * place["height"])
     page.mouse.move(place["x"] + 0.8 * place["width"], place["y"] + 0.5 * place["height"])
-    page.wait_for_selector("#beside .main-svg", timeout=60_000)  # the run of the cell under the pointer
+    page.wait_for_selector("#beside .main-svg")  # the run of the cell under the pointer
     page.mouse.click(place["x"] + 0.8 * place["width"], place["y"] + 0.5 * place["height"])
-    field = '[data-path="controller.crossover"] input[type=text]'
-    page.wait_for_function(
-        "([field, before]) => document.querySelector(field).value !== before", arg=[field, before], timeout=30_000
-    )
-    assert float(page.input_value(field).split()[0]) > 20
+    page.wait_for_function(f"() => document.querySelector('{FIELD}').value !== '8 Hz'")
+    assert float(page.input_value(FIELD).split()[0]) > 15
 
 
 def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:
@@ -343,15 +407,15 @@ def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, t
     assert page.is_disabled("#out")
     assert page.is_disabled("#pin")
     page.set_input_files("#file", written(tmp_path))
-    page.wait_for_selector("#role-position", timeout=60_000)
+    page.wait_for_selector("#role-position")
     assert page.locator("#pictures-bar button").count() == 0
     page.click("text=Edit the file")
     page.fill("#dialog textarea", RIG.read_text())
     page.click("text=Use this text")
-    page.wait_for_selector(FIELD, timeout=30_000)
+    page.wait_for_selector(FIELD)
     assert page.input_value(FIELD) == "8 Hz"
     page.click("#tab-run")
-    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
 def test_where_the_server_fails_it_can_be_asked_again(browsed: Browsed, tmp_path: Path) -> None:
@@ -364,31 +428,31 @@ def test_where_the_server_fails_it_can_be_asked_again(browsed: Browsed, tmp_path
     browsed.answered("out of memory")
     page.unroute("**/ask/machine")
     page.click("text=Ask again")
-    page.wait_for_selector(FIELD, timeout=30_000)
-    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+    page.wait_for_selector(FIELD)
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
 def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browsed: Browsed) -> None:
     page, slider = browsed.page, '[data-path="controller.crossover"] input[type=range]'
     page.click("#tab-bode")
     said = "() => document.getElementById('picture').innerText.includes('How fast this controller can be')"
-    page.wait_for_function(said, timeout=60_000)
+    page.wait_for_function(said)
     with page.expect_response(re.compile("ask/loops")):
         page.eval_on_selector(slider, "one => { one.value = 300; one.dispatchEvent(new Event('input')); }")
     page.wait_for_function(f"() => !({said})()")
     assert page.locator(".figure:not(.stale) .main-svg").count() > 0
     page.eval_on_selector(slider, "one => one.dispatchEvent(new Event('change'))")
-    page.wait_for_function(said, timeout=60_000)
+    page.wait_for_function(said)
     page.click("#undo")
     page.click("#tab-run")
-    page.wait_for_selector("#picture .js-plotly-plot .main-svg", timeout=60_000)
+    page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
 def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     page.click("#tab-logs")
     page.set_input_files("#log-files", written(tmp_path))
-    page.wait_for_selector("#role-position", timeout=60_000)
+    page.wait_for_selector("#role-position")
     assert "log.csv" in page.inner_text("#picture")
 
 
@@ -402,9 +466,7 @@ def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -
     log = write_text(tmp_path / "steering.csv", ["time [s]", "\u202eposition\x1b[31m [m]", "force [N]"], columns)
     page.click("#tab-logs")
     page.set_input_files("#log-files", log)
-    page.wait_for_function(
-        "() => document.getElementById('picture').innerText.includes('u202eposition')", timeout=60_000
-    )
+    page.wait_for_function("() => document.getElementById('picture').innerText.includes('u202eposition')")
     shown = page.inner_text("body")
     assert escaped(shown) == shown
 
@@ -419,7 +481,7 @@ def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:
         document.dispatchEvent(new DragEvent("drop", { dataTransfer: dropped, cancelable: true }));
     }""")
     page.wait_for_function("() => document.getElementById('picture').innerText.includes('one.csv, two.csv')")
-    page.wait_for_function("() => document.querySelectorAll('#picture .plot, #picture table').length", timeout=30_000)
+    page.wait_for_function("() => document.querySelectorAll('#picture .plot, #picture table').length")
 
 
 def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> None:
@@ -445,11 +507,14 @@ def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> Non
 
 @pytest.mark.parametrize("width", [400, 900, 1600])
 def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
+    """Pictures neither: they are drawn anew some time after the page has another width."""
     browsed.page.set_viewport_size({"width": width, "height": 900})
-    browsed.page.click("#tab-run")
-    browsed.page.wait_for_selector(".plot .main-svg")
-    browsed.page.wait_for_timeout(300)
-    assert browsed.page.evaluate("document.documentElement.scrollWidth") <= width
+    browsed.page.wait_for_function(
+        """width => document.documentElement.scrollWidth <= width
+        && [...document.querySelectorAll('.plot .main-svg')].every((one) =>
+            one.getBoundingClientRect().right <= document.getElementById('right').getBoundingClientRect().right + 1)""",
+        arg=width,
+    )
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -459,11 +524,11 @@ def test_axe_finds_no_violation(browsed: Browsed, scheme: str) -> None:
     there = {"run": ".plot .main-svg", "map": ".plot .heatmaplayer image", "remedies": "#tune", "logs": ".drop"}
     for tab, content in there.items():
         browsed.page.click(f"#tab-{tab}")
-        browsed.page.wait_for_selector(f"#picture {content}", timeout=60_000)
+        browsed.page.wait_for_selector(f"#picture {content}")
         violations = axe.run(browsed.page).response["violations"]
         assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
 
 
-def test_nothing_went_wrong_and_nothing_left_this_machine(browsed: Browsed) -> None:
+def test_nothing_went_wrong_and_nothing_left_this_machine(opened: Browsed) -> None:
     """At the end of this file."""
-    assert (browsed.wrong, browsed.outside) == ([], [])
+    assert (opened.wrong, opened.outside) == ([], [])

@@ -6,6 +6,7 @@ import json
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cache, lru_cache
+from threading import Lock
 from typing import Any
 
 from friso.answers.schema import stage_schema
@@ -153,6 +154,12 @@ def _range(field: Quantity | Number, value: float) -> dict[str, Any]:
     return {"low": ends[0], "high": ends[1], "log": value > 0}
 
 
-@cache
 def _schema() -> dict[str, Any]:
-    return stage_schema()
+    """The schema of the stage file: read once, and by one thread, for Python 3.11 cannot parse in several at a time
+    ("AST constructor recursion depth mismatch", github.com/python/cpython/issues/106905)."""
+    with _reading:
+        return _read_schema()
+
+
+_reading = Lock()
+_read_schema = cache(stage_schema)

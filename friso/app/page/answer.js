@@ -2,7 +2,7 @@
 import { $, el, plain } from "./dom.js";
 import { paragraphs } from "./tables.js";
 
-const history = [];
+let last = {};
 const MOST = 200;
 let status = null;
 
@@ -28,6 +28,9 @@ export function whole(answer) {
   rest.append(...paragraphs(answer.notes));
   $("answer").replaceChildren(...cases, rest, line());
 }
+
+/** What is shown is of an earlier machine. */
+export const earlier = () => $("answer").querySelectorAll(".case").forEach((item) => item.classList.add("stale"));
 
 export function refused(text) {
   $("answer").replaceChildren(el("p", { class: "case", role: "alert" }, text), line());
@@ -55,12 +58,13 @@ export function progress(part) {
   }
 }
 
-/** Note an answer; a click on it goes back there. */
-export function note(verdict, changes, label, go) {
-  const text = JSON.stringify(changes);
-  if (history.at(-1)?.text === text) return;
-  history.push({ text });
-  const title = `${label}: ${verdict}`;
-  $("history").prepend(el("button", { type: "button", class: verdict, title, "aria-label": `Back to ${title}`, onclick: () => go(changes) }));
+/** Note the answer for a machine with the keys that were `given`; a click on it goes back there. */
+export function note(verdict, { machine, given }, back) {
+  const text = JSON.stringify(given);
+  if (last.machine === machine && last.text === text) return;
+  last = { machine, text };
+  const changed = Object.entries(given).at(-1)?.join(" ") ?? "as opened";
+  const title = `${machine.name.replace(/\.toml$/, "")}, ${changed}: ${verdict}`;
+  $("history").prepend(el("button", { type: "button", class: verdict, title, "aria-label": `Back to ${title}`, onclick: () => back(machine, given) }));
   while ($("history").children.length > MOST) $("history").lastChild.remove();
 }

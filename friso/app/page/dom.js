@@ -35,6 +35,27 @@ function filled(element, attributes, children) {
 /** A random text. Pages that come unencrypted from another machine have no crypto.randomUUID. */
 export const token = () => Array.from(crypto.getRandomValues(new Uint32Array(4)), (number) => number.toString(36)).join("");
 
+/** Draw what is in a place anew: what has the focus there has it again, by its id, or else what `instead` gives for it; what was
+ * selected in a field is selected, for it may be about to be typed over; and nothing is scrolled. */
+export function anew(place, drawn, instead = () => null) {
+  const before = place.contains(document.activeElement) ? document.activeElement : null;
+  drawn();
+  if (!before?.id) return;
+  const item = $(before.id) ?? instead(before);
+  item?.focus({ preventScroll: true });
+  if (item?.type === "text" && before.type === "text") item.setSelectionRange(before.selectionStart, before.selectionEnd);
+}
+
+/** Show tabs. While they are the same, those that are there stay, under the pointer that is pressed on them; else the one that is
+ * selected has the focus of one that is gone. */
+export function tabs(place, buttons) {
+  const there = [...place.children];
+  const same = (button, k) => button.id === there[k]?.id && button.textContent === there[k].textContent;
+  if (there.length === buttons.length && buttons.every(same)) {
+    buttons.forEach((button, k) => there[k].setAttribute("aria-selected", button.getAttribute("aria-selected")));
+  } else anew(place, () => place.replaceChildren(...buttons), () => place.querySelector("[aria-selected=true]"));
+}
+
 /** "limiter_stiffness" as words. */
 export const words = (key) => {
   const text = key.slice(key.lastIndexOf(".") + 1).replaceAll("_", " ");

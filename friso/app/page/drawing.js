@@ -36,6 +36,7 @@ export function drawing(machine, chosen, choose, lock) {
       role: "button",
       "aria-label": part.label,
       "aria-pressed": String(part.id === chosen),
+      id: `part-${part.id}`,
       "data-part": part.id,
       onclick: () => choose(part.id),
       onkeydown: (event) => {
@@ -95,6 +96,7 @@ function lockSwitch(locked, lock) {
     role: "switch",
     "aria-checked": String(locked),
     "aria-label": "Joint locked",
+    id: "part-lock",
     "data-part": "lock",
     onclick: turn,
     onkeydown: (event) => {

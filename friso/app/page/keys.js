@@ -1,5 +1,5 @@
 // The keys of a part: value, unit, slider, meaning, uncertainty; and the stage file as text.
-import { $, dialog, el, words } from "./dom.js";
+import { $, anew, dialog, el, words } from "./dom.js";
 import { PARTS } from "./drawing.js";
 
 const QUANTITY = /^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?)\s*(\S.*)?$/i;
@@ -30,9 +30,13 @@ export function typing() {
   return Boolean(field?.matches?.("#keys input[type=text]")) && field.value !== field.defaultValue;
 }
 
-export function keys(place, machine, part, changed, wrong, tell) {
+/** The keys of a part; where a slider had the focus and is gone, its field has it. */
+export function keys(place, ...what) {
+  anew(place, () => drawn(place, ...what), (slider) => $(slider.id.replace(SLIDER, "")));
+}
+
+function drawn(place, machine, part, changed, wrong, tell) {
   const about = PARTS.find((item) => item.id === part);
-  const before = place.contains(document.activeElement) ? document.activeElement : null;
   const opened = new Set([...place.querySelectorAll("details[open]")].map((item) => item.dataset.table));
   const tables = about.tables.map((name) => machine.tables.find((table) => table.name === name));
   const text = el("button", { id: "keys-text", type: "button", class: "plain", onclick: () => tell.edit() }, "Edit as text");
@@ -55,14 +59,6 @@ export function keys(place, machine, part, changed, wrong, tell) {
   }
   place.append(text);
   refuse(place, wrong);
-  if (before?.id) focusAgain(before);
-}
-
-/** What is drawn again has the focus that it had, and selects what was selected: that may be about to be typed over. */
-function focusAgain(before) {
-  const item = $(before.id) ?? $(before.id.replace(SLIDER, ""));
-  item?.focus();
-  if (item?.type === "text" && before.type === "text") item.setSelectionRange(before.selectionStart, before.selectionEnd);
 }
 
 /** Say what is wrong at its keys, and of no other one; they are not drawn again. */

@@ -1,5 +1,5 @@
 // Logs: dropped files, their channels with roles, and the machine that they show.
-import { el } from "./dom.js";
+import { anew, el } from "./dom.js";
 import { shownAnswer } from "./long.js";
 import { paragraphs } from "./tables.js";
 import { hand } from "./wire.js";
@@ -55,15 +55,16 @@ export class Logs {
       return el("label", {}, role.replaceAll("_", " "), el("select", { id: `role-${role}`, onchange: choose }, ...options));
     };
     this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
-    this.assumed = el("input", { type: "checkbox", id: "assumed" });
+    this.assumed = el("input", { type: "checkbox", id: "assumed", checked: this.assumed?.checked ?? false });
     const start = () => shownAnswer(this.result, "logs", "identify", () => this.options({ assumed: this.assumed.checked }), this.tell);
-    this.form.replaceChildren(
+    const fields = [
       ...roles.map(choice),
       el("label", {}, "sample time", this.dt),
       el("label", {}, "the machine shown is what is known", this.assumed),
       el("button", { type: "button", id: "identify", onclick: start }, "Identify"),
       el("button", { type: "button", onclick: () => this.forget() }, "Other files"),
-    );
+    ];
+    anew(this.form, () => this.form.replaceChildren(...fields));
   }
 
   forget() {

@@ -15,7 +15,10 @@ export async function shownAnswer(place, lane, question, body, tell) {
       status.replaceChildren(bar, plain(part.label));
     } else if (part.kind === "message") status.replaceChildren(plain(part.text));
   });
-  if (!answer) return null;
+  if (!answer) {
+    if (place.contains(status)) place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, "There is no answer: the server was gone. Ask again."));
+    return null;
+  }
   if (answer.kind !== "answer") {
     place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, answer.text));
     return null;

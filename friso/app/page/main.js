@@ -1,6 +1,6 @@
 // The page: connects the machine, its keys, the answer and the pictures.
 import * as answers from "./answer.js";
-import { $, el, plain } from "./dom.js";
+import { $, anew, el, plain, tabs } from "./dom.js";
 import { drawing } from "./drawing.js";
 import { edit, forgetRanges, keys, refuse, typing, worded } from "./keys.js";
 import { out, save } from "./out.js";
@@ -36,9 +36,10 @@ const pictures = new Pictures(sent, {
 const form = new Live("machine", "machine", 2000, described);
 const verdict = new Live("verdict", "verdict", 5000, (part, tag) => {
   if (part.kind === "message") return answers.progress(part);
-  if (part.kind !== "answer") return;
+  if (part.kind === "failed") return answers.refused(part.text);
+  if (part.kind !== "answer") return; // what is wrong with the machine is said where it was set
   answers.quick(part);
-  if (tag) answers.note(part.verdict, tag.changes, tag.label, (changes) => set(changes));
+  if (tag) answers.note(part.verdict, tag, machines.back);
 });
 
 function withUnits(values) {
@@ -69,10 +70,9 @@ function changed(dragged) {
 
 /** The picture follows the machine, and then the verdict: both at once would be slower. */
 function follow(dragged) {
-  const given = machines.changes();
+  const tag = { machine: machines.current(), given: machines.changes() };
   const machine = machines.sent();
-  const label = Object.entries(given).at(-1)?.join(" ") ?? "as opened";
-  pictures.changed(dragged, () => verdict.ask({ machine }, { changes: given, label }));
+  pictures.changed(dragged, () => verdict.ask({ machine }, tag));
 }
 
 /** The server has read the machine, or refused it. */
@@ -83,7 +83,8 @@ function described(part) {
     answers.progress(null);
     if (!shown || held !== machines.current().text) return without(part);
     left();
-    if (!$("keys").querySelector(".wrong")) answers.refused(part.text);
+    if ($("keys").querySelector(".wrong")) answers.earlier();
+    else answers.refused(part.text);
     return;
   }
   if (part.kind !== "answer") return;
@@ -136,9 +137,8 @@ async function check() {
 }
 
 function redraw() {
-  const focused = document.activeElement?.dataset?.part;
-  $("drawing").replaceChildren(drawing(shown, chosen, choose, (locked) => set({ "joint.locked": locked })));
-  if (focused) $("drawing").querySelector(`[data-part="${focused}"]`)?.focus();
+  const image = drawing(shown, chosen, choose, (locked) => set({ "joint.locked": locked }));
+  anew($("drawing"), () => $("drawing").replaceChildren(image));
 }
 
 function left() {
@@ -178,12 +178,13 @@ function choose(part) {
 function bar() {
   const { state } = machines;
   const current = machines.current();
-  $("machines").replaceChildren(
-    ...state.machines.flatMap((machine, k) => [
-      el("button", { type: "button", role: "tab", "aria-selected": String(k === state.shown), "aria-controls": "left", onclick: () => machines.show(k) }, machine.name.replace(/\.toml$/, "")),
-      state.machines.length > 1 ? el("button", { type: "button", class: "close", role: "tab", "aria-selected": "false", "aria-label": `Close ${machine.name}`, title: "Close", onclick: () => machines.close(k) }, "×") : null,
-    ].filter(Boolean)),
+  const buttons = state.machines.flatMap((machine, k) =>
+    [
+      el("button", { type: "button", role: "tab", id: `machine-${k}`, "aria-selected": String(k === state.shown), "aria-controls": "left", onclick: () => machines.show(k) }, machine.name.replace(/\.toml$/, "")),
+      state.machines.length > 1 ? el("button", { type: "button", class: "close", role: "tab", id: `close-${k}`, "aria-selected": "false", "aria-label": `Close ${machine.name}`, title: "Close", onclick: () => machines.close(k) }, "×") : null,
+    ].filter(Boolean),
   );
+  tabs($("machines"), buttons);
   $("undo").disabled = !current || current.step === 0;
   $("redo").disabled = !current || current.step === current.steps.length - 1;
   $("pin").setAttribute("aria-pressed", String(Boolean(state.pinned)));
@@ -219,10 +220,10 @@ function wire() {
   $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer, link: machines.link, files: report }));
   document.addEventListener("keydown", (event) => {
     if (event.target.matches?.("input[type=text], textarea, select")) return;
+    if ($("dialog").open) return;
     if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
       event.preventDefault();
-      if (event.shiftKey) redo();
-      else undo();
+      $(event.shiftKey ? "redo" : "undo").click();
     } else if (event.key === "p" && !event.ctrlKey && !event.metaKey) $("pin").click();
   });
   $("keys").addEventListener("focusout", caughtUp);

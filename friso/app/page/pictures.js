@@ -1,5 +1,5 @@
 // The pictures of the answer, in tabs: each asks its own question.
-import { $, el, words } from "./dom.js";
+import { $, el, tabs, words } from "./dom.js";
 import { worded } from "./keys.js";
 import { Beside } from "./beside.js";
 import { Logs } from "./logs.js";
@@ -56,13 +56,12 @@ export class Pictures {
   }
 
   bar() {
-    const tabs = this.machine ? this.tabs.filter((tab) => !tab.when || tab.when()) : [];
-    if (this.machine && !tabs.some((tab) => tab.id === this.shown)) this.show("run");
-    $("pictures-bar").replaceChildren(
-      ...tabs.map(({ id, label }) =>
-        el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),
-      ),
+    const there = this.machine ? this.tabs.filter((tab) => !tab.when || tab.when()) : [];
+    if (this.machine && !there.some((tab) => tab.id === this.shown)) this.show("run");
+    const buttons = there.map(({ id, label }) =>
+      el("button", { type: "button", role: "tab", id: `tab-${id}`, "aria-selected": String(id === this.shown), "aria-controls": "picture", onclick: () => this.show(id) }, label),
     );
+    tabs($("pictures-bar"), buttons);
     if (this.machine) $("picture").setAttribute("aria-labelledby", `tab-${this.shown}`);
     else $("picture").removeAttribute("aria-labelledby");
   }

@@ -66,14 +66,26 @@ export function set(values, dragged = false) {
   if (dragged) hold();
   const next = { ...(drag?.before ?? changes(machine)), ...values };
   if (drag?.moved) machine.steps[machine.step] = next;
-  else {
-    machine.steps.length = machine.step + 1;
-    machine.steps.push(next);
-    machine.step += 1;
-  }
+  else append(machine, next);
   if (dragged) drag.moved = true;
   else drag = null;
   changed(dragged);
+}
+
+function append(machine, next) {
+  machine.steps.length = machine.step + 1;
+  machine.steps.push(next);
+  machine.step += 1;
+}
+
+/** Show a machine as it was when no more than these keys were `given`; one that was closed is opened again. */
+export function back(machine, given) {
+  const number = state.machines.indexOf(machine);
+  if (number < 0) return add(machine.name, machine.text, machine.made, given);
+  drag = null;
+  append(machine, given);
+  state.shown = number;
+  changed();
 }
 
 export function go(step) {

@@ -18,6 +18,6 @@ export function tour(step = 0) {
   target.scrollIntoView({ block: "nearest" });
   const next = step + 1 < STEPS.length ? el("button", { type: "button", onclick: () => tour(step + 1) }, "Next") : null;
   const box = dialog(`${title} (${step + 1} of ${STEPS.length})`, el("p", {}, text), next ? el("div", { class: "row" }, next) : "");
-  next?.focus();
+  (next ?? box.querySelector("button")).focus();
   box.onclose = () => document.querySelectorAll(".toured").forEach((item) => item.classList.remove("toured"));
 }

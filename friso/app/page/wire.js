@@ -24,8 +24,9 @@ export async function ask(question, body, lane = question, part = () => {}) {
       last = value;
       part(value);
     }
-    reached(true);
-    return last?.kind === "overtaken" ? null : last;
+    const ended = last?.kind === "overtaken"; // not by this page: the server ends
+    reached(!ended);
+    return ended ? null : last;
   } catch (error) {
     if (abort.signal.aborted) return null;
     reached(false);
