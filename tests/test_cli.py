@@ -5,6 +5,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from refusals import Refused
 
 import friso
 from friso.cli.app import _failed
+from friso.cli.progress import ProgressBar
 from friso.hunting.cycle.find import NO_RETURN
 from friso.system import LIBRARIES
 
@@ -31,6 +33,18 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
 def checked() -> dict[str, Any]:
     """What `friso check --json` prints of the rig."""
     return json.loads(run("check", RIG, "--json").stdout)
+
+
+def test_the_time_to_go_of_other_work_counts_from_its_beginning(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    clock = [0.0]
+    monkeypatch.setattr("friso.cli.progress.time", SimpleNamespace(monotonic=lambda: clock[0]))
+    with ProgressBar(lines=1.0) as bar:
+        for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50)):
+            bar(done, 100, "work")
+    said = capsys.readouterr().err.splitlines()
+    assert [line.rpartition(", ")[2] for line in said] == ["15 min to go", "10 s to go", "work", "10 s to go"]
 
 
 def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]) -> None:

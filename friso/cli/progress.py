@@ -21,11 +21,13 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     seconds (`lines`), by default never.
 
     It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
+    Where fewer steps are done than before, other work has begun, and its time counts from there.
     """
 
     def __init__(self, label: str = "", lines: float = math.inf) -> None:
         self.label, self.lines = label, lines
         self.begun = self.last = time.monotonic()
+        self.done = 0
         self.display: Display | None = None
         self.task: TaskID | None = None
 
@@ -42,6 +44,9 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
             self.display = None
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
+        if done < self.done:
+            self.begun = time.monotonic()
+        self.done = done
         if self.display is not None and self.task is not None:
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
         elif time.monotonic() - self.last > self.lines:

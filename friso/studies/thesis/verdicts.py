@@ -67,6 +67,11 @@ class ClaimVerdict:
         return "robust" if self.space.holds.high <= ROBUST else "open"
 
     @property
+    def chosen(self) -> bool:
+        """Whether it holds at friso's choice of the unstated values, and in some draw of them does not."""
+        return self.judgement == "holds" and self.space is not None and self.space.misses > 0
+
+    @property
     def dependence(self) -> str:
         """In which share of the space it holds, and on what that hangs."""
         if self.finding is None:
@@ -80,7 +85,7 @@ class ClaimVerdict:
             )
             sentence += f"{_HANGS[bool(self.space.hangs_on)]}{_listed(self.space)}."
             sentence += _KINDS.get(self.contradiction, "")
-            sentence += _CHOSEN if self.judgement == "holds" and self.space.misses else ""
+            sentence += _CHOSEN if self.chosen else ""
         if self.by_cycle_only:
             sentence += " It does not hold by an attracting cycle only, which was not tried in draws."
         if self.turned:
