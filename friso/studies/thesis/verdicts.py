@@ -79,7 +79,8 @@ class ClaimVerdict:
         if self.space is None:
             sentence = "No joint draws of the values that the thesis leaves open were made for this claim."
         else:
-            sentence = f"By the runs it holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
+            subject = "By the runs it" if len(self.ways) > 1 else "It"
+            sentence = f"{subject} holds in {draws_text(self.space.holds, self.space.count, self.space.draws)}"
             sentence += (
                 f", {percent(self.space.undecided / self.space.draws)} undecided" if self.space.undecided else ""
             )
