@@ -40,7 +40,7 @@ def test_a_signal_while_friso_starts_is_one_line(tmp_path: Path, seed: int) -> N
     wanted = random.Random(seed).randrange(10, 400)
     with subprocess.Popen(COMMAND, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stderr is not None
-        imported = 0
+        imported, line = 0, ""
         for line in process.stderr:
             imported += imported > 0 or "friso.early" in line
             if imported == wanted:
