@@ -2,7 +2,7 @@
 import { anew, el } from "./dom.js";
 import { shownAnswer } from "./long.js";
 import { paragraphs } from "./tables.js";
-import { hand } from "./wire.js";
+import { end, hand } from "./wire.js";
 
 const LARGEST = 64e6;
 
@@ -68,6 +68,7 @@ export class Logs {
   }
 
   forget() {
+    end("logs");
     this.files = [];
     this.roles.clear();
     this.input.value = "";

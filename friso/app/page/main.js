@@ -35,11 +35,12 @@ const pictures = new Pictures(sent, {
 
 const form = new Live("machine", "machine", 2000, described);
 const verdict = new Live("verdict", "verdict", 5000, (part, tag) => {
+  if (tag.machine !== machines.current()) return; // another one is shown by now
   if (part.kind === "message") return answers.progress(part);
   if (part.kind === "failed") return answers.refused(part.text);
   if (part.kind !== "answer") return; // what is wrong with the machine is said where it was set
   answers.quick(part);
-  if (tag) answers.note(part.verdict, tag, machines.back);
+  answers.note(part.verdict, tag, machines.back);
 });
 
 function withUnits(values) {
@@ -61,11 +62,15 @@ function changed(dragged) {
   end("check");
   answer = null;
   answers.progress(null);
+  if (shown && drawn.machine !== machine) {
+    answers.earlier();
+    pictures.earlier();
+  }
   if (shown && held === machine.text && !wrong) {
     follow(dragged);
     if (dragged) return;
   }
-  form.ask({ machine: machines.sent() });
+  form.ask({ machine: machines.sent() }, machine);
 }
 
 /** The picture follows the machine, and then the verdict: both at once would be slower. */
@@ -76,37 +81,41 @@ function follow(dragged) {
 }
 
 /** The server has read the machine, or refused it. */
-function described(part) {
+function described(part, machine) {
+  if (machine !== machines.current()) return; // another one is shown by now, and asked about
   if (part.kind === "refused" || part.kind === "failed") {
     wrong = { keys: part.key.split(", "), text: part.text };
     end("check");
     answers.progress(null);
-    if (!shown || held !== machines.current().text) return without(part);
+    if (!shown || held !== machine.text) return without(part);
+    usable();
     left();
     if ($("keys").querySelector(".wrong")) answers.earlier();
     else answers.refused(part.text);
     return;
   }
   if (part.kind !== "answer") return;
-  const another = wrong !== null || held !== machines.current().text;
+  const opened = held !== machine.text;
+  const another = wrong !== null || opened;
   wrong = null;
   shown = part;
   usable();
-  if (held !== machines.current().text) {
-    held = machines.current().text;
+  if (opened) {
+    held = machine.text;
     forgetRanges();
   }
-  document.title = plain(`${part.title || machines.current().name}: friso`);
+  document.title = plain(`${part.title || machine.name}: friso`);
   left();
   pictures.machine = part;
   pictures.bar();
+  if (opened) pictures.opened();
   if (another) follow(machines.dragging());
   clearTimeout(timer);
   if (!machines.dragging()) timer = setTimeout(check, CHECKED_AFTER);
 }
 
-/** What is of use with a machine alone. */
-const usable = () => ["out", "pin"].forEach((id) => ($(id).disabled = !shown));
+/** What is of use with a machine alone, and of which nothing is wrong: what is handed out is what is shown. */
+const usable = () => ["out", "pin"].forEach((id) => ($(id).disabled = !shown || wrong !== null));
 
 /** A file that holds no machine: nothing of another one stays beside it, and its text can be mended here, unless it was the server that failed. */
 function without(part) {

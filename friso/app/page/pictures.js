@@ -81,6 +81,19 @@ export class Pictures {
     this.ask();
   }
 
+  /** Another machine was opened: the keys and ranges of its maps are others. */
+  opened() {
+    if (!this.form) return;
+    clear(this.plots);
+    $("picture").replaceChildren();
+    this.begin($("picture"));
+  }
+
+  /** What is shown is of another machine; a log is of none. */
+  earlier() {
+    if (!this.own[this.shown]) stale($("picture"));
+  }
+
   /** There is no machine, and no tabs. */
   none() {
     this.machine = null;
@@ -113,6 +126,7 @@ export class Pictures {
     else {
       clearTimeout(this.timer);
       if (dragged && this.shown === "bode") return this.loops.ask(this.body());
+      this.loops.stop(); // what is still on its way is of the machine before
       stale($("picture"));
       if (!dragged) this.timer = setTimeout(() => this.ask(), AT_REST);
     }
