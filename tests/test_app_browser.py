@@ -397,6 +397,17 @@ def test_the_map_shows_the_run_under_the_pointer_and_a_click_sets_the_machine_th
     assert float(page.input_value(FIELD).split()[0]) > 15
 
 
+def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(browsed: Browsed) -> None:
+    page, held = browsed.page, []
+    page.route("**/ask/machine", lambda route: route.continue_() if held else held.append(route))
+    with page.expect_request(re.compile("ask/machine")):
+        browsed.type("controller.crossover", "11 Hz")
+    page.evaluate("async () => (await import('/state.js')).add('broken.toml', 'masses = 3')")
+    held[0].continue_()
+    page.wait_for_selector("text=Edit the file")
+    assert page.locator(FIELD).count() == 0
+
+
 def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:
     """Its text can be mended on the page."""
     page = browsed.page
