@@ -6,7 +6,6 @@ A dimensioned value is a text, number and unit ("2.4 N/mm"); `pint` knows the un
 import json
 import math
 import re
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
@@ -22,7 +21,7 @@ from friso.errors import InputError
 from friso.escapes import toml_text
 
 LARGEST_INTEGER = 10**60
-"""Whole numbers from here on are kept and written as floats."""
+"""Whole numbers from here on are not written out."""
 
 
 NOTHING = "–"
@@ -79,16 +78,22 @@ def quoted(value: Any, hint: str = "") -> str:
     return f"{text} ({hint})" if hint else text
 
 
+LARGEST = 1e30
+"""More than any value of a machine is in SI; squares and products of such values can be computed with."""
+
+BEYOND = "too large: beyond 1e30 in SI"
+
+
 @dataclass(frozen=True)
 class Bound:
-    """Which finite numbers are allowed: in words, and as a test that broadcasts over arrays."""
+    """Which numbers are allowed: in words, and as a test that broadcasts over arrays."""
 
     text: str
     test: Callable[[Any], Any]
 
     def holds(self, value: Any) -> Any:
-        """True where `value`, a number or an array, is finite and allowed."""
-        return (abs(value) <= sys.float_info.max) & self.test(value)
+        """True where `value`, a number or an array, is no larger than any machine has it, and allowed."""
+        return (abs(value) <= LARGEST) & self.test(value)
 
 
 positive = Bound("greater than 0", lambda value: value > 0)
@@ -197,8 +202,9 @@ class Number:
         """What was given, checked. Raises InputError."""
         is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
         if not is_number or not self.bound.holds(entry):
-            raise InputError("", quoted(entry), self.expected, self.written_example)
-        return float(entry) if abs(entry) >= LARGEST_INTEGER else entry
+            beyond = is_number and LARGEST < abs(entry) < math.inf
+            raise InputError("", quoted(entry, BEYOND if beyond else ""), self.expected, self.written_example)
+        return entry
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -225,15 +231,14 @@ def _read(entry: Any, si_unit: str) -> Value:
     number, unit = _split(entry)
     factor = _factor(unit, si_unit)
     bare = float(number)
-    if math.isinf(bare):
-        raise _Refused("too large")
-    try:
-        value = float(Fraction(number) * Fraction(repr(factor))) if bare else 0.0
-    except OverflowError:
-        raise _Refused("too large") from None
-    if value == 0 and re.search("[1-9]", re.split("[eE]", number)[0]):
-        raise _Refused("too small: it would be rounded to 0")
-    return Value(value, entry)
+    if bare == 0 and not re.search("[1-9]", re.split("[eE]", number)[0]):
+        return Value(0.0, entry)
+    magnitude = abs(bare) * float(factor)
+    if magnitude > LARGEST:
+        raise _Refused(BEYOND)
+    if magnitude < 1 / LARGEST:
+        raise _Refused("too small: below 1e-30 in SI")
+    return Value(float(Fraction(number) * Fraction(repr(factor))), entry)
 
 
 def _split(entry: str) -> tuple[str, str]:

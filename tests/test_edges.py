@@ -37,18 +37,19 @@ def test_keys_that_may_be_left_out_say_what_they_take(key: str, value: object, e
     assert "class" not in error.value.expected + error.value.example
 
 
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"flexure.spacing": "1e200 m"},
-        {"flexure.length": "1e-200 m"},
-        {"flexure.thickness": "1e-300 m"},
-        {"flexure.width": "1e300 m"},
-    ],
-)
-def test_sizes_that_no_float_holds(changes: dict[str, str], refused: Refused) -> None:
+def test_leaf_springs_that_no_float_holds(refused: Refused) -> None:
     with refused("flexure"):
-        LEAVES.replace(changes)
+        LEAVES.replace({"flexure.length": "1e-30 m"})
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [("flexure.spacing", "1e200 m"), ("controller.crossover", "1e-300 Hz"), ("friction.static", "1e300 N")],
+)
+def test_values_that_no_machine_has(key: str, value: str, refused: Refused) -> None:
+    """Where squares of them overflow, a check would end in a traceback."""
+    with refused(key):
+        LEAVES.replace({key: value})
 
 
 @pytest.mark.parametrize(
@@ -188,11 +189,6 @@ def test_a_value_that_is_hardly_meant_is_questioned(stage: str, key: str, value:
     assert key in doubt
     assert value in doubt
     assert doubt.endswith(f"was {meant} meant?")
-
-
-def test_what_no_machine_has_is_questioned_of_any_key() -> None:
-    (doubt,) = implausible_values(loads(RIG).replace({"friction.viscous": "1e300 N*s/m"}))
-    assert doubt.startswith("friction.viscous = 1e300 N*s/m ")
 
 
 def test_rows_of_an_array_are_no_tables() -> None:

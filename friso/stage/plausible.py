@@ -43,11 +43,6 @@ _CYCLE = _Usual(1e-7, 0.1, "s", ("us", "ms", "ns", "s"))
 _SLOWLY = _Usual(1e-7, 2.0, "m/s", ("mm/s", "um/s", "m/s"))
 _STIFFNESSES = ("N/um", "N/mm", "N/m")
 
-HUGE = 1e30
-"""More than any value of a machine is in SI."""
-
-_ANY = _Usual(-HUGE, HUGE, "", ())
-
 _USUAL: Mapping[str, _Usual] = {
     "masses.cart": _MASS,
     "masses.stage": _MASS,
@@ -109,9 +104,6 @@ def implausible_values(stage: Stage) -> Iterator[str]:
             usual_values[stage.controller.key(name)] = _Usual(times * low, times * high, unit, units)
     if (bandwidth := stage.controller and stage.controller.bandwidth_key) is not None:
         usual_values[bandwidth] = _FREQUENCY
-    for key, value in flat.items():
-        if isinstance(value, float) and abs(value) > HUGE and _written(stage, key):
-            usual_values.setdefault(key, _ANY)
     for key, usual in usual_values.items():
         value = flat.get(key)
         if value and not usual.low <= value <= usual.high:
