@@ -13,7 +13,7 @@ import sys
 import time
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -34,7 +34,7 @@ from friso.studies import store as storing
 from friso.studies.cells import WORDS
 from friso.studies.execute import local_crew
 from friso.studies.kept_cells import KeptCells
-from friso.studies.metadata import checked_metadata, digest
+from friso.studies.metadata import annotate_metadata, checked_metadata, digest
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.sealed_store import SealedStore
@@ -494,6 +494,20 @@ def test_metadata_of_any_content_are_written_anew_from_their_copy(
         (stored / name).write_bytes(damaged)
     with refused(kind=StoreError):
         read_store(stored)
+
+
+def test_what_another_process_notes_before_a_store_is_locked_stays(
+    stored: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = storing.lock_store
+
+    def noted_before(path: Path) -> AbstractContextManager[FileLock]:
+        annotate_metadata(path, notes={"metric": "peaks"})
+        return real(path)
+
+    monkeypatch.setattr(storing, "lock_store", noted_before)
+    with Store.opened(stored, Request(rig, AXES).study()) as store:
+        assert store.notes["metric"] == "peaks"
 
 
 def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Refused) -> None:

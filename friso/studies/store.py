@@ -85,12 +85,12 @@ class Store:
                 make(path, store._fill)
             elif overwrite and path.is_dir() and is_store(path):
                 store._replace()
-        metadata = checked_metadata(path)
+        checked_metadata(path)
         with lock_store(path):
             refuse_other(path, study)
             _warn_of_another_machine(path)
             remove_partial_files(path)
-            metadata.mend(path)
+            checked_metadata(path).mend(path)  # as they are now: another process may have noted something
             yield store
 
     def _replace(self) -> None:
