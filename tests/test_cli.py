@@ -41,10 +41,11 @@ def test_the_time_to_go_of_other_work_counts_from_its_beginning(
     clock = [0.0]
     monkeypatch.setattr("friso.cli.progress.time", SimpleNamespace(monotonic=lambda: clock[0]))
     with ProgressBar(lines=1.0) as bar:
-        for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50)):
+        for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50), (220.0, 20), (230.0, 30)):
             bar(done, 100, "work")
     said = capsys.readouterr().err.splitlines()
-    assert [line.rpartition(", ")[2] for line in said] == ["15 min to go", "10 s to go", "work", "10 s to go"]
+    told = [line.rpartition(", ")[2] for line in said]
+    assert told == ["15 min to go", "10 s to go", "work", "10 s to go", "work", "70 s to go"]
 
 
 def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]) -> None:

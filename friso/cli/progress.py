@@ -27,7 +27,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __init__(self, label: str = "", lines: float = math.inf) -> None:
         self.label, self.lines = label, lines
         self.begun = self.last = time.monotonic()
-        self.done = 0
+        self.done = self.before = 0
         self.display: Display | None = None
         self.task: TaskID | None = None
 
@@ -45,7 +45,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
         if done < self.done:
-            self.begun = time.monotonic()
+            self.begun, self.before = time.monotonic(), done
         self.done = done
         if self.display is not None and self.task is not None:
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
@@ -56,9 +56,9 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def _to_go(self, done: int, total: int) -> str:
         """The time that the rest takes, if it goes on as so far."""
-        if not (done and total):
+        if not total or done == self.before:
             return ""
-        seconds = (self.last - self.begun) * (total - done) / done
+        seconds = (self.last - self.begun) * (total - done) / (done - self.before)
         return f", {seconds / 60:.0f} min to go" if seconds >= 100 else f", {seconds:.0f} s to go"
 
 
