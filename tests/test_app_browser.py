@@ -16,6 +16,7 @@ from browser import BROWSER, needs_browser
 from log_files import motion, write_text
 
 import friso
+from friso.app.frames import frame
 from friso.escapes import escaped
 
 pytestmark = needs_browser
@@ -406,6 +407,24 @@ def test_an_answer_that_comes_once_another_machine_is_shown_is_not_taken_for_it(
     held[0].continue_()
     page.wait_for_selector("text=Edit the file")
     assert page.locator(FIELD).count() == 0
+
+
+def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(browsed: Browsed) -> None:
+    page, held = browsed.page, []
+    page.route("**/ask/tune", lambda route: held.append(route))
+    page.click("#tab-remedies")
+    with page.expect_request(re.compile("ask/tune")):
+        page.click("#tune")
+    page.evaluate("async () => (await import('/state.js')).set({ 'masses.cart': '1.3 kg' })")
+    said = {"sentences": ["Found."], "tables": [], "details": [], "failure": "", "notes": [], "figures": []}
+    way = {"name": "gains: the least change", "toml": RIG.read_text(encoding="utf-8")}
+    held[0].fulfill(body=frame({"kind": "answer", **said, "ways": [way], "command": "friso tune of the rig"}))
+    page.wait_for_selector("text=Of thesis_rig.toml as it was opened")
+    page.click("#out")
+    assert "friso tune of the rig" not in page.inner_text("#dialog")
+    page.keyboard.press("Escape")
+    page.click("text=Take over")
+    page.wait_for_selector("#machine-1 >> text=gains_the_least_change")
 
 
 def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ export async function shownAnswer(place, lane, question, body, tell) {
   const status = el("p", { class: "status", role: "status" }, "…");
   const stop = el("button", { type: "button", onclick: () => { end(lane); place.replaceChildren(); } }, "Stop");
   place.replaceChildren(status, stop);
-  const answer = await ask(question, body(), lane, (part) => {
+  const asked = body();
+  const answer = await ask(question, asked, lane, (part) => {
     if (part.kind === "progress") {
       const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
       status.replaceChildren(bar, plain(part.label));
@@ -33,6 +34,6 @@ export async function shownAnswer(place, lane, question, body, tell) {
     ...paragraphs(answer.details),
   );
   draw(plots, answer.figures);
-  tell.shown(answer);
+  if (JSON.stringify(body().machine) === JSON.stringify(asked.machine)) tell.shown(answer);
   return answer;
 }

@@ -29,7 +29,7 @@ const pictures = new Pictures(sent, {
   worded: withUnits,
   progress: answers.progress,
   shown: (part) => (answer = part),
-  take: (name, toml) => machines.add(`${name.replaceAll(" ", "_")}.toml`, toml, true),
+  take: (name, toml) => machines.add(`${name.replaceAll(/\W+/g, "_")}.toml`, toml, true),
   check,
 });
 

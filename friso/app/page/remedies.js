@@ -7,8 +7,12 @@ export class Remedies {
     const within = el("input", { id: "within", type: "text", placeholder: "e.g. 1 um" });
     const only = el("select", { id: "only" }, ...["", "controller", "joint"].map((word) => el("option", { value: word }, word || "anything")));
     this.result = el("div", {});
-    const start = (question, options) =>
-      shownAnswer(this.result, "remedies", question, () => ({ ...sent(), options: options() }), tell);
+    const start = async (question, options) => {
+      const { name, changes } = sent().machine;
+      const answer = await shownAnswer(this.result, "remedies", question, () => ({ ...sent(), options: options() }), tell);
+      const given = Object.entries(changes).map(([path, value]) => `${path} = ${value ?? "nothing"}`);
+      if (answer) this.result.prepend(el("p", { class: "note" }, `Of ${name} ${given.length ? `with ${given.join(", ")}` : "as it was opened"}:`));
+    };
     const tune = el("button", { type: "button", id: "tune", onclick: () => start("tune", () => ({ within: within.value, only: only.value })) }, "Find the least change");
     const design = el("button", { type: "button", id: "design", onclick: () => start("design", () => ({})) }, "Design an isolator");
     this.place = el(
