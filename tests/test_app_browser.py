@@ -427,6 +427,16 @@ def test_what_stops_it_says_of_which_machine_and_gives_no_other_one_its_command(
     page.wait_for_selector("#machine-1 >> text=gains_the_least_change")
 
 
+def test_a_picture_that_is_waited_for_says_so(browsed: Browsed) -> None:
+    page = browsed.page
+    page.route("**/ask/boundary", lambda _: None)
+    page.click("#tab-boundary")
+    page.wait_for_selector("#picture progress")
+    page.click("#tab-bode")
+    page.wait_for_selector("#picture .main-svg")
+    assert page.locator("#picture progress").count() == 0
+
+
 def test_of_a_file_that_is_refused_no_other_machine_is_shown(browsed: Browsed, tmp_path: Path) -> None:
     """Its text can be mended on the page."""
     page = browsed.page

@@ -146,6 +146,7 @@ export class Pictures {
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
+    if (!this.plots.children.length) this.below.replaceChildren(el("progress", { "aria-label": "Progress" })); // the line of the answer is the check's, too
     const part = (answer) => this.shown === shown && (answer.kind === "partly" ? this.arrived(answer) : this.tell.progress(answer));
     const answer = await ask(shown, this.body(options), "picture", part);
     if (answer && this.shown === shown) this.arrived(answer);
