@@ -82,8 +82,9 @@ def analyse(
     if model and len(logs) > 1:
         model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
     if model and band is None and other is None and _below(model, used):
-        place = f"an antiresonance at {model['antiresonance frequency'].value:.3g} Hz"
-        warnings.append(f"no two masses: {place}, below the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
+        low = model["antiresonance frequency"].value
+        seen = "no antiresonance in" if np.isnan(low) else f"an antiresonance at {low:.3g} Hz, below"
+        warnings.append(f"no two masses: {seen} the band of the model, {used[0]:.3g} to {used[1]:.3g} Hz")
         model = None
     upper = driven.between(*used)
     drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
@@ -165,8 +166,8 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
 
 
 def _below(model: TwoMass, band: FrequencyRange) -> bool:
-    """Whether a two-mass model puts its antiresonance below a band [Hz], where what it leaves out, such as bristles,
-    may stand for it."""
+    """Whether a two-mass model has no antiresonance, or puts it below a band [Hz], where what it leaves out, such as
+    bristles, may stand for it."""
     return not model["antiresonance frequency"].value >= band[0]
 
 

@@ -96,11 +96,11 @@ class ClaimVerdict:
         return sentence
 
 
-_CHOSEN = " The agreement rests on friso's choice: other values, as plausible, remove it."
+_CHOSEN = " The agreement rests on friso's choice: other values, equally plausible, remove it."
 _HANGS = {True: "; that hangs on ", False: ""}
 _KINDS = {
     "robust": " The contradiction is robust: no choice of the unstated values tried removes it.",
-    "arbitrary": " The contradiction is arbitrary: other values, as plausible as friso's, remove it.",
+    "arbitrary": " The contradiction is arbitrary: other values, equally plausible, remove it.",
 }
 
 
