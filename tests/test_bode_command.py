@@ -488,7 +488,7 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
         ("1 Hz..1 Hz", r'"1 Hz..1 Hz" \(empty range\)', "an increasing range"),
         ("0 Hz..1 kHz", '"0 Hz"', "from 1 uHz to 1 GHz"),
         ("-1 Hz..1 kHz", '"-1 Hz"', "from 1 uHz to 1 GHz"),
-        ("1 Hz..1e300 Hz", '"1e300 Hz"', "from 1 uHz to 1 GHz"),
+        ("1 Hz..1e20 Hz", '"1e20 Hz"', "from 1 uHz to 1 GHz"),
         ("1 Hz..", '"1 Hz.."', "a range of frequencies, FIRST..LAST"),
         ("..1 kHz", '"..1 kHz"', "a range of frequencies, FIRST..LAST"),
         ("1 Hz", '"1 Hz"', "a range of frequencies, FIRST..LAST"),

@@ -44,8 +44,8 @@ def test_the_time_to_go_of_other_work_counts_from_its_beginning(
         for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50), (220.0, 20), (230.0, 30)):
             bar(done, 100, "work")
     said = capsys.readouterr().err.splitlines()
-    told = [line.rpartition(", ")[2] for line in said]
-    assert told == ["15 min to go", "10 s to go", "work", "10 s to go", "work", "70 s to go"]
+    times = [line.rpartition(", ")[2] for line in said]
+    assert times == ["15 min to go", "10 s to go", "work", "10 s to go", "work", "70 s to go"]
 
 
 def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]) -> None:
