@@ -5,14 +5,18 @@ from __future__ import annotations
 import io
 import json
 import os
+import re
 import subprocess
 import sys
+import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import matplotlib
 import numpy as np
 import pytest
+from fontTools import subset
+from fontTools.ttLib import TTFont
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
@@ -244,6 +248,28 @@ def test_a_figure_file_opens_as_an_image(tmp_path):
 
     matplotlib_renderer.save(small_figure(), tmp_path / "small.PNG")
     assert matplotlib.image.imread(io.BytesIO((tmp_path / "small.PNG").read_bytes()), format="png").ndim == 3
+
+
+def test_a_page_shows_the_drawing_of_the_file():
+    """Cut off below the heading, which its window alone tells."""
+    window = re.compile(rb'height="([^"]*)pt" viewBox="0 (\S+) 648 (\S+)"')
+    shown, filed = (matplotlib_renderer.image(small_figure(), "svg", headed) for headed in (False, True))
+    assert window.sub(b"", shown) == window.sub(b"", filed)
+    (height, top, seen), (whole, above, _) = (tuple(map(float, window.search(svg).groups())) for svg in (shown, filed))
+    assert (top, above) == (pytest.approx(72 * matplotlib_renderer.HEADER_HEIGHT), 0)
+    assert height == seen == pytest.approx(whole - top)
+
+
+def test_fonts_of_a_pdf_hold_letters_alone():
+    """Their places are in the file, so no table says them; nothing is left behind for others who cut fonts down."""
+    usual = subset.Options().drop_tables
+    pdf = matplotlib_renderer.image(small_figure(), "pdf")
+    packed = re.findall(rb"stream\r?\n(x.*?)endstream", pdf, re.DOTALL)
+    streams = [zlib.decompressobj().decompress(part) for part in packed]
+    fonts = [TTFont(io.BytesIO(stream)) for stream in streams if stream.startswith(b"\0\1\0\0")]
+    assert len(fonts) > 1
+    assert all("glyf" in font and not {"GPOS", "GSUB", "GDEF"} & {*font.keys()} for font in fonts)
+    assert subset.Options().drop_tables == usual
 
 
 @pytest.mark.parametrize(

@@ -122,7 +122,7 @@ def _titled(place: str, group: Iterable[ClaimVerdict]) -> str:
     return place if place.startswith("Sec. ") else ", ".join(dict.fromkeys(item.claim.where for item in group))
 
 
-def _printed(figure: Figure) -> str:
+def _printed(figure: Figure) -> Markup:
     """The figure for paper as a data address; maps as pixels, since thousands of cells make megabytes of lines."""
     if not any(panel.maps for panel in figure.panels):
         return print_image(figure)
