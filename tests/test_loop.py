@@ -1,9 +1,12 @@
 """Whether a loop is stable, friction aside, against the criterion of Hurwitz."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 from variants import VARIANTS
 
+import friso
 from friso.hunting.loop import at_lower_gains, unstable
 from friso.stage import Stage
 
@@ -81,3 +84,39 @@ def test_what_acts_about_rest_alone_tells_nothing_of_lower_gains(changes: dict, 
     chosen = chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})
     assert at_lower_gains(chosen.flat()) == "stable"
     assert at_lower_gains(chosen.replace(changes).flat()) == always
+
+
+class Begun(Exception):
+    """Work has begun."""
+
+
+def begun(*_: object) -> None:
+    raise Begun
+
+
+MINUTES: dict[str, Callable[[Stage], object]] = {
+    "check": lambda stage: friso.check(stage, progress=begun),
+    "tune": lambda stage: friso.tune(stage, progress=begun),
+    "design": lambda stage: friso.design(stage, progress=begun),
+    "compare": lambda stage: friso.compare(stage, machines=20, progress=begun),
+    "boundary": lambda stage: friso.boundary(stage, x="controller.crossover=1 Hz..40 Hz", progress=begun),
+    "sweep": lambda stage: friso.sweep(stage, {"joint.stroke": "0.2 mm..1 mm:3"}, progress=begun),
+}
+
+
+@pytest.mark.parametrize("command", MINUTES)
+def test_an_unstable_loop_is_mentioned_before_work_that_takes_minutes(
+    command: str, rig: Stage, caplog: pytest.LogCaptureFixture
+) -> None:
+    with pytest.raises(Begun):
+        MINUTES[command](rig.replace({"controller.alpha": 0.9}))
+    assert sum("is unstable while the stage sticks and while" in text for text in caplog.messages) == 1
+    caplog.clear()
+    with pytest.raises(Begun):
+        MINUTES[command](rig)
+    assert not any("unstable" in text for text in caplog.messages)
+
+
+def test_an_unstable_loop_is_mentioned_beside_a_run(rig: Stage, caplog: pytest.LogCaptureFixture) -> None:
+    friso.simulate(rig.replace({"controller.alpha": 0.9}))
+    assert any("is unstable while the stage sticks and while" in text for text in caplog.messages)

@@ -8,7 +8,17 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
-from friso.answers.inputs import Changes, StageLike, axes_of, pairs_of, read_stage, stem_of, tolerance_of, wrong
+from friso.answers.inputs import (
+    Changes,
+    StageLike,
+    axes_of,
+    mention_unstable_loop,
+    pairs_of,
+    read_stage,
+    stem_of,
+    tolerance_of,
+    wrong,
+)
 from friso.equations.bandwidth import range_example
 from friso.hunting.boundary import Diagram, KeyRange, Plane
 from friso.progress import Progress, silent
@@ -122,6 +132,7 @@ def boundary(
     if not ranges:
         raise wrong("x", "no key", "one key or two with their ranges", example)
     links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')
+    mention_unstable_loop(chosen)
     progress(0, 0, f"following cycles over {' and '.join(ranges)}")
     from friso.studies.boundary import boundary as traced_boundary
 

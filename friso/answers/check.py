@@ -8,10 +8,20 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, Whole, correlations_of, read_stage, tolerance_of, whole_number
+from friso.answers.inputs import (
+    Changes,
+    StageLike,
+    Whole,
+    correlations_of,
+    mention_unstable_loop,
+    read_stage,
+    tolerance_of,
+    whole_number,
+)
+from friso.engine.kernel import kernels
 from friso.engine.simulate import simulate
 from friso.errors import InputError
-from friso.hunting.check import LONG, RTOL, Case
+from friso.hunting.check import LONG, RTOL, Case, needed_kernels
 from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import draw
@@ -178,6 +188,8 @@ def check(
             raise error if error.origin else error.found_in("draws") from None
     from friso.hunting.check import check as judged
 
+    kernels(needed_kernels(chosen))
+    mention_unstable_loop(chosen)
     cases = judged(chosen, tolerance, progress=progress)
     drawn = across = None
     loose = max(tolerance, LONG)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
-from friso.answers.inputs import Changes, StageLike, correlations_of, quantity_of, read_stage
+from friso.answers.inputs import Changes, StageLike, correlations_of, mention_unstable_loop, quantity_of, read_stage
 from friso.progress import Progress, silent
 from friso.quantities import Quantity, positive
 from friso.studies.compare.study import Comparison
@@ -124,4 +124,5 @@ def compare(
     from friso.studies.compare.study import compare as compared
 
     correlations = correlations_of(stage, chosen)
+    mention_unstable_loop(chosen)
     return CompareAnswer(compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also)))

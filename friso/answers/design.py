@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
-from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, read_stage
+from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention_unstable_loop, read_stage
 from friso.design_method.method import Design
 from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules
@@ -120,6 +120,7 @@ def design(
     chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
     specification = specification_of(chosen, spec)
     _tell_what_is_assumed(chosen, specification, spec is None)
+    mention_unstable_loop(chosen)
     if chosen.drive:
         LOGGER.warning(
             "[drive] is taken into account for the margins; hunting and moves are simulated in continuous time"

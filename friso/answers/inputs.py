@@ -93,6 +93,16 @@ def read_stage(
     return stage
 
 
+def mention_unstable_loop(stage: Stage) -> None:
+    """Mention (to the logger "friso") that the loop of a stage is unstable, if it is: before the work whose answer
+    rests on that, which may take minutes."""
+    from friso.hunting.loop import unstable
+    from friso.views.loop_words import unstable_loop
+
+    for sentence in unstable_loop(unstable(stage)):
+        LOGGER.warning(sentence.removesuffix("."))
+
+
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:
     """How the uncertain keys of a stage hang together, as a file beside its stage file says. Raises InputError."""
     correlations = Correlations()

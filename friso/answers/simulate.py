@@ -8,7 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
-from friso.answers.inputs import Changes, StageLike, read_stage, seconds_of, stage_of, stem_of, tolerance_of
+from friso.answers.inputs import (
+    Changes,
+    StageLike,
+    mention_unstable_loop,
+    read_stage,
+    seconds_of,
+    stage_of,
+    stem_of,
+    tolerance_of,
+)
 from friso.engine.arrays import Status
 from friso.engine.simulate import RTOL
 from friso.errors import InputError
@@ -145,6 +154,7 @@ def simulate(
         chosen, name, usual = _cell(Path(cell), [str(number) for number in index], set)
     from friso.engine.simulate import simulate as simulated
 
+    mention_unstable_loop(chosen)
     response = simulated(chosen, tolerance or usual, interval)
     return SimulateAnswer(chosen, response, name, cell is not None)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
-from friso.answers.inputs import LOGGER, Changes, StageLike, read_stage, tolerance_of, wrong
+from friso.answers.inputs import LOGGER, Changes, StageLike, mention_unstable_loop, read_stage, tolerance_of, wrong
 from friso.answers.map_study import (
     Varied,
     as_stored,
@@ -232,6 +232,7 @@ def sweep(
             metric = metric or "outcome"
             chosen = read_stage(stage, set)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
+            mention_unstable_loop(chosen)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
             study = study if store is None else as_stored(study, store, metric, overwrite)
         speak_of(study.stage.axis_kind)

@@ -13,6 +13,7 @@ from friso.answers.inputs import (
     Whole,
     choice,
     correlations_of,
+    mention_unstable_loop,
     read_stage,
     text_of,
     whole_number,
@@ -170,6 +171,7 @@ def tune(
     goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, only, keep)
     whole_number(seed, "seed", 0, MOST_SEED, "1")
     correlations = correlations_of(stage, chosen)
+    mention_unstable_loop(chosen)
     from friso.remedies.method import tune as tuned
 
     return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress))
