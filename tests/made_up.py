@@ -101,6 +101,7 @@ class FakeCase:
     solver: Any = field(default_factory=lambda: fake_solver("done"))
     unstable: tuple[str, ...] = ()
     breakaway: float = 3.0
+    force_limit: float | None = None
     unmoved: bool = False
     feeding: Any = None
 

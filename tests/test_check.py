@@ -190,6 +190,20 @@ def test_a_sweep_over_the_duration_leaves_its_cells_alone(rig: Stage) -> None:
     assert runs.steps.values[1] == alone.steps[0]
 
 
+@pytest.mark.usefixtures("own_bandwidth")
+@pytest.mark.parametrize(
+    ("limit", "duration", "at"), [("2.5 N", "500 ms", 2.5), ("2.5 N", "20 s", 2.5), ("6 N", "20 s", None)]
+)
+def test_a_force_limit_that_keeps_a_stage_off_its_reference_is_named(
+    limit: str, duration: str, at: float | None
+) -> None:
+    changes = {"controller.force_limit": limit, "motion.duration": duration}
+    answer = friso.check(VARIANTS["rigid, van Dijk, limit"].replace(changes))
+    why = "Its force is at most controller.force_limit, 2.50 N, and break-away takes 3.00 N."
+    assert answer["given"].force_limit == at
+    assert (why in answer.sentences()[0]) == (at is not None)
+
+
 def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved() -> None:
     """Released at 1 um the stage creeps home, at 2 mm it breaks away."""
     settled = VARIANTS["rigid"].replace({"controller.crossover": "12 Hz"})

@@ -11,10 +11,10 @@ import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.engine.arrays import Status
-from friso.engine.batch import run_chunks
+from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.side_by_side import side_by_side
-from friso.engine.simulate import RTOL, simulate
+from friso.engine.simulate import RTOL, sampled_outputs, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
 from friso.hunting.criteria import Verdict
@@ -26,6 +26,7 @@ from friso.hunting.measures import BANDS, measure_runs, measuring_options
 from friso.hunting.verdict import ATTRACTION, FEEDING, PARTS, ROOM, WORK, Judgement, judge
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
+from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.transmission import BACKLASH, leading_friction
 
 if TYPE_CHECKING:
@@ -54,7 +55,8 @@ class Case:
     `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
     quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
     `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what sticks, constant
-    forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`; `unstable` tells in which
+    forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`; `force_limit` [N] is that
+    of the controller, if that keeps it off its reference (None: it does not); `unstable` tells in which
     of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`); `feeding`, with a
     backlash, without what hunting ends (None, too, where that was given up). `trace` holds the time
     response if asked for.
@@ -71,6 +73,7 @@ class Case:
     largest_force: float
     solver: Solver
     breakaway: float = 0.0
+    force_limit: float | None = None
     unstable: tuple[LoopState, ...] = ()
     feeding: Feeding | None = None
     trace: xr.Dataset | None = None
@@ -86,6 +89,9 @@ class Case:
         joint = self.stage.joint
         return self.largest_force < self.breakaway and (joint is None or joint.locked)
 
+
+AT_LIMIT = 1e-9
+"""Share of a limit of the force by which one that stands there may differ from it."""
 
 FED = 0.3
 """Share of the work of a case that the search for what feeds its cycle may use at least."""
@@ -157,6 +163,7 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, FED * work))
         judgement = judgement if fed else replace(judgement, given_up=(*judgement.given_up, FEEDING))
+    breakaway = _breakaway(flat)
     done.add(len(PARTS) - ended, PARTS[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,
@@ -169,7 +176,8 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
         settling_time={band: _finite(time[0]) for band, time in zip(BANDS, measures.settling_time, strict=True)},
         largest_force=float(measures.largest_force[0]),
         solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
-        breakaway=_breakaway(flat),
+        breakaway=breakaway,
+        force_limit=_holding_limit(flat, runs, judgement, breakaway) if status == Status.DONE else None,
         unstable=unstable(stage),
         feeding=fed,
         trace=simulate(stage, rtol) if traces else None,
@@ -183,6 +191,19 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
             return feeding(stage)
     except Exhausted:
         return None
+
+
+def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
+    """The limit of the force [N] that keeps one stage off its reference for ever: break-away takes more [N], or its run
+    ends with the force there. None where it settles, or nothing shows that it does not."""
+    limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
+    stays = judgement.settled_after is None and (judgement.followed is not None or not possible)
+    if not limit or not stays or judgement.swing or judgement.observed:
+        return None
+    shape = kernel(structure(flat))
+    forces = sampled_outputs(shape, flat, runs.results.ends.T, runs.statistic("ended"))
+    force = float(forces[list(shape.outputs).index("force")][0])
+    return limit if abs(force) > limit * (1 - AT_LIMIT) or (possible and limit < breakaway) else None
 
 
 def _breakaway(flat: Mapping[str, Any]) -> float:

@@ -11,6 +11,7 @@ from friso.hunting.criteria import ATTRACTED
 from friso.hunting.margin import DISTANCE, FARTHEST
 from friso.hunting.verdict import BANDWIDTHS, FEEDING, LOWER, STARTS
 from friso.quantities import percent
+from friso.stage.controllers import FORCE_LIMIT
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
 from friso.views.drawing.prefixes import length_at_rest, listed, plus_minus, rounded_down, rounded_up, with_unit
@@ -124,9 +125,10 @@ def _kick(name: str, kick: Kick, unit: str) -> str:
 def _transient(case: Case) -> str:
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
-        return f"cannot hunt, because {judgement.hunting.reason}; but this motion has not settled at its end ({end})."
+        says = f"cannot hunt, because {judgement.hunting.reason}; but this motion has not settled at its end ({end})."
+        return " ".join([says, *_held(case)])
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
-    says = [f"transient: {attracts}, but this motion has not settled at its end ({end})."]
+    says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
     if judgement.cycle:
         says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
     if judgement.settled_after is None and judgement.followed is None:
@@ -138,6 +140,14 @@ def _transient(case: Case) -> str:
     else:
         says.append(f"It settles to within {band_text(_TEN_MICRON)} in {with_unit(judgement.settled_after, 's')}.")
     return " ".join(says)
+
+
+def _held(case: Case) -> list[str]:
+    """That the limit of the force is what keeps a case where it stands, if it is."""
+    if case.force_limit is None:
+        return []
+    more = f", and break-away takes {with_unit(case.breakaway, 'N')}" if case.force_limit < case.breakaway else ""
+    return [f"Its force is at most {FORCE_LIMIT}, {with_unit(case.force_limit, 'N')}{more}."]
 
 
 def _settling(case: Case) -> str:
@@ -158,7 +168,7 @@ def _settling_sentence(case: Case) -> str:
     if coarse is not None:
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}"
         return f"{within}, but does not stay within {band_text(_MICRON)}{_small_swing(case)}."
-    return f"settles, but not to within {band_text(_TEN_MICRON)} ({_end(case)})."
+    return " ".join([f"settles, but not to within {band_text(_TEN_MICRON)} ({_end(case)}).", *_held(case)])
 
 
 def _small_swing(case: Case) -> str:
