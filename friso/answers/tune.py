@@ -81,9 +81,9 @@ class TuneAnswer(Answer):
         return [*gain_lines(advice), *window_lines(advice), *sensitivity_sentences(advice), *assumptions(advice)]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """The design of leaf springs for an isolator, where `friso design` knows the controller."""
+        """What leaf springs do, and their design for an isolator, where `friso design` knows the controller."""
         from friso.design_method.prepare import check_designable
-        from friso.views.tune.page import NOT_SURE
+        from friso.views.tune.page import NOT_SURE, OF_LEAVES
 
         try:
             check_designable(self.result.stage)
@@ -94,7 +94,10 @@ class TuneAnswer(Answer):
             for file in files
             if file.name.startswith("tuned-isolator") and file.suffixes == [".toml"] and NOT_SURE not in file.name
         ]
-        return [f"friso design {shell_word(str(file))}" for file in isolators]
+        return [
+            f"friso {'flexure' if file.stem.endswith(OF_LEAVES) else 'design'} {shell_word(str(file))}"
+            for file in isolators
+        ]
 
     def figures(self) -> Sequence[Figure]:
         """Responses, settling times, sensitivities."""

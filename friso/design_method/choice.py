@@ -60,13 +60,13 @@ def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | No
             passed.append(str(failure))
             continue
         choice = ChosenLeaves(geometry, evaluation, tuple(needs), excess, tuple(passed))
-        if choice.frequency >= task.spec.safety.parasitic * task.crossover and _bears(task, evaluation):
+        if choice.frequency >= task.spec.safety.parasitic * task.crossover and bears(task, evaluation):
             return choice
         passed.append(f"beams: {evaluation.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
     return None
 
 
-def _bears(task: LeafTask, by_beams: Evaluation) -> bool:
+def bears(task: LeafTask, by_beams: Evaluation) -> bool:
     """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
     safety = task.spec.safety
     stays = safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction

@@ -48,6 +48,12 @@ class Geometry:
         length, width, spacing = sizes.tolist()
         return cls(length, width, spacing, sheet)
 
+    @classmethod
+    def of_stage(cls, flat: Mapping[str, Any]) -> Geometry:
+        """That of a stage with [flexure], given as its flat keys [SI]."""
+        bought = (flat[f"flexure.{name}"] for name in ("leaves", "thickness", "material"))
+        return cls.of(np.array([flat[f"flexure.{name}"] for name in SIZES]), Sheet(*bought))
+
     def keys(self) -> dict[str, Any]:
         """The keys of [flexure], as text with units."""
         sizes = {f"flexure.{name}": f"{getattr(self, name) * 1e3:.6g} mm" for name in SIZES}

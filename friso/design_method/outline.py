@@ -5,7 +5,7 @@ from __future__ import annotations
 from friso.design_method.prepare import check_designable
 from friso.equations.motion import size
 from friso.frequency.bandwidth import loop_bandwidth
-from friso.quantities import percent
+from friso.quantities import as_toml, percent
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 
@@ -33,7 +33,7 @@ def outline(stage: Stage) -> str:
     stroke = f"{own / 2:.4g} m .. {own:.4g} m" if own else "0.3 mm .. 1 mm"
     return "\n".join(
         [
-            f'name = "Friction isolator of {stage.name or "the stage"}"',
+            f"name = {as_toml('Friction isolator of ' + (stage.name or 'the stage'))}",
             "",
             "[machine]                                  # the highest bandwidth that it allows",
             f'bandwidth_limit = "{limit} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',

@@ -28,12 +28,14 @@ WIDTHS, DEPTH = (0.1, 1.5), 0.9
 @dataclass(frozen=True)
 class Remedy:
     """A remedy by its `name`, the stage it begins with, and its variables, which are applied in this order; whether it
-    changes the controller alone, or a joint is needed (`buys_joint`)."""
+    changes the controller alone, or a joint is needed (`buys_joint`); and the name of the remedy whose joint it `makes`
+    of leaf springs, if it does."""
 
     name: str
     stage: Stage
     variables: tuple[Variable, ...]
     buys_joint: bool = False
+    makes: str = ""
 
     def changes(self, shares: np.ndarray) -> dict[str, Any]:
         """The keys that change at shares of the ranges, (points, variables), to arrays of shape (points,)."""

@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from friso.axis import LINEAR
+from friso.design_method.leaves_for_joint import leaves_for_joint
 from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.bandwidth import bandwidth
 from friso.equations.motion import last_corner
@@ -62,12 +64,18 @@ FAR, FEW = 0.5, 0.2
 share of those that may miss the goal."""
 
 
+Unmade = Literal["rotary", "mode", "none"]
+"""Why no leaf springs make a joint: the axis turns; the machine has a parasitic mode of its own, beside which the stage
+cannot have that of leaf springs; or none of the usual sizes bears the stroke."""
+
+
 @dataclass(frozen=True)
 class Advice:
     """The outcomes of all remedies, in the order of the catalogue, for a stage that was checked and measured itself
     (`present`); the bandwidths with which it keeps its margin; what its edge of hunting depends on; what to relax where
     nothing works; whether it was interrupted. The tables of the machine `as_built` take no part; they and the
-    `correlations` go with the stages that are written."""
+    `correlations` go with the stages that are written. `unmade` tells of remedies why no leaf springs make their joint.
+    """
 
     stage: Stage
     goal: Goal
@@ -82,6 +90,7 @@ class Advice:
     sensitivities: Sensitivities | None = None
     as_built: Mapping[str, Any] = field(default_factory=dict)
     correlations: Correlations = field(default_factory=Correlations)
+    unmade: Mapping[str, Unmade] = field(default_factory=dict)
 
     @property
     def needed(self) -> bool:
@@ -107,8 +116,13 @@ class Advice:
 
     @property
     def working(self) -> tuple[RemedyOutcome, ...]:
-        """The remedies that work, those that change least first."""
-        return tuple(sorted((o for o in self.outcomes if o.certainty == "works"), key=self.size))
+        """The remedies that work, those that change least first; leaf springs go with the joint that they make."""
+        works = (outcome for outcome in self.outcomes if outcome.certainty == "works" and not outcome.remedy.makes)
+        return tuple(sorted(works, key=self.size))
+
+    def made_of_leaves(self, outcome: RemedyOutcome) -> RemedyOutcome | None:
+        """What became of the joint of a remedy when made of leaf springs."""
+        return next((other for other in self.outcomes if other.remedy.makes == outcome.remedy.name), None)
 
     @property
     def fastest(self) -> RemedyOutcome | None:
@@ -180,6 +194,7 @@ def tune(
         None if interrupted else edge_sensitivities(ideal, case.judgement.margin),
         {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
         correlations,
+        session.unmade,
     )
 
 
@@ -215,12 +230,29 @@ class _Session:
     outcomes: list[RemedyOutcome] = field(default_factory=list)
     searching: Search | None = None
     tried_less: bool = False
+    unmade: dict[str, Unmade] = field(default_factory=dict)
 
     def tries(self, remedy: Remedy) -> None:
         """A remedy, for the settings that settle soonest."""
         search = self._begun(remedy, self.budget.machines)
         search.optimise()
         self._ended(search, search.surveyed())
+        if remedy.buys_joint and not remedy.makes and self.outcomes[-1].certainty == "works":
+            self._made_of_leaves(self.outcomes[-1])
+
+    def _made_of_leaves(self, outcome: RemedyOutcome) -> None:
+        """The leaf springs that make the joint of a remedy, verified as that was."""
+        assert outcome.stage is not None
+        remedy = outcome.remedy
+        if outcome.stage.axis_kind != LINEAR:
+            self.unmade[remedy.name] = "rotary"
+        elif self.stage.parasitic and not self.stage.joint:
+            self.unmade[remedy.name] = "mode"
+        elif (stage := leaves_for_joint(outcome.stage)) is None:
+            self.unmade[remedy.name] = "none"
+        else:
+            made = Remedy(f"{remedy.name}, of leaf springs", stage, (), True, remedy.name)
+            self.tries(made)
 
     def tries_less(self) -> None:
         """The least change of the controller as it is, from the remedy of that which works and changes most; where none
@@ -323,7 +355,7 @@ def _moves(stage: Stage) -> None:
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
     """How many reports a remedy makes, about."""
-    return (2 if len(remedy.variables) == 1 else budget.generations + budget.refined) + 4
+    return (2 if len(remedy.variables) < 2 else budget.generations + budget.refined) + 4
 
 
 class _Report:

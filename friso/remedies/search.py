@@ -150,6 +150,9 @@ class Search:
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
         variables = len(self.remedy.variables)
+        if variables == 0:
+            self.tried.append(self.measured(np.zeros((1, 0))))
+            return
 
         def cost(shares: np.ndarray) -> np.ndarray:
             self.report(f"{self.remedy.name}: settings")
@@ -232,7 +235,7 @@ class Search:
             clear = self.clear(batch)
             yield from batch[clear]
             apart = APART if clear.any() else WIDENED * apart
-            away = np.minimum(away, np.abs(left[:, None] - batch[None]).max(axis=2).min(axis=1))
+            away = np.minimum(away, np.abs(left[:, None] - batch[None]).max(axis=2, initial=0.0).min(axis=1))
 
 
 def _evolve(

@@ -20,6 +20,9 @@ from friso.views.tune.words import COLUMNS, answer, assumptions, failing, rows, 
 NOT_SURE = "-not-sure"
 """End of the names of stage files with remedies that are not sure to work."""
 
+OF_LEAVES = "-of-leaf-springs"
+"""End of the names of stage files with joints made of leaf springs."""
+
 
 def tune_files(tuning: Advice) -> dict[str, Content]:
     """The stage files, the page, and every figure in all formats; `tuned.toml` is the least change that works."""

@@ -8,8 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from friso.design_method.geometry import Geometry
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.frequency.bandwidth import loop_bandwidth
+from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.mechanism import Mechanism
 from friso.quantities import Quantity, percent, positive
 from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
@@ -22,6 +25,7 @@ from friso.remedies.window import VariableWindow
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, FORCE_LIMIT
 from friso.stage.transmission import leading_friction
+from friso.views.design.words import leaf_words
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, share_with_interval, with_unit
 from friso.views.loop_words import unstable_loop
 from friso.views.machine_words import spread_sentences
@@ -177,7 +181,47 @@ def _works(outcome: RemedyOutcome, tuning: Advice, what: str) -> list[str]:
         f"{what}: set {listed(changes(tuning.stage, outcome.stage), 'and')} ({outcome.remedy.name}; "
         f"{size_words(tuning.size(outcome))}).",
         f"{_brings(outcome.measured, tuning)}. {price(outcome.measured, tuning, outcome.remedy.buys_joint)}",
+        *_made_of_leaves(outcome, tuning),
     ]
+
+
+UNMADE = {
+    "rotary": "leaf springs of friso guide along a line, and this axis turns",
+    "mode": (
+        "the stage file states a parasitic mode of the machine, and a stage has no second one for the leaves; friso "
+        "design designs without it"
+    ),
+    "none": (
+        "none of the sizes that friso init --spec begins with has this stiffness and bears this stroke; friso design "
+        "takes other sizes"
+    ),
+}
+"""Why no leaf springs make the joint of a remedy."""
+
+
+def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
+    """Of what leaf springs the joint of a remedy can be made, and whether that works; or why there are none."""
+    made = tuning.made_of_leaves(outcome)
+    if made is not None:
+        flat = made.remedy.stage.flat()
+        disturbs = float(first_interfering(Mechanism.of(flat)))
+        mode = f"first interfering frequency {with_unit(disturbs, 'Hz')}" if math.isfinite(disturbs) else "no mode"
+        yield (
+            f"Leaf springs for its joint: {leaf_words(Geometry.of_stage(flat))}; "
+            f"{with_unit(flat['joint.stiffness'], 'N/m')}, {mode}. {_verified(made, tuning)}"
+        )
+    elif outcome.remedy.name in tuning.unmade:
+        yield f"No leaf springs were sized for its joint: {UNMADE[tuning.unmade[outcome.remedy.name]]}."
+
+
+def _verified(made: RemedyOutcome, tuning: Advice) -> str:
+    """Whether the stage still meets the goal with leaf springs and their parasitic mode."""
+    if made.certainty == "works":
+        assert made.measured is not None
+        return f"With them, {share_with_interval(made.measured.share(tuning.goal))} of the machines meet the goal."
+    if made.certainty == "unsure":
+        return f"With them, it is not sure to work: {unsure_why(made)}."
+    return f"With them, it does not work. {why_unmet(made, tuning)}"
 
 
 def size_words(size: ChangeSize) -> str:
@@ -295,7 +339,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin = f"a modulus margin of {goal.margin:g}"
     some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
-    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} settings tried)"
+    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} setting{'s' * (len(left) > 1)} tried)"
     settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "

@@ -1,0 +1,127 @@
+"""The leaf springs that make a joint of a given stiffness and stroke: those with the highest interfering frequency."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from itertools import product
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from friso.axis import LINEAR
+from friso.design_method.choice import STEP, bears, evaluated
+from friso.design_method.front import evaluate_geometries
+from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets
+from friso.design_method.outline import outline
+from friso.design_method.requirements import BREAKAWAY, PARASITIC, LeafTask, requirements
+from friso.design_method.spec import read_spec
+from friso.equations.breakaway import least_breakaway
+from friso.errors import InputError
+from friso.leaf_springs.beams import BeamFailure
+from friso.leaf_springs.closed_forms import loaded_drive_stiffness
+from friso.leaf_springs.joint import first_interfering
+from friso.stage import Stage
+
+SEED, GENERATIONS, POINTS = 36, 60, 20
+"""Of the search: the same leaves for the same joint; its generations, and points for each of three variables."""
+
+HIGHEST = 1e6
+"""What counts as the interfering frequency [Hz] of leaves none of whose modes actuator and sensor see."""
+
+WORST = 1e3
+"""Cost from which on leaves break a requirement."""
+
+WIDTHS = 5
+"""Steps to the width that gives the stiffness, which is nearly proportional to it."""
+
+NEAR = 0.01
+"""Share by which the stiffness of leaves in whole sizes may be off."""
+
+
+def leaves_for_joint(stage: Stage) -> Stage | None:
+    """The stage with leaf springs in place of the numbers of its joint and of the parasitic mode: those of the same
+    stiffness that interfere at the highest frequency, of the sizes, sheets, loads and factors of safety that `friso
+    init --spec` begins with; None where none bear the stroke. Raises InputError for a stage whose joint leaf springs
+    cannot be.
+    """
+    if stage.axis_kind != LINEAR:
+        axis = f"an axis with {stage.axis_kind.described}"
+        raise InputError("joint", axis, "a linear axis: leaf springs guide along a line", 'axis = "linear"')
+    spec = read_spec(outline(stage))
+    first = Geometry.of(box(spec)[1], sheets(spec)[0])
+    replaced = {"joint.stiffness": None} | ({"parasitic": None} if stage.parasitic else {})
+    base = stage.replace({**replaced, **first.keys()})
+    flat, friction = base.flat(), float(least_breakaway(base.flat()))
+    task = LeafTask(spec, flat["joint.stroke"], 0.0, friction, flat)
+    search = _Search(task, stage.flat()["joint.stiffness"])
+    for geometry in search.whole_sizes(search.best()):
+        with suppress(BeamFailure):
+            if bears(task, evaluated(task, geometry)):
+                return base.replace(geometry.keys())
+    return None
+
+
+class _Search:
+    """The search over length and spacing of the leaves and what they are of; the width follows from the stiffness."""
+
+    def __init__(self, task: LeafTask, stiffness: float) -> None:
+        self.task, self.stiffness = task, stiffness
+        self.bought = sheets(task.spec)
+        self.low, self.high = box(task.spec)
+        # that the cart stays and that no mode disturbs is verified on the stage with its leaves
+        self.needs = [need for need in requirements(task) if need.name not in (BREAKAWAY, PARASITIC)]
+
+    def best(self) -> np.ndarray:
+        """Logarithms of length and spacing [m], and the number of the sheet (3,)."""
+        ends = [*np.log([self.low[[0, 2]], self.high[[0, 2]]]).T, (0.0, len(self.bought) - 1e-9)]
+        bounds = [(low, high + 1e-12 * (high == low)) for low, high in ends]
+        minimum = differential_evolution(
+            lambda x: self.cost(np.exp(x[:2]).T, [self.bought[int(k)] for k in x[2]]),
+            bounds,
+            vectorized=True,
+            updating="deferred",
+            maxiter=GENERATIONS,
+            popsize=POINTS,
+            rng=SEED,
+            polish=False,
+        )
+        return np.asarray(minimum.x)
+
+    def cost(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
+        """What is minimised over lengths and spacings [m], (count, 2): how far leaves break a requirement, or else the
+        frequency at which they interfere, the other way round."""
+        sizes = self.with_width(spans, bought)
+        worst = self.broken(sizes, bought)
+        frequency = np.minimum(first_interfering(mechanisms(self.task.flat, sizes, bought)), HIGHEST)
+        return np.where(worst > 0, WORST + worst, -np.log(frequency))
+
+    def with_width(self, spans: np.ndarray, bought: list[Sheet]) -> np.ndarray:
+        """Lengths, widths and spacings [m], (count, 3), of the stiffness wanted."""
+        sizes = np.insert(spans, 1, self.high[1], axis=1)
+        for _ in range(WIDTHS):
+            sizes[:, 1] *= self.stiffness / loaded_drive_stiffness(mechanisms(self.task.flat, sizes, bought))
+        return sizes
+
+    def broken(self, sizes: np.ndarray, bought: list[Sheet]) -> np.ndarray:
+        """The logarithm of the factor by which leaves break a requirement, the space for their width being one: 0 or
+        less where they break none."""
+        scores = evaluate_geometries(self.task, self.needs, sizes, bought)
+        space = np.stack([self.low[1] / sizes[:, 1], sizes[:, 1] / self.high[1]], axis=1)
+        worst = np.log(np.concatenate([scores.excess, space], axis=1)).max(axis=1)
+        return np.where(np.isfinite(worst), worst, WORST)
+
+    def whole_sizes(self, best: np.ndarray) -> list[Geometry]:
+        """The geometries in sizes that can be made next to one, (3,), that break no requirement and have the
+        stiffness, those that interfere at the highest frequency first."""
+        sheet = self.bought[int(best[2])]
+        near = [np.round(np.exp(size) / STEP + side) * STEP for side in (-1, 0, 1) for size in best[:2]]
+        spans = np.array([*product(near[::2], near[1::2])])
+        bought = [sheet] * len(spans)
+        sizes = self.with_width(spans, bought)
+        sizes[:, 1] = np.round(sizes[:, 1] / STEP) * STEP
+        built = mechanisms(self.task.flat, sizes, bought)
+        inside = np.all((sizes > self.low - STEP / 2) & (sizes < self.high + STEP / 2), axis=1)
+        right = np.abs(loaded_drive_stiffness(built) / self.stiffness - 1) < NEAR
+        fits = inside & right & (self.broken(sizes, bought) <= np.log(1 + STEP))
+        order = np.argsort(-np.asarray(first_interfering(built)))
+        return [Geometry.of(sizes[k], sheet) for k in order if fits[k]]

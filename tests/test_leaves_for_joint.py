@@ -1,0 +1,103 @@
+"""The leaf springs that make a joint: its stiffness, what they bear, and that none interfere at a higher frequency."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from friso import Stage, load, loads
+from friso.answers.tune import TuneAnswer
+from friso.design_method.geometry import Sheet, mechanisms
+from friso.design_method.leaves_for_joint import leaves_for_joint
+from friso.leaf_springs import closed_forms
+from friso.leaf_springs.beams import beams
+from friso.leaf_springs.joint import first_interfering
+from friso.leaf_springs.mechanism import Mechanism
+from friso.remedies.goal import Goal
+from friso.remedies.method import Advice, tune
+from friso.remedies.search import Budget
+from friso.views.tune.page import stage_files
+from friso.views.tune.words import answer
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG = load(EXAMPLES / "thesis_rig.toml")
+
+
+def joint(stiffness: str, stroke: str) -> Stage:
+    """The thesis's rig with another joint."""
+    return RIG.replace({"joint.stiffness": stiffness, "joint.stroke": stroke})
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "stroke"),
+    [("515 N/m", "2.97 mm"), ("2.4 kN/m", "1 mm"), ("20 kN/m", "0.1 mm"), ("0.3 kN/m", "3 mm"), ("4 kN/m", "0.3 mm")],
+)
+def test_leaves_have_the_stiffness_and_bear_the_stroke(stiffness: str, stroke: str) -> None:
+    rig = joint(stiffness, stroke)
+    made = leaves_for_joint(rig)
+    assert made is not None
+    flat, wanted = made.flat(), rig.flat()["joint.stiffness"]
+    by_beams = beams(Mechanism.of(flat), flat["joint.stroke"])
+    assert flat["joint.stiffness"] == pytest.approx(wanted, rel=0.01)
+    assert by_beams.drive[0] == pytest.approx(wanted, rel=0.015)
+    assert by_beams.fatigue_margin > 1.25  # 1.3 for bending and load together
+    assert by_beams.buckling_margin > 3
+    assert best_of_a_grid(flat, wanted) < 1.02 * first_interfering(Mechanism.of(flat))
+
+
+def best_of_a_grid(flat: dict[str, float], wanted: float) -> float:
+    """The highest first interfering frequency [Hz] of leaves of the same stiffness on a grid of lengths, spacings and
+    gauges that bear stroke and weight, by the closed forms; the width from 31 by interpolation."""
+    best = 0.0
+    widths = np.linspace(15e-3, 45e-3, 31)
+    for thickness in (0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5):
+        sheet = Sheet(2, thickness * 1e-3, "stainless 1.4310")
+        for length in np.linspace(30e-3, 70e-3, 41):
+            sizes = np.stack(np.broadcast_arrays(length, widths, 45e-3), axis=1)
+            width = np.interp(wanted, closed_forms.drive_stiffness(mechanisms(flat, sizes, [sheet] * 31)), widths)
+            several = np.stack(np.broadcast_arrays(length, width, np.linspace(30e-3, 60e-3, 13)), axis=1)
+            built = mechanisms(flat, several, [sheet] * 13)
+            stress = built.stress_concentration * closed_forms.max_stress(built, flat["joint.stroke"])
+            stress += built.stress_concentration * built.weight / built.leaves / built.area
+            good = np.abs(closed_forms.drive_stiffness(built) / wanted - 1) < 1e-3
+            good &= 1.015 * 1.3 * stress < built.fatigue
+            good &= 1.015 * 3 * built.weight < closed_forms.buckling_load(built)
+            best = max(best, float(np.max(np.where(good, first_interfering(built), 0.0))))
+    return best
+
+
+def test_a_joint_too_stiff_for_the_sheets_has_none() -> None:
+    assert leaves_for_joint(joint("100 kN/m", "20 um")) is None
+
+
+def test_a_name_with_quotes_is_a_name() -> None:
+    assert leaves_for_joint(joint("2.4 kN/m", "1 mm").replace({"name": 'the "old" rig \\ 2'})) is not None
+
+
+@pytest.fixture(scope="module")
+def tuning() -> Advice:
+    rigid = RIG.replace({"joint": None, "parasitic": None})
+    budget = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6)
+    return tune(rigid, Goal(controller=False), budget=budget, chosen=["isolator"])
+
+
+def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) -> None:
+    isolator, made = tuning.outcomes
+    assert tuning.working == (isolator,)
+    assert tuning.made_of_leaves(isolator) is made
+    assert isolator.stage is not None
+    assert made.stage is not None
+    assert made.stage.flat()["joint.stiffness"] == pytest.approx(isolator.stage.flat()["joint.stiffness"], rel=0.01)
+    assert made.certainty == "works"
+    assert made.case is not None
+    assert (made.case.verdict, made.case.judgement.hunting.certain) == ("settles", True)
+    length = f"{made.stage.flat()['flexure.length'] * 1e3:.3g} x"
+    assert any("2 leaves of" in line and length in line for line in answer(tuning))
+    files = stage_files(tuning)
+    written = loads(str(files["tuned-isolator-of-leaf-springs.toml"]))
+    assert written.flat()["flexure.length"] == made.stage.flat()["flexure.length"]
+    paths = [Path("tuned") / name for name in files]
+    assert TuneAnswer(tuning).next_steps(paths) == [
+        "friso design tuned/tuned-isolator.toml",
+        "friso flexure tuned/tuned-isolator-of-leaf-springs.toml",
+    ]
