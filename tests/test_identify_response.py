@@ -1,11 +1,13 @@
 """Frequency responses from records of known systems, and what is read from them: intervals must hold the truth."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from refusals import Refused, Wording
 from scipy import signal
+from scipy.linalg import expm
 
 from friso.identification.estimate import Estimate
 from friso.identification.kinds import KINDS
@@ -27,7 +29,7 @@ from friso.identification.response.two_mass import fit_two_mass, two_masses, wid
 from friso.stage import loads
 
 DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz
-TRUE = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 1e-3])
+TRUE = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 1e-3, 0.0, 0.0, 0.0])
 
 Response = Callable[[np.ndarray], np.ndarray]
 
@@ -498,6 +500,36 @@ def test_two_mass_predicts_another_record_and_signs_are_told(refused: Refused, w
         relative_error(rig, aside, (200, 220))
 
 
+def sampled_with_hold(parameters: np.ndarray, frequency: np.ndarray, step: float) -> np.ndarray:
+    """Samples of driven and other mass over samples of a force that is held for `step` [s], shape (2, lines)."""
+    driven, other, stiffness, damping = np.exp(parameters[:4])
+    drag, other_drag = parameters[4:6]
+    rates = np.zeros((5, 5))
+    rates[[0, 2], [1, 3]] = 1.0
+    rates[1] = np.array([-stiffness, -damping - drag, stiffness, damping, 1.0]) / driven
+    rates[3] = np.array([stiffness, damping, -stiffness, -damping - other_drag, 0.0]) / other
+    over = expm(rates * step)
+    states = [
+        np.linalg.solve(np.exp(2j * np.pi * line * step) * np.eye(4) - over[:4, :4], over[:4, 4]) for line in frequency
+    ]
+    return np.array(states)[:, [0, 2]].T
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_masses_from_a_force_that_is_held_for_an_eighth_of_the_fastest_period(both: bool) -> None:
+    """Without a hold in the model the masses came out 1.4 to 1.9 % too large, with intervals of 0.4 to 0.8 %."""
+    truth = dict(zip(("driven mass", "other mass", "joint stiffness"), np.exp(TRUE), strict=False))
+    truth["total mass"] = truth["driven mass"] + truth["other mass"]
+    frequency, rng = np.arange(1.0, 25.0, 0.5), np.random.default_rng(29)
+    for step in (5e-3, None):
+        values = sampled_with_hold(TRUE, frequency, 5e-3)
+        responses = [exact(lambda _, v=v: v, frequency, 1e-3, rng) for v in (values if both else values[:1])]
+        fit = fit_two_mass(*(replace(response, sample_time=step) for response in responses))
+        assert all(fit[name].holds(value) for name, value in truth.items())
+        assert fit["total mass"].half_width < 0.01 * truth["total mass"]
+        assert fit["delay"].holds(2.5e-3)
+
+
 def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -> None:
     """The mode lies below the seventh of the band that is fitted at first: masses made up from above it were wrong."""
     truth = dict(zip(("driven mass", "other mass", "joint stiffness"), np.exp(TRUE), strict=False))
@@ -529,7 +561,7 @@ def test_one_mass_without_a_joint_is_not_told_as_two() -> None:
 
 def test_intervals_grow_where_realisations_scatter(refused: Refused) -> None:
     frequency, rng = np.arange(3.0, 40.0, 1.0), np.random.default_rng(27)
-    softer = TRUE + np.array([0, 0, 0.2, 0, 0, 0, 0])
+    softer = TRUE + np.array([0, 0, 0.2, *np.zeros(len(TRUE) - 3)])
     alike = [fit_two_mass(exact(rig, frequency, 0.01, rng)) for _ in range(2)]
     apart = [alike[0], fit_two_mass(exact(lambda f: two_masses(softer, f)[0], frequency, 0.01, rng))]
     before = alike[0]["joint stiffness"].half_width

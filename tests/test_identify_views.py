@@ -67,7 +67,7 @@ pytestmark = pytest.mark.xdist_group("identify-views")
 DT = 1e-3
 MASS, VISCOUS, COULOMB = 10.0, 50.0, 8.0
 WHY = "no steady motion between 1 and 20 mm/s"
-TWO_MASSES = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 0.0])
+TWO_MASSES = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 0.0, 0.0, 0.0, 0.0])
 
 
 def moves_log() -> Log:

@@ -58,7 +58,9 @@ def welch(record: ResponseRecord, resolution: float, channels: Channels | None =
         coherence = np.abs(answer) ** 2 / (power * total)
     excited = np.sqrt(power) > WEAK * np.sqrt(power.max())
     degrees = np.full(len(frequency), 2 * (effective - 1))
-    return _response(frequency, response, deviation, degrees, "welch", channels, coherence).at(excited)
+    return _response(frequency, response, deviation, degrees, "welch", channels, coherence, record.sample_time).at(
+        excited
+    )
 
 
 def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
@@ -95,7 +97,7 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     deviation = np.sqrt(variance * np.sum(np.abs(row) ** 2, axis=1)) / np.abs(gain)
     frequency = centres / (size * record.sample_time)
     degrees = np.full(len(centres), 2.0 * free)
-    return _response(frequency, response, deviation, degrees, "local polynomial", channels, None)
+    return _response(frequency, response, deviation, degrees, "local polynomial", channels, None, record.sample_time)
 
 
 def _response(
@@ -106,9 +108,20 @@ def _response(
     kind: str,
     channels: Channels | None,
     coherence: np.ndarray | None,
+    sample_time: float,
 ) -> FrequencyResponse:
     unknown = np.full(len(frequency), np.nan)
     warnings = ("noise and nonlinear distortion cannot be distinguished: the deviation covers both",)
     return FrequencyResponse(
-        frequency, response, deviation, unknown, unknown, degrees, kind, channels or Channels(), coherence, warnings
+        frequency,
+        response,
+        deviation,
+        unknown,
+        unknown,
+        degrees,
+        kind,
+        channels or Channels(),
+        coherence,
+        warnings,
+        sample_time,
     )

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import OptimizeResult, least_squares
 
 from friso.identification.estimate import Estimate
 from friso.identification.response.response import FrequencyResponse
@@ -14,6 +15,8 @@ from friso.identification.response.response import FrequencyResponse
 ResponseModel = Callable[[np.ndarray], np.ndarray]
 """From parameters (p,) to complex responses (outputs, lines)."""
 
+
+NOTHING: Mapping[int, tuple[float, float]] = MappingProxyType({})
 
 CLOSE = 1e-6
 """Relative change of the sum of squares, or of the parameters, that ends a fit: far below what noise does to them."""
@@ -74,28 +77,47 @@ def refined(
     deviation: np.ndarray,
     lower: np.ndarray | float = -np.inf,
     upper: np.ndarray | float = np.inf,
+    believed: Mapping[int, tuple[float, float]] = NOTHING,
 ) -> ResponseFit:
     """The model's parameters by least squares, weighted by the deviations; responses of shape (outputs, lines).
 
     The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since a
     model is never quite right: the covariance is the larger of the plain one, scaled by the residual, and one that
-    allows for that (Newey, West 1987, doi:10.2307/1913610).
+    allows for that (Newey, West 1987, doi:10.2307/1913610). What is `believed` of parameters, by place a value and its
+    deviation, counts as one more observation each; limits only keep the fit from going astray.
     """
     weight = np.sqrt(2) / deviation
+    places = list(believed)
+    middle, reach = np.array(list(believed.values())).reshape(-1, 2).T
+    lines, count = response.shape[1], 2 * response.size
+    free = max(count - len(start), 1)
 
-    def residuals(parameters: np.ndarray) -> np.ndarray:
-        error = (model(parameters) - response) * weight
-        return np.stack([error.real, error.imag], axis=-1).ravel()
+    def solved(first: np.ndarray, scale: float) -> OptimizeResult:
+        def residuals(parameters: np.ndarray) -> np.ndarray:
+            error = (model(parameters) - response) * weight
+            off = (parameters[places] - middle) / reach * scale
+            return np.concatenate([np.stack([error.real, error.imag], axis=-1).ravel(), off])
 
-    limits = (lower, upper)
-    solution = least_squares(residuals, start, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
-    count, lines = solution.fun.size, response.shape[1]
-    free = max(count - len(solution.x), 1)
-    inverse = np.linalg.pinv(solution.jac.T @ solution.jac, rcond=1e-14, hermitian=True)
-    plain = inverse * (2 * solution.cost / free)
-    by_line = (solution.jac * solution.fun[:, None]).reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
-    robust = inverse @ _long_run(by_line) @ inverse * (count / free)
-    return ResponseFit(solution.x, _larger(plain, robust), float(2 * solution.cost), count)
+        limits = (lower, upper)
+        return least_squares(residuals, first, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
+
+    def reduced(solution: OptimizeResult) -> float:
+        return float(np.sum(solution.fun[:count] ** 2)) / free
+
+    solution = solved(start, 1.0)
+    if places:
+        solution = solved(solution.x, np.sqrt(reduced(solution)))
+    size = np.linalg.norm(solution.jac, axis=0)
+    size[size == 0] = 1.0
+    slopes = solution.jac / size
+    inverse = np.linalg.pinv(slopes.T @ slopes, rcond=1e-14, hermitian=True)
+    plain = inverse * reduced(solution)
+    scores = slopes * solution.fun[:, None]
+    by_line = scores[:count].reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
+    alone = slopes[count:].T @ slopes[count:] * reduced(solution)
+    robust = inverse @ (_long_run(by_line) * (count / free) + alone) @ inverse
+    covariance = _larger(plain, robust) / size[:, None] / size
+    return ResponseFit(solution.x, covariance, reduced(solution) * free, count)
 
 
 def _long_run(scores: np.ndarray) -> np.ndarray:

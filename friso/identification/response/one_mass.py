@@ -7,6 +7,7 @@ from itertools import product
 import numpy as np
 from scipy import stats
 
+from friso.identification.response.beyond import COMPLIANCES, HELD, believed, beyond, bounds
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.response import FrequencyResponse
 from friso.identification.response.two_mass import TwoMass
@@ -24,30 +25,35 @@ TRIED = 3
 DAMPED = 0.1
 """Half-width of the mode on the spring from which a fit starts, over its frequency."""
 
-MASS, DRAG, SPRING, DELAY, ABOVE = range(5)
-"""Places of the parameters: logarithm of the mass, viscous friction, spring to ground, delay; from the last on, the
-compliance of what lies above the band, for each output."""
+MASS, DRAG, SPRING, BEYOND = range(4)
+"""Places of the parameters: logarithm of the mass, viscous friction, spring to ground; from the last on, those of
+`beyond`."""
 
 
 def needs_two(model: TwoMass, driven: FrequencyResponse, other: FrequencyResponse | None = None) -> bool:
     """Whether two masses explain responses, over the band of their model, considerably better than one mass does.
 
-    The one mass has viscous friction and a spring to ground, a delay, and for each output the constant compliance that
-    modes above the band add to it, as a force that is held between samples does (1/(m s^2) (1 + (s T)^2/24)). An F-test
-    says whether chance explains the difference; since the mode may lie at any line, its level is divided by their
-    number.
+    The one mass has viscous friction and a spring to ground, and like the two what the drive and all that lies above
+    the band add. An F-test says whether chance explains the difference; since the mode may lie at any line, its level
+    is divided by their number.
     """
-    responses = [response.between(*model.band) for response in (driven, other) if response is not None]
-    one, two = fit_one_mass(responses, model.signs), model.fit
+    responses = [response for response in (driven, other) if response is not None]
+    one, two = fit_one_mass(responses, model.signs, model.band), model.fit
     free, more = max(two.count - len(two.parameters), 1), len(two.parameters) - len(one.parameters)
     better = (one.squares - two.squares) / more / (two.squares / free)
-    chance = float(stats.f.sf(better, more, free)) * len(responses[0].frequency)
+    chance = float(stats.f.sf(better, more, free)) * one.count / (2 * len(responses))
     return two.squares < LEFT * one.squares and chance < CHANCE
 
 
-def fit_one_mass(responses: list[FrequencyResponse], signs: tuple[float, ...]) -> ResponseFit:
-    """One mass fitted to the responses of one or two outputs on the same lines, signs of -1 reversed: the best of the
-    fits from several corners of friction and spring inside and below the band; parameters as in the module."""
+def fit_one_mass(
+    responses: list[FrequencyResponse], signs: tuple[float, ...], band: tuple[float, float]
+) -> ResponseFit:
+    """One mass fitted to the responses of one or two outputs on the same lines in a band [Hz], signs of -1 reversed:
+    the best of the fits from several corners of friction and spring inside and below the band; parameters as in the
+    module."""
+    held = {BEYOND + HELD: believed(responses[0])}
+    outside = bounds(responses[0], band[1], len(responses))
+    responses = [response.between(*band) for response in responses]
     frequency = responses[0].frequency
     values = np.stack([sign * response.response for response, sign in zip(responses, signs, strict=False)])
     deviation = np.stack([deviations(response) for response in responses])
@@ -58,20 +64,19 @@ def fit_one_mass(responses: list[FrequencyResponse], signs: tuple[float, ...]) -
     def misfit(start: np.ndarray) -> float:
         return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
 
-    late = 0.1 / frequency[-1]
-    lower = np.array([-np.inf, 0.0, 0.0, -late, *[-np.inf] * len(values)])
-    upper = np.array([np.inf, np.inf, np.inf, late, *[np.inf] * len(values)])
+    lower, upper = np.array([-np.inf, 0.0, 0.0, *outside[0]]), np.array([np.inf, np.inf, np.inf, *outside[1]])
     starts = sorted(_starts(values, frequency), key=misfit)[:TRIED]
-    fits = [refined(model, start, values, deviation, lower, upper) for start in starts]
+    fits = [refined(model, start, values, deviation, lower, upper, held) for start in starts]
     return min(fits, key=lambda fit: fit.squares)
 
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Responses of one mass, shape (outputs, lines), over frequencies [Hz]."""
+    """Responses of one mass as each output has it, shape (outputs, lines), over frequencies [Hz]."""
     s = 2j * np.pi * frequency
     mass = np.exp(parameters[MASS])
     rigid = 1 / (mass * s**2 + parameters[DRAG] * s + parameters[SPRING])
-    return (rigid + parameters[ABOVE:, None]) * np.exp(-s * parameters[DELAY])
+    outputs = len(parameters) - BEYOND - COMPLIANCES
+    return beyond(np.tile(rigid, (outputs, 1)), frequency, mass, parameters[BEYOND:])
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
@@ -80,7 +85,7 @@ def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:
     starts = []
     for corner, mode in product(places, places):
         drag, spring = corner + DAMPED * mode, mode**2
-        rest = np.zeros(1 + len(values))
+        rest = np.zeros(COMPLIANCES + len(values))
         shape = one_mass(np.array([0.0, drag, spring, *rest]), frequency)[0]
         level = float(np.mean(np.log(np.abs(shape) / np.abs(values[0]))))
         starts.append(np.array([level, drag * np.exp(level), spring * np.exp(level), *rest]))

@@ -58,7 +58,17 @@ def multisine(
     frequency = spectra_of_records[0].frequency[excited]
     known_channels = channels or Channels()
     return FrequencyResponse(
-        frequency, response, deviation, noise, distortion, degrees, "multisine", known_channels, None, tuple(warnings)
+        frequency,
+        response,
+        deviation,
+        noise,
+        distortion,
+        degrees,
+        "multisine",
+        known_channels,
+        None,
+        tuple(warnings),
+        records[0].sample_time,
     )
 
 

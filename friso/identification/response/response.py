@@ -49,7 +49,8 @@ class FrequencyResponse:
     total; `noise` and `distortion` are what noise (differs from period to period) and nonlinear distortion (differs
     from realisation to realisation) contribute, deviation^2 = noise^2 + distortion^2 where both are known, NaN where
     the record cannot tell them. `degrees` is the number of real degrees of freedom behind the deviation. `coherence`
-    is that of input and output, or None. `kind` is "multisine", "welch" or "local polynomial".
+    is that of input and output, or None. `kind` is "multisine", "welch" or "local polynomial". `sample_time` [s] is
+    that of the record, None where it is not known.
     """
 
     frequency: np.ndarray
@@ -62,6 +63,7 @@ class FrequencyResponse:
     channels: Channels = Channels()
     coherence: np.ndarray | None = None
     warnings: tuple[str, ...] = ()
+    sample_time: float | None = None
 
     def band(self) -> ResponseBand:
         """The 95 % intervals of magnitude and phase: half the variance lies along the response, half across it."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
+from friso.identification.response.beyond import COMPLIANCES, DELAY, HELD, believed, beyond, bounds
 from friso.identification.response.fitting import ResponseFit, deviations, refined
 from friso.identification.response.modes import fit_modes
 from friso.identification.response.response import FrequencyResponse
@@ -29,8 +30,9 @@ EXPLAINED = 3.0
 FAR = np.log(30.0)
 """Logarithm of the factor by which masses and stiffness may move from the start; twice that for damping."""
 
-DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, DELAY = range(7)
-"""Places of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; delay."""
+DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, BEYOND = range(7)
+"""Places of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; from the
+last on, those of `beyond`."""
 
 
 @dataclass(frozen=True)
@@ -57,15 +59,16 @@ class TwoMass:
 
 
 def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Responses of the driven and the other mass to a force on the former, shape (2, lines), over frequencies
-    [Hz]."""
+    """Responses of the driven and, where there is a compliance for it, of the other mass to a force on the former,
+    shape (outputs, lines), over frequencies [Hz]."""
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     s = 2j * np.pi * frequency
     joint = damping * s + stiffness
     first = driven * s**2 + parameters[DRAG] * s + joint
     second = other * s**2 + parameters[OTHER_DRAG] * s + joint
     determinant = first * second - joint**2
-    return np.stack([second, joint]) / determinant * np.exp(-s * parameters[DELAY])
+    outputs = len(parameters) - BEYOND - COMPLIANCES
+    return beyond((np.stack([second, joint]) / determinant)[:outputs], frequency, driven, parameters[BEYOND:])
 
 
 def fit_two_mass(
@@ -89,10 +92,15 @@ def fit_two_mass(
     deviation = np.stack([deviations(response) for response in responses])
     sign = _sign(values[0])
     options = [(sign, sign), (sign, -sign)][: len(responses)]
-    seen = cache(lambda: _from_modes(responses[0]))
-    fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen), pair) for pair in options]
+    seen = cache(lambda: _from_modes(responses[0], len(responses)))
+    held = {BEYOND + HELD: believed(collocated)}
+    outside = bounds(collocated, float(frequency[-1]), len(values))
+    fits = [
+        (_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen, outside, held), pair)
+        for pair in options
+    ]
     fit, signs = min(fits, key=lambda candidate: candidate[0].squares)
-    _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency)[: len(values)])
+    _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency))
     limits = (float(frequency[0]), float(frequency[-1]))
     return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
 
@@ -141,7 +149,7 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
         raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
 
 
-def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
+def _from_modes(response: FrequencyResponse, outputs: int) -> list[np.ndarray]:
     """A start from the first antiresonance and resonance of a rational fit, of whole mass 1; none where it has none."""
     try:
         modes = fit_modes(response)
@@ -154,52 +162,56 @@ def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
         return []
     other = 1 - (zero / pole) ** 2
     stiffness = other * (2 * np.pi * zero) ** 2
-    return [_start(other, stiffness, 4 * np.pi * max(damping, 1e-4) * pole * other * (1 - other))]
+    return [_start(other, stiffness, 4 * np.pi * max(damping, 1e-4) * pole * other * (1 - other), outputs)]
 
 
-def _start(other: float, stiffness: float, damping: float) -> np.ndarray:
-    return np.array([*np.log([1 - other, other, stiffness, damping]), 0.0, 0.0, 0.0])
+def _start(other: float, stiffness: float, damping: float, outputs: int) -> np.ndarray:
+    return np.array([*np.log([1 - other, other, stiffness, damping]), *np.zeros(BEYOND - DRAG + COMPLIANCES + outputs)])
 
 
 def _best(
-    values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen: Callable[[], list[np.ndarray]]
+    values: np.ndarray,
+    deviation: np.ndarray,
+    frequency: np.ndarray,
+    seen: Callable[[], list[np.ndarray]],
+    outside: tuple[np.ndarray, np.ndarray],
+    held: Mapping[int, tuple[float, float]],
 ) -> ResponseFit:
     """The best of the fits from the most promising mass ratio, from the modes `seen` and from the next ratio; the first
     one that explains the data."""
-    late = 0.1 / frequency[-1]
     reach = np.array([FAR] * 3 + [2 * FAR])
 
     def model(parameters: np.ndarray) -> np.ndarray:
-        return two_masses(parameters, frequency)[: len(values)]
+        return two_masses(parameters, frequency)
 
     def misfit(start: np.ndarray) -> float:
         return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
 
     def starts() -> Iterator[np.ndarray]:
-        first, second, *_ = sorted(_starts(values[0], frequency), key=misfit)
+        first, second, *_ = sorted(_starts(values, frequency), key=misfit)
         yield first
         yield from (_scaled_to(visible, values[0], frequency) for visible in seen())
         yield second
 
     fits = []
     for start in starts():
-        lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, -late])
-        upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, late])
-        fits.append(refined(model, start, values, deviation, lower, upper))
+        lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, *outside[0]])
+        upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, *outside[1]])
+        fits.append(refined(model, start, values, deviation, lower, upper, held))
         if fits[-1].reduced < EXPLAINED:
             break
     return min(fits, key=lambda fit: fit.squares)
 
 
-def _starts(response: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
-    """Starts at the highest place of the acceleration inside the band, with several mass ratios."""
-    level = np.abs(response) * (2 * np.pi * frequency) ** 2
+def _starts(values: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
+    """Starts at the highest place of the first acceleration inside the band, with several mass ratios."""
+    level = np.abs(values[0]) * (2 * np.pi * frequency) ** 2
     resonance = frequency[1 + int(np.argmax(level[1:-1]))]
     for ratio in RATIOS:
         other = 1 - 1 / ratio**2
         stiffness = other * (2 * np.pi * resonance / ratio) ** 2
         damping = 0.1 * np.sqrt(stiffness * other)
-        yield _scaled_to(_start(other, stiffness, damping), response, frequency)
+        yield _scaled_to(_start(other, stiffness, damping, len(values)), values[0], frequency)
 
 
 def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
@@ -237,7 +249,7 @@ def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate,
     plain = [
         fit.estimate("driven viscous friction", _si(rate), METHOD, lambda p: float(p[DRAG])),
         fit.estimate("other viscous friction", _si(rate), METHOD, lambda p: float(p[OTHER_DRAG])),
-        fit.estimate("delay", "s", METHOD, lambda p: float(p[DELAY])),
+        fit.estimate("delay", "s", METHOD, lambda p: float(p[BEYOND + DELAY])),
     ]
     return (*positive, *plain)
 

@@ -1,0 +1,60 @@
+"""What the drive and all that lies above the band add to the response of masses: a delay, a hold, and compliances.
+
+A force that is held for T at each sample acts half of T late on average, and the weaker the faster it changes: by
+sin(x)/x, x = omega T/2. The samples of the position then hold the images of the force too, of which those on the driven
+mass matter: the response of a mass m alone is 1/(m s^2) times x^2 cos(x)/sin(x)^2 in all, with a delay of T/2 (the
+double integrator with a zero-order hold: Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3).
+Nothing in a log tells whether its force was held, so that T is fitted, between none and the sample time. Modes above
+the band add a compliance that is the same at all frequencies.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.identification.response.response import FrequencyResponse
+
+DELAY, HELD, COMPLIANCES = range(3)
+"""Places of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from the
+last on, the compliance for each output."""
+
+LATEST = 0.4
+"""Largest delay over the period of the highest frequency. A drive that computes for a sample and holds the force for
+another one acts one and a half samples late: 0.38 of a period at four samples for each."""
+
+USUAL = 0.25
+"""Share of the period of the highest frequency that an unknown sample time usually has at most."""
+
+MILLI = 1e-3
+
+
+def beyond(response: np.ndarray, frequency: np.ndarray, driven: float, parameters: np.ndarray) -> np.ndarray:
+    """Responses (outputs, lines) over frequencies [Hz] with delay, hold and a compliance for each output.
+
+    The first output is that of the `driven` mass, in units of input per acceleration.
+    """
+    delay, held, compliances = parameters[DELAY], MILLI * np.sqrt(parameters[HELD]), parameters[COMPLIANCES:, None]
+    omega = 2 * np.pi * frequency
+    weaker = np.sinc(frequency * held)
+    samples = response * weaker
+    samples[0] += (weaker - np.cos(omega * held / 2) / weaker**2) / (driven * omega**2)
+    return (samples + compliances) * np.exp(-1j * omega * delay)
+
+
+def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper limits of the parameters, each of shape (COMPLIANCES + outputs,), for a model of a response up to
+    `top` [Hz]."""
+    late, longest = LATEST / top, _longest(response, 0.5)
+    free = np.full(outputs, np.inf)
+    return np.array([-late, 0.0, *-free]), np.array([late, (longest / MILLI) ** 2, *free])
+
+
+def believed(response: FrequencyResponse) -> tuple[float, float]:
+    """Value and deviation [ms^2] of the square of the time for which the force is held: none to the sample time."""
+    half = (_longest(response, USUAL) / MILLI) ** 2 / 2
+    return half, half
+
+
+def _longest(response: FrequencyResponse, share: float) -> float:
+    """The sample time [s], or where it is not known this share of the period of the highest frequency."""
+    return response.sample_time or share / float(response.frequency[-1])
