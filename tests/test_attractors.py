@@ -14,17 +14,20 @@ import friso
 import friso.hunting.attractors
 import friso.hunting.cycle.hunting
 from friso.engine.allowance import allowance
+from friso.hunting import verdict
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.basin import ends_in, swings_seldom
+from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.margin import margin, search_bandwidths
-from friso.hunting.motions import Motions
+from friso.hunting.measures import measuring_options
+from friso.hunting.motions import Motions, run_motions
 from friso.hunting.outward import Beyond, Outward
-from friso.hunting.verdict import WORK, judge_many, judge_runs, own_motion
+from friso.hunting.verdict import STILL_SWINGS, WORK, judge_many, judge_runs, own_motion
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
@@ -532,6 +535,22 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
     assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["transient"]
     with allowance(1):
         assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["failed"]
+
+
+@pytest.mark.usefixtures("own_bandwidth")
+def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sure() -> None:
+    """The thesis's friction and speeds a hundredth as large: hunts by 5.2 um, of which this survey knows nothing."""
+    friction = {"static": "0.03 N", "coulomb": "0.01 N", "stribeck_velocity": "16 um/s"}
+    changes = {f"friction.{name}": value for name, value in friction.items()}
+    small = VARIANTS["rigid"].replace({**changes, "controller.crossover": "8 Hz", "motion.duration": "60 s"})
+    nothing = replace(hunting(small), target=None, cycles=())
+    with patched({verdict: {"hunting": lambda stage, work: nothing}}):
+        case = check_given(small)
+    assert case.settling_time[1e-5] is not None
+    assert 1.02e-5 < case.peak_to_peak < 1.06e-5
+    assert (case.judgement.hunting.certain, case.judgement.hunting.reason) == (False, STILL_SWINGS)
+    flat, blind = small.flat(), replace(attractors(held(small)), motions=())
+    assert judge_runs(flat, run_motions(flat, 1, measuring_options(1e-6)), blind, 1e-6).tolist() == ["failed"]
 
 
 def asymmetric_stage() -> Stage:

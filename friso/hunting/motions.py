@@ -14,7 +14,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
-from friso.hunting.attractors.rounds import loose_from
+from friso.hunting.attractors.rounds import RESOLVED, loose_from
 from friso.hunting.criteria import BAND, COUNTED_ABOVE, lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import wait
@@ -64,11 +64,13 @@ def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) ->
 @dataclass(frozen=True)
 class FollowedMotions:
     """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
-    their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown);
-    whether they swing on `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
+    their end, within 10 um of the reference; which are still `moving`, as they have not, or swing within that; the time
+    [s] after which they rest, if they are followed for long (NaN: not then either, or unknown); whether they swing on
+    `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
     than their end, or not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
 
     rests: np.ndarray
+    moving: np.ndarray
     after: np.ndarray
     steady: np.ndarray
     followed: np.ndarray
@@ -77,12 +79,7 @@ class FollowedMotions:
     @property
     def unknown(self) -> np.ndarray:
         """Which had to be followed for long, and were not to the end of that, shape (count,)."""
-        return ~self.rests & ~np.isfinite(self.followed)
-
-    @property
-    def restless(self) -> np.ndarray:
-        """Which have not settled either by the end of the longer run, shape (count,)."""
-        return ~self.rests & np.isfinite(self.followed) & ~np.isfinite(self.after)
+        return self.moving & ~np.isfinite(self.followed)
 
     def follow(self, which: np.ndarray, flat: Mapping[str, Any], count: int, run_options: RunOptions) -> None:
         """Follow the motions with the numbers `which`, those of the stages `flat`, for long. Raises Exhausted."""
@@ -100,27 +97,34 @@ class FollowedMotions:
                 swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY)
             )
         self.followed[which] = np.where(done, lasts_for, np.nan)
-        self.after[which], self.swing[which] = np.where(done, last.settling, np.nan), last.swing
+        after = np.where(self.rests[which], self.after[which], last.settling)
+        self.after[which], self.swing[which] = np.where(done, after, np.nan), last.swing
 
 
 def followed_motions(
     flat: Mapping[str, Any], motions: Motions, count: int, run_options: RunOptions, possible: bool
 ) -> FollowedMotions:
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
-    its end is followed, as far as an allowance reaches."""
-    rests = np.isfinite(motions.settling)
+    its end, or still swings there, is followed, as far as an allowance reaches."""
+    rests, still = np.isfinite(motions.settling), np.zeros(count, bool)
     steady, followed = np.zeros(count, bool), np.full(count, np.nan)
-    rest = FollowedMotions(rests, motions.settling.copy(), steady, followed, motions.swing.copy())
+    rest = FollowedMotions(rests, still, motions.settling.copy(), steady, followed, motions.swing.copy())
     if not possible:
         idle = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
         return replace(rest, rests=rests | idle)
-    if (moving := np.flatnonzero(~rests)).size:
+    rest.moving[:] = ~(rests & (motions.swing <= resting(flat, count)))
+    if (moving := np.flatnonzero(rest.moving)).size:
         late = replace(run_options, record_from=np.inf, least_swing=BAND / 2)  # what may leave the band, at the end
         try:
             rest.follow(moving, some_of(flat, moving), moving.size, late)
         except Exhausted:
             rest.steady[moving], rest.followed[moving] = False, np.nan
     return rest
+
+
+def resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
+    """The swings, peak to peak [m], up to which stages of one structure are at rest, shape (count,)."""
+    return 2 * RESOLVED * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def some_of(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:

@@ -16,7 +16,6 @@ from friso.engine.batch import RunOptions
 from friso.equations.bandwidth import faster
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
-from friso.hunting.attractors.rounds import RESOLVED
 from friso.hunting.basin import (
     MOVES,
     Kick,
@@ -42,7 +41,7 @@ from friso.hunting.cycle.hunting import (
 )
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
-from friso.hunting.motions import Motions, followed_motions, run_motions, some_of
+from friso.hunting.motions import Motions, followed_motions, resting, run_motions, some_of
 from friso.hunting.outward import AttractionEnd
 from friso.stage import Stage
 
@@ -171,7 +170,7 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         )
     if attraction.possible and attraction.certain and rest.unknown[0]:
         attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
-    elif attraction.possible and attraction.certain and rest.restless[0] and rest.swing[0] > _resting(stage.flat())[0]:
+    elif attraction.possible and attraction.certain and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
         attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
@@ -249,7 +248,7 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
     ends, completed, swing = ends_in({**flat, **changed}, len(CHANGED), target)
     doubt = BY_CHANCE if np.any(ends[completed] != ends[0]) else "" if completed.all() else UNCHECKED
     own = OwnMotion(ends[0], completed[0], float(swing[0]), doubt)
-    if own.ends or own.doubt or not own.completed or own.swing <= _resting(flat)[0]:
+    if own.ends or own.doubt or not own.completed or own.swing <= resting(flat)[0]:
         return own
     longer = replace(target, early=FARTHER * target.lasting, lasting=FARTHER * target.lasting)
     try:
@@ -263,11 +262,6 @@ def own_motion(stage: Stage, target: Target, work: float) -> OwnMotion:
 def _widest(attraction: Hunting) -> float:
     """The largest swing that attracts, peak to peak [m]."""
     return 2 * max(swing.amplitude for swing in (*attraction.attracting, *attraction.observed))
-
-
-def _resting(flat: Mapping[str, Any], count: int = 1) -> np.ndarray:
-    """The swings, peak to peak [m], up to which stages of one structure are at rest, shape (count,)."""
-    return 2 * RESOLVED * Ensemble.held(flat, count, form=shared_structure(flat)).length
 
 
 def _starts(
@@ -294,7 +288,7 @@ def _restless(stage: Stage, attraction: Hunting, swing: float, within: float) ->
     """Why a motion need not come to rest that does not end in what was found to attract, and at last swings by so much
     [m], peak to peak; `within` is the time from which on it stays near its reference [s] (NaN: not within its run).
     "" if it does."""
-    if swing > _resting(stage.flat())[0]:
+    if swing > resting(stage.flat())[0]:
         return SWINGS_ON
     surveyed = attraction.surveyed
     every = surveyed is None or bool(surveyed.complete[0])
@@ -397,7 +391,7 @@ def judge_runs(
         )
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
         if survey is not None:
-            swinging = rest.restless & ~rest.steady & (rest.swing > _resting(some_of(flat, free), free.size))
+            swinging = rest.moving & ~rest.steady & (rest.swing > resting(some_of(flat, free), free.size))
             decided[free] = ~(rest.unknown | swinging)
     return verdicts(decided, attracts, in_cycle, rests)
 
@@ -407,5 +401,5 @@ def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions
     followed for long, and of which that is decided: they do, or they have come to rest."""
     count = len(motions.completed)
     rest = followed_motions(flat, motions, count, run_options, possible=True)
-    stands = np.isfinite(rest.followed) & (rest.swing <= _resting(flat, count))
+    stands = np.isfinite(rest.followed) & (rest.swing <= resting(flat, count))
     return rest.steady, rest.steady | np.isfinite(rest.after) | stands
