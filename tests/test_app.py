@@ -34,9 +34,10 @@ from friso.app import machine as machines
 from friso.app.gate import Access
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
-from friso.app.serve import listening
+from friso.app.serve import Server, listening
 from friso.app.server import application
 from friso.app.work import Work, Workshop
+from friso.axis import LINEAR
 from friso.engine.overtaken import Overtaken, ended_by, go_on
 from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
@@ -44,7 +45,7 @@ from friso.studies.execute import local_crew
 from friso.studies.request import Request
 from friso.studies.sweep import run_in_memory
 from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import Axis, Figure, Panel, Series
+from friso.views.drawing.figure import Axis, Cloud, Figure, Panel, Series
 
 RIG = Path(friso.example("thesis_rig"))
 STICK_SLIP = Path(friso.example("lugre_stick_slip"))
@@ -74,10 +75,13 @@ class Served:
         connection.close()
         return response.status, response.headers, content
 
-    def ask(self, question: str, stage: Path, changes: dict[str, Any] | None = None, **options: Any) -> list[Any]:
-        """The parts of an answer."""
-        machine = {"name": stage.name, "text": stage.read_text(encoding="utf-8"), "changes": changes or {}}
-        body = {"machine": machine, "options": options, "page": "test", "lane": question}
+    def ask(
+        self, question: str, stage: Path, changes: dict[str, Any] | None = None, pinned: bool = False, **options: Any
+    ) -> list[Any]:
+        """The parts of an answer; the stage as it is may be `pinned`."""
+        machine = {"name": stage.name, "text": stage.read_text(encoding="utf-8")}
+        body = {"machine": {**machine, "changes": changes or {}}, "pinned": machine if pinned else None}
+        body |= {"options": options, "page": "test", "lane": question}
         status, _, content = self.request("POST", f"/ask/{question}", json.dumps(body).encode())
         assert status == 200, content
         return [*parts(content)]
@@ -493,11 +497,49 @@ def test_a_map_stays_where_there_is_no_edge(served: Served) -> None:
     assert "log" not in part["command"] + part["python"]
 
 
+def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Last, for it takes as long again; `friso.boundary` itself takes too long here."""
+    asked = []
+
+    class Edge:
+        axis_kind, sentences, tables, details = LINEAR, list, list, list
+        failure = ""
+
+        def __init__(self, stage: friso.Stage) -> None:
+            asked.append(self)
+            curve = Series(np.array([0.9, 1.1]), np.full(2, stage.flat()["friction.static"]), "flip", "#222222")
+            cloud = Cloud(np.ones(1), np.ones(1), np.ones(1), "", "")
+            self.panel = Panel("", Axis("Stage mass", "kg"), Axis("Static friction", "N"), (curve,), clouds=(cloud,))
+
+        def figures(self) -> list[Figure]:
+            return [Figure("boundary", "Edge of hunting", "", (self.panel,))]
+
+    monkeypatch.setattr(friso, "boundary", lambda stage, **_: Edge(stage))
+    axes = {"x": "friction.coulomb=1 N..2 N", "y": "friction.static=6 N..12 N"}
+    for _ in range(2):
+        parts = served.ask("boundary", STICK_SLIP, {"friction.static": "9 N"}, pinned=True, **axes)
+        first, last = (part["figures"][0]["data"] for part in parts if "figures" in part)
+        assert {trace.get("name") for trace in last} >= {"flip", "pinned", "this machine"}
+        assert len(last) > len(first)
+    assert len(asked) == 3  # the pinned one's is kept
+
+
+def test_a_cell_of_a_map_and_the_leaf_springs_have_what_is_pinned(served: Served) -> None:
+    part = served.ask("cell", STICK_SLIP, {"masses.stage": "1.1 kg"}, pinned=True)[-1]
+    assert "pinned" in [trace["name"] for trace in part["figures"][0]["data"]]
+    leaves = Path(friso.example("thesis_leaves"))
+    part = served.ask("flexure", leaves, {"flexure.thickness": "0.2 mm"}, pinned=True)[-1]
+    assert [drawing["label"] for drawing in part["drawings"]] == ["", "pinned"]
+    assert len({drawing["svg"] for drawing in part["drawings"]}) == 2
+
+
 def test_a_report_has_page_figures_document_and_stage_file(served: Served, undrawn: None) -> None:
-    part = served.ask("check.zip", STICK_SLIP)[-1]
-    names = set(zipfile.ZipFile(io.BytesIO(base64.b64decode(part["base64"]))).namelist())
-    assert {"report.html", "check.json", "lugre_stick_slip.toml"} <= names
-    assert {f"settled.{form}" for form in ("png", "svg", "pdf")} <= names
+    for command, figure in {"check": "settled", "simulate": "response"}.items():
+        asked = served.ask({"simulate": "run"}.get(command, command), STICK_SLIP)[-1]["asked"]
+        part = served.ask(f"{asked['name']}.zip", STICK_SLIP, **asked["options"])[-1]
+        names = set(zipfile.ZipFile(io.BytesIO(base64.b64decode(part["base64"]))).namelist())
+        assert {f"{command}.json", "lugre_stick_slip.toml"} <= names
+        assert {f"{figure}.{form}" for form in ("png", "svg", "pdf")} <= names
 
 
 def test_changes_become_the_command_that_gives_the_same(served: Served) -> None:
@@ -506,15 +548,25 @@ def test_changes_become_the_command_that_gives_the_same(served: Served) -> None:
     assert part["python"] == "friso.simulate('lugre_stick_slip.toml', set={'masses.stage': '1.1 kg'})"
 
 
-def test_of_a_machine_made_on_the_page_the_lines_are_those_of_the_file_saved_there() -> None:
+def test_of_a_machine_made_on_the_page_the_lines_are_those_of_the_file_saved_there(served: Served) -> None:
+    assert served.ask("run", STICK_SLIP, {"motion.jerk": None})[-1]["of"] == "the stage file saved here"
     text = STICK_SLIP.read_text(encoding="utf-8")
     opened = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg"}})
-    assert command_line("check", opened, {}) == 'friso check a.toml --set masses.stage="2 kg"'
+    assert command_line("check", [opened.name], opened.to_set) == 'friso check a.toml --set masses.stage="2 kg"'
     made = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg"}, "made": True})
     without = Machine.of({"text": text, "name": "a.toml", "changes": {"masses.stage": "2 kg", "motion.jerk": None}})
     for machine in (made, without):
-        assert command_line("check", machine, {}) == "friso check a.toml"
-        assert python_line("check", machine, {}) == "friso.check('a.toml')"
+        assert command_line("check", [machine.name], machine.to_set) == "friso check a.toml"
+        assert python_line("check", [machine.name], machine.to_set) == "friso.check('a.toml')"
+
+
+def test_the_lines_of_logs_name_what_was_said_of_them(served: Served) -> None:
+    log = b"t,x\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
+    kept = json.loads(served.request("POST", "/logs/my%20log.csv", log)[2])["file"]
+    part = served.ask("logs", RIG, files=[kept], map={"position": "x", "time": "t"}, dt="1 ms", assumed=True)[-1]
+    assert part["command"] == 'friso logs "my log.csv" --map position=x --map time=t --dt "1 ms"'
+    python = "friso.logs('my log.csv', map={'position': 'x', 'time': 't'}, dt='1 ms')"
+    assert (part["python"], part["of"]) == (python, "the files dropped here")
 
 
 @pytest.mark.parametrize(
@@ -565,6 +617,57 @@ def test_a_question_that_computes_nothing_does_not_wait_for_those_that_do() -> N
 
     (frame,) = asyncio.run(asked())
     assert b"answer" in frame
+
+
+def test_at_the_end_answers_end_before_what_computes_notices() -> None:
+    async def asked() -> list[bytes]:
+        workshop, begun, go = Workshop(), threading.Event(), threading.Event()
+
+        def job(work: Work) -> Iterator[dict[str, Any]]:
+            begun.set()
+            go.wait(60)
+            yield {}
+
+        async def answer() -> list[bytes]:
+            return [frame async for frame in workshop.answer("", "tune", 1, job)]
+
+        answered = asyncio.create_task(answer())
+        try:
+            while not begun.is_set():
+                await asyncio.sleep(0.001)
+            workshop.overtake()
+            return await asyncio.wait_for(answered, 30)
+        finally:
+            go.set()
+            workshop.close()
+
+    (frame,) = asyncio.run(asked())
+    assert b"overtaken" in frame
+
+
+def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
+    async def ended() -> None:
+        with listening("127.0.0.1", 0) as listener:
+            port, workshop = listener.getsockname()[1], Workshop()
+            access = Access.at("127.0.0.1", port)
+            app = application(access, {}, workshop)
+            config = uvicorn.Config(app, log_level="warning", ws="none", timeout_graceful_shutdown=0)
+            server = Server(config, workshop)
+            served = asyncio.create_task(server.serve([listener]))
+            while not server.started:
+                await asyncio.sleep(0.001)
+            _, writer = await asyncio.open_connection("127.0.0.1", port)
+            cookie = f"{access.cookie}={access.session}"
+            writer.write(f"POST /logs/a.csv HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nCookie: {cookie}\r\n".encode())
+            writer.write(b"Content-Length: 1000\r\n\r\n1,2\n")
+            while not server.server_state.tasks:
+                await asyncio.sleep(0.001)
+            server.should_exit = True
+            await served
+            writer.close()
+
+    asyncio.run(ended())
+    assert capsys.readouterr().err == ""
 
 
 def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:

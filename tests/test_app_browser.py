@@ -545,6 +545,63 @@ def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> Non
     page.wait_for_selector("[data-part=controller]")
 
 
+def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: Browsed) -> None:
+    page, asked = browsed.page, []
+    page.click("#tab-map")
+    page.wait_for_selector(".plot .heatmaplayer image")
+    page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 41)")
+    page.on("request", lambda request: asked.append(request.url))
+    height = page.evaluate("document.querySelector('.plot').layout.height")
+    page.set_viewport_size({"width": 400, "height": 900})
+    page.wait_for_function("height => document.querySelector('.plot').layout.height > height", arg=height)
+    note = "[...document.querySelectorAll('.plot .annotation')].find((one) => one.textContent.includes('swings at'))"
+    key = "document.querySelector('.plot g[class^=legend]').getBoundingClientRect().bottom"
+    page.wait_for_function(f"() => {note}.getBoundingClientRect().top >= {key}")
+    assert asked == []
+
+
+def test_out_gives_the_lines_of_the_picture_that_is_shown(browsed: Browsed) -> None:
+    """Of one that has no answer yet, and of logs, those of the answer above."""
+    page = browsed.page
+
+    def line() -> str:
+        page.click("#out")
+        text = page.inner_text("#dialog pre >> nth=0")
+        assert page.inner_text("#dialog button:has-text('ZIP')").split()[-2] == text.split()[1]
+        page.keyboard.press("Escape")
+        return text
+
+    page.wait_for_selector("#answer .rest .note")
+    assert line() == "friso simulate thesis_rig.toml"
+    page.click("#tab-bode")
+    page.wait_for_selector("#picture .main-svg")
+    assert line() == "friso bode thesis_rig.toml"
+    page.click("#tab-logs")
+    assert line() == "friso check thesis_rig.toml"
+    page.route("**/ask/boundary", lambda _: None)
+    page.click("#tab-boundary")
+    assert line() == "friso check thesis_rig.toml"
+    page.click("#tab-bode")
+    assert line() == "friso bode thesis_rig.toml"
+
+
+def test_what_takes_too_long_is_overtaken_without_being_asked_again(browsed: Browsed) -> None:
+    page, held = browsed.page, []
+    page.route("**/ask/cell", lambda route: route.continue_() if held else held.append(route))
+    sentence = page.evaluate(
+        """async () => {
+            const { Live } = await import('/wire.js');
+            const { sent } = await import('/state.js');
+            return new Promise((done) => {
+                const live = new Live('cell', 'test', 300, (answer) => done(answer.sentences[0]));
+                live.ask({ machine: sent(), options: {} });
+                live.ask({ machine: { ...sent(), changes: { "controller.crossover": "11 Hz" } }, options: {} });
+            });
+        }"""
+    )
+    assert sentence == friso.simulate(RIG, set={"controller.crossover": "11 Hz"}).sentences()[0]
+
+
 @pytest.mark.parametrize("width", [400, 900, 1600])
 def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
     """Pictures neither: they are drawn anew some time after the page has another width."""

@@ -34,7 +34,7 @@ from friso.quantities import percent
 from friso.views.check.figures import check_figures
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
-from friso.views.drawing.figure import GREY, Axis, Figure, Map, Panel, Series
+from friso.views.drawing.figure import GREY, Axis, Category, Figure, Map, Panel, Series
 from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
 from friso.views.drawing.thinning import BUCKETS, KEPT, thin
 
@@ -311,6 +311,21 @@ def test_legends_beside_each_other_stay_above_their_axes(columns: int, lines: in
     panel = Panel("model", Axis("x", ""), Axis("y", ""), series)
     layout = plotly_renderer.parts(Figure("f", "", "", (panel,) * columns, columns))["layout"]
     assert [layout[f"legend{name}"]["orientation"] for name in ("", "2")[:columns]] == [orientation] * columns
+
+
+def test_the_note_of_a_map_stands_below_all_rows_of_its_key() -> None:
+    """On a narrow page four entries take two rows; where there is neither title nor key, nothing is kept free above."""
+    categories = tuple(Category(f"a category {k}", GREY) for k in range(4))
+    codes = np.array([np.arange(4.0)] * 2)
+    nothing = np.full(codes.shape, np.nan)
+    field = Map(np.arange(4.0), np.arange(2.0), nothing, "", "", categories=categories, codes=codes)
+    figure = Figure("f", "", "", (Panel("", Axis("x", ""), Axis("y", ""), maps=(field,)),), note="a note")
+    narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
+    rows = [-layout["annotations"][0]["yshift"] // plotly_renderer.KEY_ROW for layout in (wide, narrow)]
+    assert rows == [1, 2]
+    assert narrow["height"] - wide["height"] == plotly_renderer.KEY_ROW
+    titled = plotly_renderer.parts(replace(figure, panels=(replace(figure.panels[0], title="A title"),)))["layout"]
+    assert titled["height"] - wide["height"] == plotly_renderer.TITLE
 
 
 def test_maps_stand_below_each_other_on_a_narrow_page() -> None:

@@ -5,19 +5,19 @@ from __future__ import annotations
 import io
 import json
 import zipfile
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from friso.axis import speaking_of
 from friso.leftovers import temporary_folder
-from friso.stage import Stage
 from friso.views.files import pictures
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
 
 
-def archive(answer: Answer, stage: Stage, stem: str) -> bytes:
-    """A ZIP file of the files of an answer, its figures in all forms, its document as JSON, and the stage file."""
+def archive(answer: Answer, more: Mapping[str, str]) -> bytes:
+    """A ZIP file of the files of an answer, its figures in all forms, its document as JSON, and more texts by name."""
     held = io.BytesIO()
     packing = zipfile.ZipFile(held, "w", zipfile.ZIP_DEFLATED)
     with temporary_folder("friso-app-") as folder, packing as file:
@@ -30,5 +30,6 @@ def archive(answer: Answer, stage: Stage, stem: str) -> bytes:
         for path in sorted(out.rglob("*")):
             file.write(path, path.relative_to(out))
         file.writestr(f"{answer.command}.json", json.dumps(answer.to_dict(), indent=1, allow_nan=False))
-        file.writestr(f"{stem}.toml", stage.to_toml())
+        for name, text in more.items():
+            file.writestr(name, text)
     return held.getvalue()

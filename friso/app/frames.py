@@ -26,16 +26,14 @@ def frame(value: Any) -> bytes:
     return struct.pack("<II", len(text), len(numbers)) + text + numbers
 
 
-def figure_on_page(figure: Figure, narrow: bool = False) -> dict[str, Any]:
-    """A figure as a page draws it: name, title, caption, and what plotly takes; on a narrow page, panels one below the
-    other."""
-    of_maps = any(panel.coloured for panel in figure.panels)
-    drawn = plotly_renderer.narrow_parts if narrow and not of_maps else plotly_renderer.parts
+def figure_on_page(figure: Figure) -> dict[str, Any]:
+    """A figure as a page draws it: name, title, caption, and what plotly takes, where there is room and on a narrow
+    page."""
     return {
         "name": figure.name,
         "title": figure.title,
         "caption": figure.caption,
-        **drawn(figure),
+        **plotly_renderer.parts_of_both(figure),
     }
 
 

@@ -32,7 +32,7 @@ def _ghosted(figure: Figure, other: Figure) -> Figure:
 
     def both(panel: Panel) -> Panel:
         ghost = ghosts.get(_subject(panel))
-        if ghost is None or panel.coloured or not ghost.series:
+        if ghost is None or not ghost.series:
             return panel
         lines = [replace(line, colour=GHOST, label="", width=1.0) for line in ghost.series]
         lines[-1] = replace(lines[-1], label="pinned")

@@ -2,34 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from friso.app.machine import Machine
 from friso.quantities import as_toml
 from friso.system import shell_word
 
 
-def command_line(command: str, machine: Machine, options: Mapping[str, Any]) -> str:
-    """The command, as the shell of this system takes it."""
-    sets = [("set", f"{key}={_bare(value)}") for key, value in _set(machine).items()]
-    words = ["friso", command, machine.name]
-    for name, value in [*sets, *options.items()]:
+def command_line(command: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
+    """A command with files and options by their names in Python, as the shell of this system takes it."""
+    words = ["friso", command, *files]
+    for name, value in _each(options):
         option = f"--{name.strip('_').replace('_', '-')}"
         words += [option] if value is True else [option, str(value)]
     return " ".join(map(shell_word, words))
 
 
-def python_line(function: str, machine: Machine, options: Mapping[str, Any]) -> str:
+def python_line(function: str, files: Sequence[str], options: Mapping[str, Any]) -> str:
     """The same in Python."""
-    changed = {"set": _set(machine)} if _set(machine) else {}
-    arguments = [repr(machine.name), *(f"{name}={value!r}" for name, value in {**changed, **options}.items())]
-    return f"friso.{function}({', '.join(arguments)})"
+    first = repr(files[0] if len(files) == 1 else [*files])
+    return f"friso.{function}({', '.join([first, *(f'{name}={value!r}' for name, value in options.items())])})"
 
 
-def _set(machine: Machine) -> dict[str, Any]:
-    """The keys to be set: none in the stage file that the page saves, which has them."""
-    return {} if machine.is_of_page else machine.changes
+def _each(options: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """The options of a command; of one that is given for several keys, each."""
+    for name, value in options.items():
+        if isinstance(value, Mapping):
+            yield from ((name, f"{key}={_bare(item)}") for key, item in value.items())
+        else:
+            yield name, value
 
 
 def _bare(value: Any) -> str:

@@ -51,6 +51,11 @@ class Machine:
         return self.made or None in self.changes.values()
 
     @property
+    def to_set(self) -> dict[str, Any]:
+        """The keys to be set in its file, as an option: none in the stage file that the page saves, which has them."""
+        return {"set": self.changes} if self.changes and not self.is_of_page else {}
+
+    @property
     def stage(self) -> Stage:
         """The stage. Raises StageError."""
         return _stage(self)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ from friso.views.drawing.figure import Figure
 
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
+    from friso.answers.identify import IdentifyAnswer
     from friso.answers.sweep import SweepAnswer
     from friso.app.work import Work
 
@@ -36,13 +37,12 @@ AnswerPart = dict[str, Any]
 
 @dataclass(frozen=True)
 class PageRequest:
-    """What a page asks about: the machine shown, the one that is `pinned` beside it or None, the options, and whether
-    figures are for a `narrow` page; and the files that were dropped on it."""
+    """What a page asks about: the machine shown, the one that is `pinned` beside it or None, and the options; and the
+    files that were dropped on it."""
 
     machine: Machine
     pinned: Machine | None
     options: Mapping[str, Any]
-    narrow: bool
     uploads: Uploads
 
     @classmethod
@@ -53,7 +53,7 @@ class PageRequest:
             raise InputError("options", type(options).__name__, "options by name")
         pinned = data.get("pinned")
         both = Machine.of(data.get("machine")), None if pinned is None else Machine.of(pinned)
-        return cls(*both, options, bool(data.get("narrow")), uploads)
+        return cls(*both, options, uploads)
 
     def chosen(self, *names: str) -> dict[str, Any]:
         """The options of these names that are given: texts, numbers, true or false. Raises InputError for others."""
@@ -63,17 +63,15 @@ class PageRequest:
         return {name: value for name, value in self.options.items() if value not in (None, "")}
 
 
-def parts_of(
-    asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any
-) -> AnswerPart:
+def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure: figure, **more: Any) -> AnswerPart:
     """An answer as a page shows it, each figure with what is shown `beside`."""
-    return {**figures_of(asked, answer, beside), **words_of(answer), **more}
+    return {**figures_of(answer, beside), **words_of(answer), **more}
 
 
-def figures_of(asked: PageRequest, answer: Answer, beside: Callable[[Figure], Figure]) -> AnswerPart:
+def figures_of(answer: Answer, beside: Callable[[Figure], Figure]) -> AnswerPart:
     """The figures of an answer, without words."""
     with speaking_of(answer.axis_kind):
-        figures = [figure_on_page(beside(figure), asked.narrow) for figure in answer.figures()]
+        figures = [figure_on_page(beside(figure)) for figure in answer.figures()]
     return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}
 
 
@@ -97,19 +95,19 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What the run does."""
     asked.chosen()
-    pinned = None if asked.pinned is None else _run(asked.pinned)
-    work.notes.clear()  # those on the pinned machine
-    yield parts_of(asked, friso.simulate(asked.machine.stage), ghosts_of(pinned), **_lines("simulate", asked))
+    ghosts = _ghosts(asked, work, _run)
+    yield parts_of(friso.simulate(asked.machine.stage), ghosts, **_lines("simulate", asked))
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What the run of a cell of a map does: its error alone."""
     asked.chosen()
+    ghosts = _ghosts(asked, work, _run)
     answer = friso.simulate(asked.machine.stage)
     with speaking_of(answer.axis_kind):
-        (figure,) = answer.figures()
+        (figure,) = map(ghosts, answer.figures())
         error = replace(figure, panels=tuple(panel for panel in figure.panels if panel.title == "Error"))
-        yield {"kind": "answer", "sentences": [*answer.sentences()], "figures": [figure_on_page(error, narrow=True)]}
+        yield {"kind": "answer", "sentences": [*answer.sentences()], "figures": [figure_on_page(error)]}
 
 
 def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -124,13 +122,12 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Does it hunt: every case, with its margin."""
-    options = asked.chosen("draws")
-    pinned = None if asked.pinned is None else _check(asked.pinned)
-    work.notes.clear()
+    options = asked.chosen(*OPTIONS["check"])
+    ghosts = _ghosts(asked, work, _check)
     answer = friso.check(asked.machine.stage, **options, progress=work.progress)
     cases = {name: case.verdict for name, case in answer.result.items()}
     more = {"cases": _labelled(asked.machine.stage, cases), **_lines("check", asked, options)}
-    yield parts_of(asked, answer, ghosts_of(pinned), **more)
+    yield parts_of(answer, ghosts, **more)
 
 
 def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -148,22 +145,29 @@ def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def _loops(asked: PageRequest, work: Work) -> tuple[Answer, AnswerPart]:
     asked.chosen()
-    pinned = None if asked.pinned is None else _bode(asked.pinned)
-    work.notes.clear()
+    ghosts = _ghosts(asked, work, _bode)
     answer = friso.bode(asked.machine.stage, progress=work.progress)
-    return answer, figures_of(asked, answer, ghosts_of(pinned))
+    return answer, figures_of(answer, ghosts)
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The leaf springs."""
     asked.chosen()
-    pinned = asked.pinned and asked.pinned.stage
-    ghost = friso.flexure(pinned) if pinned and pinned.flexure else None
+    ghost = _flexure(asked.pinned) if asked.pinned and asked.pinned.stage.flexure else None
     work.notes.clear()
     answer = friso.flexure(asked.machine.stage, progress=work.progress)
-    drawing = answer.files()["flexure_drawing.svg"]
-    yield parts_of(asked, answer, ghosts_of(ghost), drawing=drawing, **_lines("flexure", asked))
+    drawn = {"": answer, "pinned": ghost} if ghost else {"": answer}
+    drawings = [{"label": label, "svg": item.files()["flexure_drawing.svg"]} for label, item in drawn.items()]
+    yield parts_of(answer, ghosts_of(ghost), drawings=drawings, **_lines("flexure", asked))
 
+
+OPTIONS: Mapping[str, tuple[str, ...]] = {
+    "check": ("draws",),
+    "map": ("x", "y", "log", "metric", "edge"),
+    "boundary": ("x", "y", "log"),
+    "tune": ("within", "settle", "force_limit", "bandwidth_limit", "only", "keep"),
+}
+"""The options that a page may give a command."""
 
 COARSE_TO_FINE = (6, 21, 41)
 """Points along each axis of a map, one picture after the other."""
@@ -172,12 +176,11 @@ COARSE_TO_FINE = (6, 21, 41)
 def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """A map over two keys, coarse to fine, and last, if it is asked for, the edge of hunting over it; where the machine
     stands in it, and the pinned one."""
-    options = asked.chosen("x", "y", "log", "metric", "edge")
+    options = asked.chosen(*OPTIONS["map"])
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
     shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
-    stands = [("this machine", asked.machine.stage)]
-    stands += [("pinned", asked.pinned.stage)] if asked.pinned else []
+    stands = _stands(asked)
 
     def ranges(count: int) -> dict[str, Any]:
         return {name: f"{text}:{count}" for name, text in axes.items()}
@@ -191,7 +194,7 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges(count), **shown}, "sweep")}
-        return parts_of(asked, answer, drawn, **more)
+        return parts_of(answer, drawn, **more)
 
     *coarse, finest = COARSE_TO_FINE
     for count in coarse:
@@ -213,17 +216,35 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Where hunting ends, over one key or in the plane of two."""
-    options = asked.chosen("x", "y", "log")
+    options = asked.chosen(*OPTIONS["boundary"])
+    keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
+    lines = _lines("boundary", asked, options)
     answer = friso.boundary(asked.machine.stage, **options, progress=work.progress)
-    yield parts_of(asked, answer, **_lines("boundary", asked, options))
+
+    def part(ghosts: Callable[[Figure], Figure]) -> AnswerPart:
+        def drawn(figure: Figure) -> Figure:
+            return with_places(ghosts(figure), _stands(asked), keys) if len(keys) == 2 else ghosts(figure)
+
+        return parts_of(answer, drawn, **lines)
+
+    if asked.pinned is None:
+        yield part(ghosts_of(None))
+        return
+    yield {**part(ghosts_of(None)), "kind": "partly"}
+    try:
+        ghost = _boundary(asked.pinned, tuple(options.items()), _Reporting(work.progress))
+        yield part(ghosts_of(ghost))
+    except InputError as error:  # such as a stage that cannot hunt
+        whole = part(ghosts_of(None))
+        yield {**whole, "sentences": [*whole["sentences"], f"The pinned machine: {error}"]}
 
 
 def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: the ways, and the stage of each that works."""
-    options = asked.chosen("within", "settle", "force_limit", "bandwidth_limit", "only", "keep")
+    options = asked.chosen(*OPTIONS["tune"])
     answer = friso.tune(asked.machine.stage, **options, progress=work.progress)
     ways = [{"name": outcome.remedy.name, "toml": outcome.stage.to_toml()} for outcome in answer.working]
-    yield parts_of(asked, answer, ways=ways, **_lines("tune", asked, options))
+    yield parts_of(answer, ways=ways, **_lines("tune", asked, options))
 
 
 def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -231,7 +252,7 @@ def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     asked.chosen()
     answer = friso.design(asked.machine.stage, progress=work.progress)
     ways = [{"name": "design", "toml": answer.stage.to_toml()}]
-    yield parts_of(asked, answer, ways=ways, **_lines("design", asked))
+    yield parts_of(answer, ways=ways, **_lines("design", asked))
 
 
 def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -239,24 +260,28 @@ def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     files, assigned = _dropped(asked)
     answer = friso.logs(files, **assigned, progress=work.progress)
     channels = list(dict.fromkeys(channel.name for item in answer.result for channel in item.channels))
-    yield parts_of(asked, answer, channels=channels, roles=[*MAPPABLE])
+    yield parts_of(answer, channels=channels, roles=[*MAPPABLE], **_lines_of_logs("logs", asked))
 
 
 def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The machine that dropped logs show, with its uncertainties; with `assumed`, the one shown is what is known."""
-    files, assigned = _dropped(asked)
-    stage = asked.machine.stage if asked.options.get("assumed") is True else None
-    beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
-    answer = friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
+    answer = _identified(asked, work)
     stages = [] if answer.stage is None else [{"name": "identified", "toml": answer.stage.to_toml()}]
     if stages and answer.result.correlations.keys:
         work.notes.append(CORRELATED)
-    yield parts_of(asked, answer, ways=stages)
+    yield parts_of(answer, ways=stages, **_lines_of_logs("identify", asked))
+
+
+def _identified(asked: PageRequest, work: Work) -> IdentifyAnswer:
+    files, assigned = _dropped(asked)
+    stage = asked.machine.stage if asked.options.get("assumed") is True else None
+    beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
+    return friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
 
 
 CORRELATED = (
     "The correlations of the estimates are left out here, and of a machine that is taken over: "
-    "friso identify on the command line writes them beside its stage file."
+    "they stand in a file beside the stage file, which friso identify writes, as does the report under Out."
 )
 
 
@@ -296,26 +321,46 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
 QUICK = frozenset({"machine"})
 """The questions that compute nothing."""
 
-REPORTS: Mapping[str, Callable[..., Answer]] = {
-    "check.zip": friso.check,
-    "bode.zip": friso.bode,
-    "flexure.zip": friso.flexure,
-    "boundary.zip": friso.boundary,
-    "map.zip": friso.sweep,
+
+def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRequest, Work], Answer]:
+    """What answers a command about the machine shown."""
+
+    def answer(asked: PageRequest, work: Work) -> Answer:
+        options = asked.chosen(*OPTIONS.get(command, ()))
+        return function(asked.machine.stage, **options, progress=work.progress)
+
+    return answer
+
+
+def _mapped(asked: PageRequest, work: Work) -> Answer:
+    """The finest map; its edge is a boundary's."""
+    options = asked.chosen(*OPTIONS["map"])
+    options.pop("edge", None)
+    options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
+    return friso.sweep(asked.machine.stage, **options, progress=work.progress)
+
+
+COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
+    "simulate": _answered(friso.simulate, "simulate"),
+    "check": _answered(friso.check, "check"),
+    "bode": _answered(friso.bode, "bode"),
+    "flexure": _answered(friso.flexure, "flexure"),
+    "boundary": _answered(friso.boundary, "boundary"),
+    "map": _mapped,
+    "tune": _answered(friso.tune, "tune"),
+    "design": _answered(friso.design, "design"),
+    "identify": _identified,
 }
-"""The answers whose files are handed out: all that the command writes, and its document, in one archive."""
+"""The commands whose files are handed out: all that the command writes, and its document, in one archive."""
 
 
-def report(function: Callable[..., Answer], asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The files of an answer."""
-    options = asked.chosen("x", "y", "log", "metric", "edge")
-    options.pop("edge", None)  # the archive of a map holds the map
-    if function is friso.sweep:
-        options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
-    answer = function(asked.machine.stage, **options, progress=work.progress)
+def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
+    """The files of the answer of a command."""
+    answer = COMMANDS[command](asked, work)
     work.progress(0, 0, "drawing the figures")
-    stem = asked.machine.name.removesuffix(".toml")
-    held = archive(answer, asked.machine.stage, stem)
+    of_logs = command == "identify"  # its stage file is among what it writes
+    stem = "logs" if of_logs else asked.machine.name.removesuffix(".toml")
+    held = archive(answer, {} if of_logs else {f"{stem}.toml": asked.machine.stage.to_toml()})
     yield {"kind": "files", "name": f"{stem}_{answer.command}.zip", "base64": base64.b64encode(held).decode("ascii")}
 
 
@@ -323,9 +368,48 @@ def _lines(
     command: str, asked: PageRequest, options: Mapping[str, Any] | None = None, function: str = ""
 ) -> AnswerPart:
     chosen = {name: value for name, value in (options or {}).items() if value is not False}
-    line = python_line(function or command, asked.machine, chosen)
-    of = "the stage file saved here" if asked.machine.is_of_page else f"{asked.machine.name} as it was opened"
-    return {"command": command_line(command, asked.machine, chosen), "python": line, "of": of}
+    files, options = [asked.machine.name], {**asked.machine.to_set, **chosen}
+    return _both_lines(command, asked, files, options, _of(asked.machine), function)
+
+
+def _lines_of_logs(command: str, asked: PageRequest) -> AnswerPart:
+    """The lines of a question about logs; of the machine shown where it is what is known."""
+    paths, assigned = _dropped(asked)
+    options, of = {name: item for name, item in assigned.items() if item}, "the files dropped here"
+    if asked.options.get("assumed") is True and command == "identify":
+        options |= {"stage": asked.machine.name, **asked.machine.to_set}
+        of += f" and {_of(asked.machine)}"
+    return _both_lines(command, asked, [path.name for path in paths], options, of)
+
+
+def _both_lines(
+    command: str, asked: PageRequest, files: list[str], options: Mapping[str, Any], of: str, function: str = ""
+) -> AnswerPart:
+    """A command and its line of Python, what they are `of`, and what was asked, for its files."""
+    lines = {
+        "command": command_line(command, files, options),
+        "python": python_line(function or command, files, options),
+    }
+    return {**lines, "of": of, "asked": {"name": command, "options": dict(asked.options)}}
+
+
+def _of(machine: Machine) -> str:
+    return "the stage file saved here" if machine.is_of_page else f"{machine.name} as it was opened"
+
+
+def _ghosts(asked: PageRequest, work: Work, answer: Callable[[Machine], Answer]) -> Callable[[Figure], Figure]:
+    """What puts the lines of the pinned machine's answer behind those of a figure."""
+    if asked.pinned is None:
+        return ghosts_of(None)
+    pinned = answer(asked.pinned)
+    work.notes.clear()  # those on the pinned machine
+    return ghosts_of(pinned)
+
+
+def _stands(asked: PageRequest) -> list[tuple[str, Stage]]:
+    """The machines whose places a map shows."""
+    pinned = [("pinned", asked.pinned.stage)] if asked.pinned else []
+    return [("this machine", asked.machine.stage), *pinned]
 
 
 @lru_cache(8)
@@ -341,6 +425,23 @@ def _bode(which: Machine) -> Any:
 @lru_cache(2)
 def _check(which: Machine) -> Any:
     return friso.check(which.stage)
+
+
+@lru_cache(2)
+def _flexure(which: Machine) -> Any:
+    return friso.flexure(which.stage)
+
+
+@dataclass(frozen=True)
+class _Reporting:
+    """What takes progress: which one, is all the same to what is kept."""
+
+    progress: Callable[..., None] = field(compare=False)
+
+
+@lru_cache(4)
+def _boundary(which: Machine, options: tuple[tuple[str, Any], ...], reporting: _Reporting) -> Any:
+    return friso.boundary(which.stage, **dict(options), progress=reporting.progress)
 
 
 def _given(stage: Stage) -> str:

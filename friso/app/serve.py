@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import socket
@@ -54,13 +55,13 @@ def serve(stage: Path | None, host: str, port: int | None, insecure: bool, brows
     workshop = Workshop()
     app = application(access, begin, workshop)
     config = uvicorn.Config(app, log_level="warning", ws="none", lifespan="on", timeout_graceful_shutdown=GRACE)
-    server = _Server(config, workshop)
+    server = Server(config, workshop)
     server.run([listener])
     if server.ended_by:
         signal.raise_signal(server.ended_by)
 
 
-class _Server(uvicorn.Server):
+class Server(uvicorn.Server):
     """Ends the questions at work before it waits for their answers, and itself in good order for any signal, which is
     the command's own once the server has ended."""
 
@@ -87,8 +88,9 @@ class _Server(uvicorn.Server):
         self.should_exit = True
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """End what is asked, and then the connections."""
+        """End what is asked, and then the connections; a log that is still coming is cut off, which is no error."""
         self.workshop.overtake()
+        logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
         await super().shutdown(sockets)
 
 

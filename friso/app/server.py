@@ -16,7 +16,7 @@ from starlette.routing import Route
 from starlette.types import ASGIApp
 
 from friso.app.gate import Access, Gate
-from friso.app.questions import QUESTIONS, QUICK, REPORTS, PageRequest, report
+from friso.app.questions import COMMANDS, QUESTIONS, QUICK, PageRequest, report
 from friso.app.uploads import Uploads
 from friso.app.work import Workshop
 from friso.errors import InputError
@@ -36,7 +36,8 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
 
     async def ask(request: Request) -> Response:
         name = request.path_params["question"]
-        job = partial(report, REPORTS[name]) if name in REPORTS else QUESTIONS.get(name)
+        command = name.removesuffix(".zip")
+        job = partial(report, command) if name != command and command in COMMANDS else QUESTIONS.get(name)
         if job is None:
             return _refused(f"there is no question {name[:40]!r}", 404)
         try:

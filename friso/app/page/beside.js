@@ -26,9 +26,9 @@ export class Beside {
   show(changes) {
     clearTimeout(this.timer);
     this.timer = setTimeout(() => {
-      const { machine } = this.sent();
+      const { machine, pinned } = this.sent();
       const label = Object.entries(changes).map(([path, value]) => `${words(path)} ${short(value)}`).join(", ");
-      this.live.ask({ machine: { ...machine, changes: { ...machine.changes, ...changes } }, pinned: null, options: {}, narrow: true }, label);
+      this.live.ask({ machine: { ...machine, changes: { ...machine.changes, ...changes } }, pinned, options: {} }, label);
     }, AFTER);
   }
 

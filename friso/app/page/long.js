@@ -34,6 +34,6 @@ export async function shownAnswer(place, lane, question, body, tell) {
     ...paragraphs(answer.details),
   );
   draw(plots, answer.figures);
-  if (JSON.stringify(body().machine) === JSON.stringify(asked.machine)) tell.shown(answer);
+  if (JSON.stringify(body().machine) === JSON.stringify(asked.machine)) tell.shown(answer, lane);
   return answer;
 }

@@ -13,7 +13,7 @@ const CHECKED_AFTER = 500;
 let shown = null; // the machine as the server describes it
 let chosen = "controller";
 let wrong = null;
-let answer = null;
+let given = new Map(); // the answers about this machine, by the tabs of their pictures
 let timer = 0;
 let held = "";
 let begun = false;
@@ -28,7 +28,7 @@ const pictures = new Pictures(sent, {
   set: (values) => set(values),
   worded: withUnits,
   progress: answers.progress,
-  shown: (part) => (answer = part),
+  shown: (part, tab) => given.set(tab, part),
   take: (name, toml) => machines.add(`${name.replaceAll(/\W+/g, "_")}.toml`, toml, true),
   check,
 });
@@ -60,7 +60,7 @@ function changed(dragged) {
   if (!machine) return;
   clearTimeout(timer);
   end("check");
-  answer = null;
+  given = new Map();
   answers.progress(null);
   if (shown && drawn.machine !== machine) {
     answers.earlier();
@@ -141,7 +141,7 @@ async function check() {
   if (part.kind !== "answer") return answers.refused(part.text);
   verdict.stop();
   answers.whole(part);
-  answer ??= part;
+  given.set("check", part);
   pictures.checked(part);
 }
 
@@ -226,7 +226,7 @@ function wire() {
   $("open").addEventListener("click", () => $("file").click());
   $("file").addEventListener("change", () => opened([...$("file").files]));
   $("tour").addEventListener("click", () => tour());
-  $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer, link: machines.link, files: report }));
+  $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer: given.get(pictures.shown) ?? given.get("check"), link: machines.link, files: report }));
   document.addEventListener("keydown", (event) => {
     if (event.target.matches?.("input[type=text], textarea, select")) return;
     if ($("dialog").open) return;
@@ -253,11 +253,9 @@ function wire() {
   machines.onChange(changed);
 }
 
-/** Ask for what the command would write, and save it; resolves to what to say. */
-async function report(part) {
-  const question = ["bode", "map", "boundary", "flexure"].includes(pictures.shown) ? pictures.shown : "check";
-  const options = pictures.form ? pictures.form() : {};
-  const made = await ask(`${question}.zip`, { ...pictures.body(options), ...sent() }, "report", part);
+/** Ask for what a command would write, and save it; resolves to what to say. */
+async function report({ name, options }, part) {
+  const made = await ask(`${name}.zip`, { ...sent(), options }, "report", part);
   if (!made || made.kind !== "files") return made?.text;
   save(made.name, Uint8Array.from(atob(made.base64), (letter) => letter.charCodeAt(0)), "application/zip");
   return "Saved.";

@@ -20,10 +20,11 @@ export function out({ machine, answer, link, files }) {
   const stage = el("button", { type: "button", onclick: () => save(`${name}.toml`, machine.toml, "application/toml") }, "Stage file");
   const share = el("button", { type: "button" }, "Link that holds the machine");
   share.addEventListener("click", async () => copied(await link()));
-  const report = el("button", { type: "button" }, "Report, figures and data (ZIP)");
+  const asked = answer?.asked ?? { name: "check", options: {} };
+  const report = el("button", { type: "button" }, `Report, figures and data of friso ${asked.name} (ZIP)`);
   report.addEventListener("click", async () => {
     status.textContent = "The report is being made …";
-    const made = await files((part) => (status.textContent = plain(part.label ?? part.text ?? "")));
+    const made = await files(asked, (part) => (status.textContent = plain(part.label ?? part.text ?? "")));
     status.textContent = plain(made ?? "");
   });
   const lines = answer?.command ? [el("h3", {}, `The same on the command line, of ${answer.of}`), el("pre", {}, answer.command), copy(answer.command), el("h3", {}, "and in Python"), el("pre", {}, answer.python), copy(answer.python)] : [];

@@ -9,7 +9,6 @@ import { ask, Live } from "./wire.js";
 import { paragraphs, table } from "./tables.js";
 
 const AT_REST = 250;
-const NARROW = 640;
 
 export class Pictures {
   /** `sent` gives what is asked about, `tell` what is done with answers. */
@@ -29,9 +28,6 @@ export class Pictures {
     ];
     this.beside = new Beside(sent);
     this.own = { remedies: new Remedies(sent, tell), logs: new Logs(sent, tell) };
-    window.addEventListener("resize", () => {
-      if (this.narrow !== this.was) this.ask();
-    });
   }
 
   /** What answers a question again and again while a slider moves. */
@@ -46,13 +42,8 @@ export class Pictures {
     return this.machine?.tables.some((item) => item.name === name && item.present);
   }
 
-  get narrow() {
-    return $("picture").clientWidth < NARROW;
-  }
-
   body(options = {}) {
-    this.was = this.narrow;
-    return { ...this.sent(), options, narrow: this.narrow };
+    return { ...this.sent(), options };
   }
 
   bar() {
@@ -170,14 +161,15 @@ export class Pictures {
     this.answer = answer;
     if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) });
     const words = this.shown === "check" ? [] : answer.sentences;
-    const drawn = answer.drawing ? [this.drawn(answer.drawing)] : [];
+    const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
     this.below.replaceChildren(...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
-    this.tell.shown(answer);
+    this.tell.shown(answer, this.shown);
   }
 
-  drawn(markup) {
-    const address = URL.createObjectURL(new Blob([markup], { type: "image/svg+xml" }));
-    return el("div", { class: "drawn" }, el("img", { src: address, alt: "The leaf springs, to scale" }));
+  drawn({ label, svg }) {
+    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+    const of = label ? `: ${label}` : "";
+    return el("figure", { class: "drawn" }, el("img", { src: address, alt: `The leaf springs, to scale${of}` }), label ? el("figcaption", {}, label) : null);
   }
 
   // ---------------------------------------------------------------- maps

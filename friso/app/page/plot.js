@@ -4,6 +4,7 @@ import { el, plain } from "./dom.js";
 const dark = matchMedia("(prefers-color-scheme: dark)");
 /** Colours of the figures that a dark page shows otherwise. */
 const DARK = { "#222222": "#e6e7e9", "#e3e3e3": "#2f3338", "#767676": "#9aa0a6", "#0072B2": "#56B4E9", "#c9c9c9": "#5a5f66", "#a9a9a9": "#777d84" };
+const NARROW = 640;
 const CONFIG = { displaylogo: false, responsive: true, modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]], showSendToCloud: false, plotlyServerURL: "" };
 
 function themed(value) {
@@ -36,12 +37,25 @@ export function draw(place, figures, tell = {}) {
   }
 }
 
+const narrow = (place) => place.parentElement.clientWidth < NARROW;
+
+/** The traces on a narrow page: their colour bars stand elsewhere. */
+function withBars({ data, bars }) {
+  const moved = (holder, bar) => ({ ...holder, colorbar: { ...holder.colorbar, ...bar } });
+  return data.map((trace, k) => {
+    if (!bars[k]) return trace;
+    return trace.colorbar ? moved(trace, bars[k]) : { ...trace, marker: moved(trace.marker, bars[k]) };
+  });
+}
+
 function plot(place, figure, tell) {
-  const layout = { ...figure.layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", uirevision: figure.name, autosize: true };
+  place.narrow = narrow(place);
+  const given = place.narrow ? { data: withBars(figure), layout: figure.narrow } : figure;
+  const layout = { ...given.layout, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", uirevision: figure.name, autosize: true };
   const fresh = !place.data;
   place.figure = figure;
   place.style.height = `${layout.height}px`;
-  const [data, shown] = dark.matches ? [themed(figure.data), themed(layout)] : [figure.data, layout];
+  const [data, shown] = dark.matches ? [themed(given.data), themed(layout)] : [given.data, layout];
   Plotly.react(place, data, shown, CONFIG);
   if (!fresh) return;
   if (tell.clicked) place.on("plotly_click", (event) => tell.clicked(event.points[0]));
@@ -63,6 +77,10 @@ export function clear(place) {
 /** What is shown is of an earlier machine. */
 export const stale = (place) => place.querySelectorAll(".figure").forEach((box) => box.classList.add("stale"));
 
-dark.addEventListener("change", () => {
-  for (const place of document.querySelectorAll(".plot")) if (place.figure) plot(place, place.figure, {});
-});
+/** Those plots again that are drawn otherwise by now. */
+function again(isOther) {
+  for (const place of document.querySelectorAll(".plot")) if (place.figure && isOther(place)) plot(place, place.figure, {});
+}
+
+dark.addEventListener("change", () => again(() => true));
+window.addEventListener("resize", () => again((place) => place.narrow !== narrow(place)));

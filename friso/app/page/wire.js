@@ -145,16 +145,19 @@ async function look() {
  */
 export class Live {
   constructor(question, lane, patience, done) {
-    Object.assign(this, { question, lane, patience, done, busy: false, next: null, begun: 0 });
+    Object.assign(this, { question, lane, patience, done, busy: false, next: null, begun: 0, timer: 0 });
   }
 
   ask(body, tag) {
     this.next = { body, tag };
-    if (this.busy && performance.now() - this.begun < this.patience) return;
-    this.go();
+    const left = this.busy ? this.begun + this.patience - performance.now() : 0;
+    if (left <= 0) return this.go();
+    clearTimeout(this.timer);
+    this.timer = setTimeout(() => this.go(), left);
   }
 
   async go() {
+    clearTimeout(this.timer);
     const { body, tag } = this.next;
     this.next = null;
     this.busy = true;
@@ -167,6 +170,7 @@ export class Live {
   }
 
   stop() {
+    clearTimeout(this.timer);
     this.next = null;
     end(this.lane);
   }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+import math
 import textwrap
 from collections.abc import Sequence
 from typing import Any
@@ -15,7 +16,8 @@ from friso.views.drawing.figure import GREY, INK, Array, Axis, Coloured, Figure,
 
 BAR = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
 LINE = 17  # [px] one line of the note
-KEY = 30  # [px] the legend
+KEY_ROW, KEY_SPACE = 19, 11  # [px] a row of a legend, and what lies about the one beneath a figure
+KEY_LETTER, KEY_MARK = 6.6, 45  # [px] one letter of a legend, and the sign of an entry
 _LETTER = 6.1  # [px] of the note
 
 DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
@@ -114,6 +116,12 @@ def key_traces(figure: Figure, legend: str) -> list[dict[str, Any]]:
     return [{**unseen, "name": html.escape(label), **style} for label, style in styles]
 
 
+def key_rows(labels: Sequence[str], width: int) -> int:
+    """Rows of a legend of these entries that is so wide [px]: they stand in columns as wide as the longest."""
+    entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
+    return math.ceil(len(labels) / max(1, int(width / entry)))
+
+
 def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
     """Height [px] of the area below the panels, its legend by name, and the note, broken at a width [px], as
     annotations."""
@@ -123,9 +131,11 @@ def footer(figure: Figure, legend: str, width: int) -> tuple[int, dict[str, Any]
     text = "<br>".join(html.escape(line) for line in lines)
     font = {"size": 11, "color": INK}
     annotations = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
-    if not any((*colour_key(figure), line_key(figure))):
+    labels = [item.label for items in (*colour_key(figure), line_key(figure)) for item in items]
+    if not labels:
         return note, {}, annotations
+    key = KEY_SPACE + KEY_ROW * key_rows(labels, width)
     for annotation in annotations:
-        annotation["yshift"] = -KEY
+        annotation["yshift"] = -key
     style = {"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "itemclick": False}
-    return note + KEY, {legend: style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations
+    return note + key, {legend: style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations

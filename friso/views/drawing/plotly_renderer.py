@@ -22,11 +22,21 @@ from plotly.offline import get_plotlyjs
 from friso.views.drawing.drawable import drawable, word_ticks
 from friso.views.drawing.figure import GREY, INK, Axis, Band, Figure, Markers, Panel, Series
 from friso.views.drawing.packing import packed, packed_json
-from friso.views.drawing.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
+from friso.views.drawing.plotly_maps import (
+    BAR,
+    DASHES,
+    KEY_ROW,
+    SYMBOLS,
+    bar_panels,
+    coloured_traces,
+    footer,
+    key_rows,
+    key_traces,
+)
 
 WIDE, NARROW = 540, 290  # [px] for all columns of axes: the least of a wide page, and of a telephone
-TITLE, KEY_ROW, SPACE = 17, 19, 18  # [px] a line of the title, a row of the legend, and what lies about them
-TITLE_LETTER, KEY_LETTER, KEY_MARK = 7.6, 6.6, 45  # [px] one letter of each, and the sign of a legend's entry
+TITLE, SPACE = 17, 18  # [px] a line of the title, and what lies about it and the legend
+TITLE_LETTER = 7.6  # [px] one letter of it
 PLOT = 230  # [px] height of the axes
 MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: both axes matter equally
 EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
@@ -54,13 +64,20 @@ def script() -> str:
 def fragment(figure: Figure) -> str:
     """The figure as an HTML element of its height, and beside it, packed, what plotly draws into it, and the layout on
     a narrow screen with the places of the colour bars there."""
-    drawn, narrow = render(figure), _checked(narrow_parts(figure)).to_plotly_json()
-    parts = {**_single(drawn.to_plotly_json()), "config": _CONFIG, "narrow": _single(narrow["layout"])}
-    parts["bars"] = [_bar(trace) for trace in narrow["data"]]
+    drawn = _on_both(render(figure).to_plotly_json(), _checked(narrow_parts(figure)).to_plotly_json())
     return (
-        f'<div id="figure-{figure.name}" style="height: {drawn.layout.height}px"></div>\n'
-        f'<script type="application/gzip" class="figure">{packed_json(parts)}</script>'
+        f'<div id="figure-{figure.name}" style="height: {drawn["layout"]["height"]}px"></div>\n'
+        f'<script type="application/gzip" class="figure">{packed_json({**_single(drawn), "config": _CONFIG})}</script>'
     )
+
+
+def parts_of_both(figure: Figure) -> dict[str, Any]:
+    """`parts`, and beside them what is otherwise on a narrow screen: the layout, and the places of the colour bars."""
+    return _on_both(parts(figure), narrow_parts(figure))
+
+
+def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
+    return {**wide, "narrow": narrow["layout"], "bars": [_bar(trace) for trace in narrow["data"]]}
 
 
 def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
@@ -150,11 +167,10 @@ class _Head:
         as the longest. Plotly breaks a row at the width of the figure alone, so beside other panels entries of more
         than a row are stacked."""
         labels, own = _labels(panel), width // panels
-        entry = KEY_MARK + KEY_LETTER * max(map(len, labels), default=0)
-        columns = max(1, int(own / entry))
-        stacked = panels > 1 and len(labels) > columns
-        lines = textwrap.wrap(panel.title, int(own / TITLE_LETTER)) or [""]
-        return cls(tuple(lines), max(1, len(labels) if stacked else math.ceil(len(labels) / columns)), stacked)
+        rows = key_rows(labels, own)
+        stacked = panels > 1 and rows > 1
+        lines = textwrap.wrap(panel.title, int(own / TITLE_LETTER))
+        return cls(tuple(lines), len(labels) if stacked else rows, stacked)
 
     @property
     def height(self) -> int:
