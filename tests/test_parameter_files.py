@@ -133,6 +133,19 @@ def test_torque_mode_there_and_back(tmp_path: Path, unit: str, joint: str, force
     assert back["MAX_ERROR_I"] == pytest.approx(0.01)
 
 
+def test_a_variable_that_stands_twice_counts_once_and_is_named(tmp_path: Path) -> None:
+    """As in LinuxCNC, the first; and comments may be in Latin-1."""
+    path = ini(tmp_path, {"P": 50, "I": 100})
+    answers = {**MACHINE, "force_per_output": "20 N"}
+    expected = stage_from(path, None, answers)
+    twice = "P = 1\nP = 2\n" + path.read_text().replace("[JOINT_0]", "# für die Achse, in µm\n[JOINT_0]")
+    path.write_bytes(f"{twice}\nP = 60\nI = 100\n".encode("latin-1"))
+    stage = stage_from(path, None, answers)
+    assert stage.stage.flat() == expected.stage.flat()
+    (repeated,) = {*stage.left_out} - {*expected.left_out}
+    assert " of P, " in repeated
+
+
 @pytest.mark.parametrize(
     ("usual", "written", "times"),
     [

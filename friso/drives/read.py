@@ -54,7 +54,7 @@ def read(path: Path) -> tuple[ParameterFormat, tuple[AxisParameters, ...]]:
     """The kind of a parameter file, and its axes that have gains. Raises InputError."""
     titles = ", ".join(FORMATS[name].title for name in FORMATS)
     expected = f"a parameter file: {titles}"
-    text = text_of(path, expected, "friso init stage.toml --from machine.ini")
+    text = text_of(path, expected, "friso init stage.toml --from machine.ini", latin=True)
     for name in FORMATS:
         kind = FORMATS[name]
         if kind.recognises(path.name, text):

@@ -154,11 +154,13 @@ def _value(text: str) -> Any:
     return document["line"]["value"] if is_one_value else text
 
 
-def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
-    """What stands in a text file, which is to be what is `expected`. Raises InputError, also for a device, for a pipe
-    and for more than MOST_BYTES."""
+def text_of(path: Path, expected: str, example: str = _EXAMPLE, latin: bool = False) -> str:
+    """What stands in a text file, which is to be what is `expected`; where it may be Latin-1 (`latin`), as older
+    programs write it, that is read too. Raises InputError, also for a device, for a pipe and for more than MOST_BYTES.
+    """
     try:
-        return content_of(path, MOST_BYTES).decode("utf-8-sig")
+        content = content_of(path, MOST_BYTES)
+        return _utf_8_or_latin(content) if latin and not _NO_TEXT.search(content) else content.decode("utf-8-sig")
     except LargeFileError as error:
         most = f"of at most {MOST_BYTES / 1e6:g} MB"
         raise InputError("", str(error), f"{expected}, {most}", example, str(path)) from None
@@ -169,6 +171,17 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
     except (OSError, ValueError) as error:
         text = "a folder" if os.path.isdir(path) else _reason(error)
         raise InputError("", text, expected, example, str(path)) from None
+
+
+_NO_TEXT = re.compile(rb"[\x00-\x08\x0e-\x19\x80-\x9f]")
+"""What no text in Latin-1 has, as UTF-16 and data have."""
+
+
+def _utf_8_or_latin(content: bytes) -> str:
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("latin-1")
 
 
 def _reason(error: OSError | ValueError) -> str:

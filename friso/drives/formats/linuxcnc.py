@@ -69,6 +69,8 @@ _INCLUDE = re.compile(r"^#INCLUDE[ \t]+(\S{1,200})", re.MULTILINE)
 """A line that takes in another file."""
 
 INCLUDED = "#INCLUDE"
+REPEATED = "#REPEATED"
+"""Names of an entry of `AxisParameters.machine` that no variable has, as these begin comments."""
 
 HELD = frozenset(
     {
@@ -102,7 +104,11 @@ def axes(text: str) -> tuple[AxisParameters, ...]:
         INCLUDED: ", ".join(included) or None,
     }
     with_gains = [
-        AxisParameters(f"[{name}]", values, {key: value for key, value in machine.items() if value is not None})
+        AxisParameters(
+            f"[{name}]",
+            {key: value for key, value in values.items() if key != REPEATED},
+            {key: value for key, value in {**machine, REPEATED: values.get(REPEATED)}.items() if value is not None},
+        )
         for name, values in sections.items()
         if re.fullmatch(_AXIS, name) and "P" in values
     ]
@@ -126,9 +132,12 @@ def _letter(name: str, letters: str, counts: Mapping[str, int]) -> str:
 
 
 def _sections(text: str) -> dict[str, dict[str, str]]:
-    """Variables by section, the first of a name, as LinuxCNC takes them. Raises InputError."""
+    """Variables by section, the first of a name, as LinuxCNC takes them; the names of those that others with another
+    value follow are that of REPEATED. Raises InputError."""
     sections: dict[str, dict[str, str]] = {}
     section: dict[str, str] = {}
+    repeated: dict[tuple[str, str], None] = {}
+    title = ""
     lines = text.splitlines()
     if len(lines) > MOST_LINES:
         raise InputError("", f"{len(lines)} lines", f"at most {MOST_LINES}")
@@ -136,11 +145,16 @@ def _sections(text: str) -> dict[str, dict[str, str]]:
         if not line or line[0] in "#;":
             continue
         if line.startswith("["):
-            section = sections.setdefault(line[1:].partition("]")[0].strip(), {})
+            title = line[1:].partition("]")[0].strip()
+            section = sections.setdefault(title, {})
             continue
         key, equals, value = line.partition("=")
         if equals:
-            section.setdefault(key.strip(), _COMMENT.split(value, maxsplit=1)[0].strip())
+            name, text = key.strip(), _COMMENT.split(value, maxsplit=1)[0].strip()
+            if section.setdefault(name, text) != text and title in sections:
+                repeated[title, name] = None
+    for title, name in repeated:
+        sections[title][REPEATED] = f"{sections[title][REPEATED]}, {name}" if REPEATED in sections[title] else name
     return sections
 
 
@@ -185,6 +199,8 @@ def stage(axis: AxisParameters, answers: UserAnswers) -> AsStage:
         left.append(f"OUTPUT_SCALE = {axis.number(OUTPUT_SCALE):g}: an output of 1 is that of pid, before this scale")
     if strange := [name for name in axis.values if not DOCUMENTED.fullmatch(name)]:
         left.append(f"{', '.join(strange)}: names that LinuxCNC's manual does not have")
+    if REPEATED in axis.machine:
+        left.append(f"the later values of {axis.machine[REPEATED]}, which stand more than once: the first counts")
     if INCLUDED in axis.machine:
         left.append(f"what #INCLUDE names: {axis.machine[INCLUDED]}")
     in_torque = FORCE in answers
