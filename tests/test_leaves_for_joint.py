@@ -1,6 +1,8 @@
 """The leaf springs that make a joint: its stiffness, what they bear, and that none interfere at a higher frequency."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,10 +16,10 @@ from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.remedies.goal import Goal
-from friso.remedies.method import Advice, tune
+from friso.remedies.method import Advice, Unmade, tune
 from friso.remedies.search import Budget
 from friso.views.tune.page import stage_files
-from friso.views.tune.words import answer
+from friso.views.tune.words import DOUBTS, UNMADE, answer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = load(EXAMPLES / "thesis_rig.toml")
@@ -101,3 +103,22 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
         "friso design tuned/tuned-isolator.toml",
         "friso flexure tuned/tuned-isolator-of-leaf-springs.toml",
     ]
+
+
+@pytest.mark.parametrize("why", get_args(Unmade))
+def test_why_no_leaves_were_sized_is_said(tuning: Advice, why: Unmade) -> None:
+    (isolator, _) = tuning.outcomes
+    without = replace(tuning, outcomes=(isolator,), unmade={isolator.remedy.name: why})
+    (sentence,) = (line for line in answer(without) if "leaf springs" in line)
+    assert UNMADE[why] in sentence
+
+
+def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) -> None:
+    isolator, made = tuning.outcomes
+    doubted = replace(tuning, outcomes=(isolator, replace(made, doubts=("distance",))))
+    (sentence,) = (line for line in answer(doubted) if line.startswith("Leaf springs"))
+    assert DOUBTS["distance"] in sentence
+    names = [name for name in stage_files(doubted) if "leaf-springs" in name]
+    assert all("not-sure" in name for name in names)
+    paths = [Path("tuned") / name for name in stage_files(doubted)]
+    assert TuneAnswer(doubted).next_steps(paths) == ["friso design tuned/tuned-isolator.toml"]
