@@ -28,7 +28,8 @@ def case(
 ) -> Any:
     """As much of a case as the verdicts across laws look at."""
     cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
-    margin = None if edge is None else SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain)
+    quiet = None if edge is None else edge / (4 if edge_certain else 3)
+    margin = edge and SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet)
     hunting = SimpleNamespace(certain=certain, target=cycle)
     judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)
     return SimpleNamespace(verdict=verdict, judgement=judgement)
@@ -152,10 +153,20 @@ def test_edges_that_were_given_up_are_not_told_as_absent(wording: Wording) -> No
     wording(laws_sentences(none)[0])
 
 
+def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
+    laws = across(under("lugre", ("settles", 8.0)), under("gms", ("settles", 8.001), ("settles", 8.1)))
+    for trial in (trial for verdict in laws.verdicts for trial in verdict.trials):
+        trial.cases["given"].judgement.margin.crossover = None
+    gains = replace(laws, stage=PD)
+    assert dict(laws_rows(gains))["As given: edge"] == ["at 2 times the bandwidth", "at 2 to 2.02 times the bandwidth"]
+    several = replace(gains.verdicts[1], trials=gains.verdicts[1].trials[:1])
+    assert "edge at 2 times the bandwidth." in laws_sentences(replace(gains, verdicts=(laws.verdicts[0], several)))[0]
+
+
 def test_an_edge_that_is_not_certain_says_so(wording: Wording) -> None:
     laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0, True, False)))
     wording(laws_sentences(laws)[0])
-    assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 Hz (not certain)"]
+    assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 to 9.33 Hz (not certain)"]
     trial = laws_document(laws)["cases"]["given"]["laws"]["gms"]["trials"][0]
     assert not trial["edge_certain"]
 

@@ -19,11 +19,18 @@ ATTRACTED = ("hunts", "bistable")
 
 @dataclass(frozen=True)
 class Edge:
-    """The edge of hunting as a factor of the stage's bandwidth, whether it is sure, and up to what share of it."""
+    """The edge of hunting as a factor of the stage's bandwidth, whether it is sure, and up to what share of it; one
+    that is not sure lies between that factor, up to which hunting was found, and `quiet`, at which none was found."""
 
     factor: float
     sure: bool
     reserve: float
+    quiet: float
+
+    @property
+    def beyond(self) -> float:
+        """The factor above which nothing may attract, for all that is said."""
+        return self.factor * (1 + self.reserve) if self.sure else self.quiet
 
 
 @dataclass(frozen=True)
@@ -80,7 +87,8 @@ def checked(stage: Stage) -> Checked:
 def _claim(name: str, case: Case) -> Claim:
     said = case.judgement
     sure = said.hunting.certain and case.verdict != "failed"
-    edge = Edge(said.margin.factor, sure and said.margin.certain, said.margin.reserve) if said.margin else None
+    end = said.margin
+    edge = end and Edge(end.factor, sure and end.certain, end.reserve, end.quiet)
     windows = said.displacement.windows if said.displacement else ()
     kicks = tuple((low * high) ** 0.5 for low, high in windows)
     return Claim(name, case.stage, case.verdict, sure, edge, kicks, said.hunting.surveyed, _doubts(case, sure, edge))

@@ -168,7 +168,7 @@ def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
     """Whether nothing attracts on the far side of the edge, and something on the near side."""
     assert claim.edge
-    edge, nearest = claim.edge.factor, 1 + claim.edge.reserve
+    edge, nearest = claim.edge.factor, claim.edge.beyond / claim.edge.factor
     benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
     swings = _swings(benches[0], seed)
     beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], edge**-0.5) if edge * factor < 1]

@@ -91,10 +91,14 @@ class LawVerdict:
 
     def edges(self, case: str) -> tuple[float, float] | None:
         """Lowest and highest edge of hunting [Hz], or in factors of the bandwidth where there is no crossover, in a
-        case; None without any."""
-        margins = [trial.cases[case].judgement.margin for trial in self.trials]
-        edges = [edge.factor if edge.crossover is None else edge.crossover for edge in margins if edge]
-        return (min(edges), max(edges)) if edges else None
+        case; None without any. One that is not certain reaches up to where none was found."""
+        margins = [margin for trial in self.trials if (margin := trial.cases[case].judgement.margin)]
+        units = [1.0 if edge.crossover is None else edge.crossover / edge.factor for edge in margins]
+        lowest = [edge.factor * unit for edge, unit in zip(margins, units, strict=True)]
+        highest = [
+            (edge.factor if edge.certain else edge.quiet) * unit for edge, unit in zip(margins, units, strict=True)
+        ]
+        return (min(lowest), max(highest)) if margins else None
 
     def edges_certain(self, case: str) -> bool:
         """Whether the edges of hunting that were found in a case are certain."""

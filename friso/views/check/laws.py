@@ -138,7 +138,8 @@ def _span(laws: VerdictsByLaw, ends: tuple[float, float]) -> str:
     low, high = ends
     if laws.in_hertz:
         return range_with_unit(low, high, "Hz")
-    return f"at {low:.3g}" + ("" if high - low < SAME * high else f" to {high:.3g}") + " times the bandwidth"
+    first, last = f"{low:.3g}", f"{high:.3g}"
+    return f"at {first}{'' if first == last else f' to {last}'} times the bandwidth"
 
 
 def laws_columns(laws: VerdictsByLaw) -> list[str]:
