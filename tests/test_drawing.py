@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import io
 import json
 import os
@@ -258,6 +259,18 @@ def test_a_page_shows_the_drawing_of_the_file():
     (height, top, seen), (whole, above, _) = (tuple(map(float, window.search(svg).groups())) for svg in (shown, filed))
     assert (top, above) == (pytest.approx(72 * matplotlib_renderer.HEADER_HEIGHT), 0)
     assert height == seen == pytest.approx(whole - top)
+
+
+def test_a_page_carries_what_plotly_draws_in_four_bytes_a_number():
+    """The first bytes of all numbers of an array stand first, as `page.js` reads them."""
+    figure = small_figure()
+    carried = packed_values(plotly_renderer.fragment(figure))[0]["data"]
+    for trace, part in zip(plotly_renderer.render(figure).data, carried, strict=True):
+        for name in {"x", "y", *(("z",) if trace.type == "heatmap" else ())}:
+            planes = np.frombuffer(base64.b64decode(part[name]["planes"]), np.uint8)
+            numbers = planes.reshape(4, -1).T.copy().view("<f4")
+            shape = [int(size) for size in part[name]["shape"].split(",") if size] or -1
+            assert np.array_equal(numbers.reshape(shape), np.asarray(trace[name], "<f4"), equal_nan=True)
 
 
 def test_fonts_of_a_pdf_hold_letters_alone():

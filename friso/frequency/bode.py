@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
+from friso.engine.side_by_side import side_by_side
 from friso.errors import InputError
 from friso.frequency.cascaded import CascadeLoops, cascade_loops, is_cascade
 from friso.frequency.crossover import Limits, limits
@@ -111,7 +112,8 @@ class Bode:
     @cached_property
     def limits(self) -> Mapping[str, Limits]:
         """How fast the controller may be, by joint: "locked" and "free", or "given" without one."""
-        return {name: limits(flat) for name, flat in _by_joint(self.stage).items()}
+        stages = _by_joint(self.stage)
+        return dict(zip(stages, side_by_side([partial(limits, flat) for flat in stages.values()]), strict=True))
 
     def _with_margins(self, number: int) -> tuple[Members, Margins]:
         member = self.scan.members[number]

@@ -87,10 +87,12 @@ def _bar(trace: dict[str, Any]) -> dict[str, Any] | None:
 
 
 def _single(part: Any) -> Any:
-    """Arrays with the precision of a screen: half as long as those with the engine's. What is not finite is null."""
+    """Arrays with the precision of a screen: half as long as those with the engine's, and the first bytes of all their
+    numbers before the second, which packs better (`page.js` puts them together). What is not finite is null."""
     if isinstance(part, dict) and part.get("dtype") == "f8":
         numbers = np.frombuffer(base64.b64decode(part["bdata"]), "<f8").astype("<f4")
-        return {**part, "dtype": "f4", "bdata": base64.b64encode(numbers.tobytes()).decode("ascii")}
+        planes = base64.b64encode(numbers.view(np.uint8).reshape(-1, 4).T.tobytes()).decode("ascii")
+        return {"planes": planes, "shape": part.get("shape", "")}
     if isinstance(part, dict):
         return {name: _single(value) for name, value in part.items()}
     if isinstance(part, list | tuple | np.ndarray):  # plotly leaves an empty array as it is

@@ -1,8 +1,18 @@
 "use strict";
 // Plotly and the figures stand compressed in the page. Where a browser cannot unpack them, their pictures are shown.
+const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
 const unpacked = async (element) => {
-  const bytes = Uint8Array.from(atob(element.textContent), (letter) => letter.charCodeAt(0));
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+  return new Response(new Blob([bytesOf(element.textContent)]).stream().pipeThrough(new DecompressionStream("gzip"))).text();
+};
+// Numbers of four bytes: the first bytes of all of them come first. Those of a plane are an array for each row.
+const numbers = ({ planes, shape }) => {
+  const bytes = bytesOf(planes);
+  const mixed = new Uint8Array(bytes.length);
+  bytes.forEach((byte, k) => (mixed[(4 * k) % bytes.length + Math.floor((4 * k) / bytes.length)] = byte));
+  const flat = new Float32Array(mixed.buffer);
+  const [rows, columns] = shape.split(",").map(Number);
+  if (!columns) return flat;
+  return Array.from({ length: rows }, (_, row) => flat.subarray(row * columns, (row + 1) * columns));
 };
 const plotly = (async () => {
   const script = document.createElement("script");
@@ -12,7 +22,9 @@ const plotly = (async () => {
 (async () => {
   await plotly;
   for (const packed of document.querySelectorAll("script.figure")) {
-    const { data, layout, narrow, bars, config } = JSON.parse(await unpacked(packed));
+    const { data, layout, narrow, bars, config } = JSON.parse(await unpacked(packed), (_, value) =>
+      value?.planes === undefined ? value : numbers(value),
+    );
     const place = packed.previousElementSibling;
     const isNarrow = place.parentElement.clientWidth < 640;
     const chosen = isNarrow ? narrow : layout;
