@@ -32,6 +32,7 @@ from friso.answers.schema import stage_schema
 from friso.app import gate, uploads
 from friso.app import machine as machines
 from friso.app.gate import Access
+from friso.app.ghosts import ghosts_of
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
 from friso.app.serve import Server, listening
@@ -522,6 +523,30 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
         assert {trace.get("name") for trace in last} >= {"flip", "pinned", "this machine"}
         assert len(last) > len(first)
     assert len(asked) == 3  # the pinned one's is kept
+
+
+@pytest.mark.parametrize(
+    ("own", "other", "alike"),
+    [
+        ("Locked (as given): position", "Locked: position", True),
+        ("Free", "Free (as given)", True),
+        ("leaf bending, in phase, 377 Hz", "leaf bending, in phase, 1.04 kHz", True),
+        ("leaf bending, in phase, 377 Hz", "leaf bending, out of phase, 377 Hz", False),
+        ("Locked", "Free", False),
+    ],
+)
+def test_what_is_pinned_stands_behind_what_is_alike(own: str, other: str, alike: bool) -> None:
+    """Whichever case is given there, and whatever a mode's frequency is."""
+    line = Series(np.arange(2.0), np.arange(2.0), "a line", "#222222")
+
+    def figure(title: str) -> Figure:
+        return Figure("f", "", "", (Panel(title, Axis("x", "m"), Axis("y", "m"), (line,)),))
+
+    class Pinned:
+        figures = staticmethod(lambda: [figure(other)])
+
+    (panel,) = ghosts_of(Pinned())(figure(own)).panels  # type: ignore[arg-type]
+    assert [series.label for series in panel.series] == [*["pinned"] * alike, "a line"]
 
 
 def test_a_cell_of_a_map_and_the_leaf_springs_have_what_is_pinned(served: Served) -> None:

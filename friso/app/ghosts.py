@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -41,8 +42,12 @@ def _ghosted(figure: Figure, other: Figure) -> Figure:
     return replace(figure, panels=tuple(map(both, figure.panels)))
 
 
+_OWN = re.compile(r" \(as given\)|, \S+ k?Hz$")
+"""What a title says of the machine alone: which of its cases it is in, and the frequency of a mode."""
+
+
 def _subject(panel: Panel) -> tuple[str, str, str]:
-    return panel.title, panel.x.label, panel.y.label
+    return _OWN.sub("", panel.title), panel.x.label, panel.y.label
 
 
 def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Sequence[str]) -> Figure:

@@ -190,7 +190,8 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
         def drawn(figure: Figure) -> Figure:
-            return with_edge(with_places(figure, stands, [*keys.values()]), edge)
+            said = replace(figure, note="")  # the sentences below it say the same
+            return with_edge(with_places(said, stands, [*keys.values()]), edge)
 
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges(count), **shown}, "sweep")}

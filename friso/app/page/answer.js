@@ -16,8 +16,10 @@ export function quick(answer) {
   $("answer").replaceChildren(...cases, rest, line());
 }
 
-/** The whole answer. */
-export function whole(answer) {
+const DRAWS = 200;
+
+/** The whole answer; of a machine with uncertain keys, `draw` is called with how many machines are to be drawn. */
+export function whole(answer, draw) {
   const cases = [];
   const rest = el("div", { class: "rest" });
   for (const text of answer.sentences) {
@@ -26,6 +28,7 @@ export function whole(answer) {
     else rest.append(el("p", { class: "note" }, text));
   }
   rest.append(...paragraphs(answer.notes));
+  if (draw && !answer.asked.options.draws) rest.append(el("button", { type: "button", id: "draw", onclick: () => draw(DRAWS) }, `How probable is hunting? (${DRAWS} draws, minutes)`));
   $("answer").replaceChildren(...cases, rest, line());
 }
 

@@ -134,13 +134,13 @@ function without(part) {
   answers.refused(part.text);
 }
 
-async function check() {
-  const part = await ask("check", { ...pictures.body(), ...sent() }, "check", (item) => item.kind !== "answer" && answers.progress(item));
+async function check(draws) {
+  const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item));
   if (!part) return;
   answers.progress(null);
   if (part.kind !== "answer") return answers.refused(part.text);
   verdict.stop();
-  answers.whole(part);
+  answers.whole(part, shown.uncertain.length ? check : null);
   given.set("check", part);
   pictures.checked(part);
 }
