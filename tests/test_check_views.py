@@ -539,6 +539,8 @@ def test_a_motion_that_does_not_move_the_stage_says_so(wording: Wording) -> None
     wording("\n".join(unmoved))
     moved = [sentence(judgement, largest_force=2.44) for judgement in judgements]
     assert ["2.44 N" in text for text in (*unmoved, *moved)] == [True, True, False, False]
+    hardly = sentence(settles(), unmoved=True, largest_force=2.9996)
+    assert "(it exerts at most 2.9996 N; break-away takes 3.0000 N)" in hardly
 
 
 def test_an_uncertain_verdict_is_not_tabled_as_sure() -> None:

@@ -14,7 +14,15 @@ from friso.quantities import percent
 from friso.stage.controllers import FORCE_LIMIT
 from friso.views.check.cases import BANDS, ShownCase, band_text, shown_cases
 from friso.views.check.feeding_words import feeding_sentences
-from friso.views.drawing.prefixes import length_at_rest, listed, plus_minus, rounded_down, rounded_up, with_unit
+from friso.views.drawing.prefixes import (
+    digits_that_differ,
+    length_at_rest,
+    listed,
+    plus_minus,
+    rounded_down,
+    rounded_up,
+    with_unit,
+)
 from friso.views.loop_words import unstable_where
 
 if TYPE_CHECKING:
@@ -146,8 +154,15 @@ def _held(case: Case) -> list[str]:
     """That the limit of the force is what keeps a case where it stands, if it is."""
     if case.force_limit is None:
         return []
-    more = f", and break-away takes {with_unit(case.breakaway, 'N')}" if case.force_limit < case.breakaway else ""
-    return [f"Its force is at most {FORCE_LIMIT}, {with_unit(case.force_limit, 'N')}{more}."]
+    limit, least = _forces(case.force_limit, case.breakaway)
+    more = f", and break-away takes {least}" if case.force_limit < case.breakaway else ""
+    return [f"Its force is at most {FORCE_LIMIT}, {limit}{more}."]
+
+
+def _forces(*forces: float) -> list[str]:
+    """Forces [N] with as many digits as tell them apart."""
+    digits = digits_that_differ(forces)
+    return [with_unit(force, "N", digits) for force in forces]
 
 
 def _settling(case: Case) -> str:
@@ -157,7 +172,7 @@ def _settling(case: Case) -> str:
 
 
 def _unmoved(case: Case) -> str:
-    force, least = with_unit(case.largest_force, "N"), with_unit(case.breakaway, "N")
+    force, least = _forces(case.largest_force, case.breakaway)
     return f"this motion does not move the stage (it exerts at most {force}; break-away takes {least})"
 
 
