@@ -21,7 +21,7 @@ from friso.views.drawing.figure import GREY, INK, Array, Coloured, Figure, Map, 
 
 LINE = 0.17  # [inch] one line of the legend or the note
 LETTERS = 15.5  # to the inch, at their size
-_VECTORS = 10_000  # more cells than these become a picture inside an SVG or PDF, which else takes minutes to open
+_VECTORS = 1000  # more cells than these become a picture inside an SVG or PDF, which else is slow to draw and to open
 
 
 def draw_coloured(axes: Axes, panel: Panel) -> None:

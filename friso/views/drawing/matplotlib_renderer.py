@@ -43,6 +43,7 @@ ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
+DOTS, FINER = 150, 2  # dots to the inch, and how many times as many where a file of lines holds a picture
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
 _METADATA = {
@@ -75,7 +76,6 @@ _STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 8.5,
     "lines.solid_joinstyle": "round",
-    "savefig.dpi": 150,
     "svg.hashsalt": "friso",
     "svg.fonttype": "path",
     "pdf.fonttype": 42,
@@ -173,7 +173,8 @@ class _LaidOut:
     def _printed(self, form: str, area: Bbox | None) -> bytes:
         stream = io.BytesIO()
         with _letters_alone() if form == "pdf" else nullcontext():
-            self.canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area)
+            dots = DOTS if form == "png" else FINER * DOTS  # of pictures inside
+            self.canvas.savefig(stream, format=form, metadata=_METADATA[form], bbox_inches=area, dpi=dots)
         return stream.getvalue()
 
 
