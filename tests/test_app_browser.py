@@ -500,6 +500,39 @@ def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> N
     assert "log.csv" in page.inner_text("#picture")
 
 
+def test_of_a_log_that_says_nothing_roles_units_and_scales_are_told(browsed: Browsed, tmp_path: Path) -> None:
+    """What is then asked is what the command line is given; a refusal names the file as it was dropped."""
+    page, moved = browsed.page, motion()
+    columns = [np.asarray(moved[n]) for n in ("time", "position", "force")]
+    write_text(tmp_path / "mute.csv", ["a", "b", "c"], [columns[0], columns[1] * 1000, columns[2]])
+    page.click("#tab-logs")
+    for other in page.locator("#picture button:text-is('Other files')").all():  # of the test before
+        other.click()
+    page.set_input_files("#log-files", tmp_path / "mute.csv")
+    page.wait_for_selector("#role-position")
+    for role, channel, measure in (("time", "a", "s"), ("position", "b", "mm"), ("force", "c", "2 N/V")):
+        for act in (
+            lambda r=role, c=channel: page.select_option(f"#role-{r}", c),
+            lambda r=role, m=measure: page.fill(f"#measure-{r}", m),
+        ):
+            with page.expect_response("**/ask/logs"):
+                act()
+                page.keyboard.press("Tab")
+    page.wait_for_function("() => !document.getElementById('picture').innerText.includes('open:')")
+    with page.expect_request("**/ask/identify") as asked:
+        page.click("#identify")
+    options = asked.value.post_data_json["options"]
+    assert options["map"] == {"time": "a", "position": "b", "force": "c"}
+    assert (options["unit"], options["scale"]) == ({"a": "s", "b": "mm"}, {"force": "2 N/V"})
+    page.click("#picture button:text-is('Stop')")
+    with page.expect_response("**/ask/logs"):
+        page.fill("#measure-position", "kg")
+        page.keyboard.press("Tab")
+    page.wait_for_selector("#picture .wrong")
+    assert page.inner_text("#picture .wrong").startswith("mute.csv: unit")
+    page.click("#picture button:text-is('Other files')")  # for the tests that follow
+
+
 def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -> None:
     """Control characters and overrides of the reading direction are written out, as friso writes them out elsewhere."""
     every = "".join(map(chr, [*range(0xD800), *range(0xE000, 0x10000), *range(0xE0000, 0xE0080), 0x1F600]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -29,6 +30,7 @@ from friso.views.drawing.figure import Figure
 if TYPE_CHECKING:
     from friso.answers.answer import Answer
     from friso.answers.identify import IdentifyAnswer
+    from friso.answers.logs import LogsAnswer
     from friso.answers.sweep import SweepAnswer
     from friso.app.work import Work
 
@@ -258,10 +260,18 @@ def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What dropped files hold, and which channels there are to choose from."""
+    answer = _looked_into(asked, work)
+    found = [channel for item in answer.result for channel in item.channels]
+    channels = list(dict.fromkeys(channel.name for channel in found))
+    recognised = {channel.role: channel.name for channel in found if channel.role}
+    more = {"channels": channels, "roles": [*MAPPABLE], "recognised": recognised}
+    yield parts_of(answer, **more, **_lines_of_logs("logs", asked))
+
+
+def _looked_into(asked: PageRequest, work: Work) -> LogsAnswer:
     files, assigned = _dropped(asked)
-    answer = friso.logs(files, **assigned, progress=work.progress)
-    channels = list(dict.fromkeys(channel.name for item in answer.result for channel in item.channels))
-    yield parts_of(answer, channels=channels, roles=[*MAPPABLE], **_lines_of_logs("logs", asked))
+    with _named_as_dropped():
+        return friso.logs(files, **assigned, progress=work.progress)
 
 
 def identify(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -277,7 +287,17 @@ def _identified(asked: PageRequest, work: Work) -> IdentifyAnswer:
     files, assigned = _dropped(asked)
     stage = asked.machine.stage if asked.options.get("assumed") is True else None
     beside = files[0].parent  # else a file of that name in the folder where friso was started would have its say
-    return friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
+    with _named_as_dropped():
+        return friso.identify(files, stage=stage, **assigned, folder=beside, progress=work.progress)
+
+
+@contextmanager
+def _named_as_dropped() -> Iterator[None]:
+    """What is wrong with a log is said of it by its name: where the server keeps it, is of no use to anybody."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError.of(error).found_in(Path(error.origin).name) from None
 
 
 CORRELATED = (
@@ -350,6 +370,7 @@ COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
     "map": _mapped,
     "tune": _answered(friso.tune, "tune"),
     "design": _answered(friso.design, "design"),
+    "logs": _looked_into,
     "identify": _identified,
 }
 """The commands whose files are handed out: all that the command writes, and its document, in one archive."""
@@ -359,7 +380,7 @@ def report(command: str, asked: PageRequest, work: Work) -> Iterator[AnswerPart]
     """The files of the answer of a command."""
     answer = COMMANDS[command](asked, work)
     work.progress(0, 0, "drawing the figures")
-    of_logs = command == "identify"  # its stage file is among what it writes
+    of_logs = command in ("logs", "identify")  # a stage file that is identified is among what is written
     stem = "logs" if of_logs else asked.machine.name.removesuffix(".toml")
     held = archive(answer, {} if of_logs else {f"{stem}.toml": asked.machine.stage.to_toml()})
     yield {"kind": "files", "name": f"{stem}_{answer.command}.zip", "base64": base64.b64encode(held).decode("ascii")}

@@ -1,14 +1,15 @@
 // Logs: dropped files, their channels with roles, and the machine that they show.
-import { anew, el } from "./dom.js";
+import { el } from "./dom.js";
 import { shownAnswer } from "./long.js";
 import { paragraphs } from "./tables.js";
 import { end, hand } from "./wire.js";
 
 const LARGEST = 64e6;
+const SCALE = /^[-+.\d]/;
 
 export class Logs {
   constructor(sent, tell) {
-    Object.assign(this, { sent, tell, files: [], roles: new Map() });
+    Object.assign(this, { sent, tell, files: [], roles: new Map(), measures: new Map(), recognised: {} });
     this.input = el("input", { type: "file", id: "log-files", multiple: true, "aria-label": "Logs", onchange: () => this.add([...this.input.files]) });
     this.status = el("div", { class: "status", role: "status" });
     this.form = el("div", { class: "form" });
@@ -36,7 +37,13 @@ export class Logs {
   }
 
   options(more = {}) {
-    return { ...this.sent(), options: { files: this.files.map((file) => file.id), map: Object.fromEntries(this.roles), dt: this.dt?.value ?? "", ...more } };
+    const unit = {};
+    const scale = {};
+    for (const [role, text] of this.measures) {
+      if (SCALE.test(text)) scale[role] = text;
+      else unit[this.roles.get(role) ?? this.recognised[role] ?? role] = text;
+    }
+    return { ...this.sent(), options: { files: this.files.map((file) => file.id), map: Object.fromEntries(this.roles), unit, scale, dt: this.dt?.value ?? "", ...more } };
   }
 
   async look() {
@@ -44,7 +51,11 @@ export class Logs {
     if (answer) this.fields(answer);
   }
 
-  fields({ roles, channels }) {
+  fields({ roles, channels, recognised }) {
+    this.recognised = recognised;
+    const offered = JSON.stringify([roles, channels]);
+    if (this.form.children.length && offered === this.offered) return; // something may be being typed
+    this.offered = offered;
     const choice = (role) => {
       const options = ["", ...channels].map((name) => el("option", { value: name, selected: name === (this.roles.get(role) ?? "") }, name || "as recognised"));
       const choose = (event) => {
@@ -52,7 +63,9 @@ export class Logs {
         else this.roles.delete(role);
         this.look();
       };
-      return el("label", {}, role.replaceAll("_", " "), el("select", { id: `role-${role}`, onchange: choose }, ...options));
+      const name = role.replaceAll("_", " ");
+      const measure = el("input", { type: "text", id: `measure-${role}`, class: "measure", "aria-label": `Unit or scale of ${name}`, placeholder: "unit", title: "Unit of the channel (mm), or scale (35.15 N/V), where the file does not say it", value: this.measures.get(role) ?? "", onchange: () => this.measured(role, measure.value) });
+      return el("div", { class: "role" }, el("label", {}, name, el("select", { id: `role-${role}`, onchange: choose }, ...options)), measure);
     };
     this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
     this.assumed = el("input", { type: "checkbox", id: "assumed", checked: this.assumed?.checked ?? false });
@@ -64,13 +77,21 @@ export class Logs {
       el("button", { type: "button", id: "identify", onclick: start }, "Identify"),
       el("button", { type: "button", onclick: () => this.forget() }, "Other files"),
     ];
-    anew(this.form, () => this.form.replaceChildren(...fields));
+    this.form.replaceChildren(...fields);
+  }
+
+  /** The unit or the scale of a role's channel is told, or "" for that of the file. */
+  measured(role, text) {
+    if (text.trim()) this.measures.set(role, text.trim());
+    else this.measures.delete(role);
+    this.look();
   }
 
   forget() {
     end("logs");
     this.files = [];
     this.roles.clear();
+    this.measures.clear();
     this.input.value = "";
     this.status.textContent = "";
     this.form.replaceChildren();
