@@ -261,9 +261,9 @@ def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def logs(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What dropped files hold, and which channels there are to choose from."""
     answer = _looked_into(asked, work)
-    found = [channel for item in answer.result for channel in item.channels]
-    channels = list(dict.fromkeys(channel.name for channel in found))
-    recognised = {channel.role: channel.name for channel in found if channel.role}
+    held = [channel for item in answer.result for channel in item.channels]
+    channels = list(dict.fromkeys(channel.name for channel in held))
+    recognised = {channel.role: channel.name for channel in held if channel.role}
     more = {"channels": channels, "roles": [*MAPPABLE], "recognised": recognised}
     yield parts_of(answer, **more, **_lines_of_logs("logs", asked))
 
