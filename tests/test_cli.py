@@ -150,6 +150,23 @@ def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, tmp_path:
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize(
+    ("arguments", "lines"),
+    [
+        (["reproduce", "--points", "x"], ["--points", '"x"', "a whole number", "--points 41"]),
+        (["compare", RIG, "--machines=1e3"], ["--machines", '"1e3"', "a whole number", "--machines 2000"]),
+        (["map", RIG, "--verify", "some"], ["--verify", '"some"', "a number", "--verify 0.05"]),
+        (["check", RIG, "--draws", " "], ["--draws", '" "', "a whole number", "--draws 4"]),
+        (["app", "--port", "70000"], ["--port", '"70000"', "a whole number from 0 to 65535", "--port 65535"]),
+    ],
+)
+def test_a_number_that_is_none_is_refused_as_all_else_is(arguments: list, lines: list[str]) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    heads = ("friso: ", "  given:    ", "  expected: ", "  example:  ")
+    assert done.stderr.splitlines() == [head + line for head, line in zip(heads, lines, strict=True)]
+
+
 def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
     """An unstable loop diverges past what numbers hold: status 1, and the response up to there is written.
 

@@ -17,7 +17,7 @@ import typer
 from typer.core import TyperGroup
 
 from friso import interrupts
-from friso.cli.arguments import refuse_empty, with_checked_paths
+from friso.cli.arguments import number_refused, refuse_empty, with_checked_paths
 from friso.cli.command import COMMANDS, QUESTIONS
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.terminal import SPELLED, escaping
@@ -152,8 +152,9 @@ def _failed(error: BaseException) -> int:
     if isinstance(error.__context__ if exits else error, BrokenPipeError):
         sys.stderr.close()
         return 1
-    if isinstance(error, InputError):
-        say(str(error))
+    wrong = error if isinstance(error, InputError) else number_refused(error, sys.argv[1:])
+    if wrong is not None:
+        say(str(wrong))
         return 2
     usage = getattr(error, "format_message", None)
     if usage is not None:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from functools import wraps
+from inspect import signature
+from itertools import pairwise
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import Any, get_args, get_type_hints
 
+from typer import BadParameter
 from typer.models import ArgumentInfo
 
 from friso import paths
+from friso.cli.command import COMMANDS
 from friso.errors import InputError
+from friso.quantities import quoted
 
 
 def refuse_empty(arguments: Iterable[str]) -> None:
@@ -47,3 +52,34 @@ def _named(function: Callable[..., None], name: str) -> tuple[str, str]:
         return str(info.metavar), "rig.toml"
     option = next(iter(info.param_decls or ()), f"--{name.replace('_', '-')}")
     return option, f"{option} report"
+
+
+_NUMBERS = {int: "a whole number", float: "a number"}
+
+
+def number_refused(error: BaseException, arguments: Sequence[str]) -> InputError | None:
+    """Of an option that wants a number and was given none, or one beyond its ends, the same error as friso tells every
+    other one; None for any other error."""
+    parameter, context = (getattr(error, name, None) for name in ("param", "ctx"))
+    command = getattr(context, "info_name", None) or ""
+    if not isinstance(error, BadParameter) or parameter is None or command not in COMMANDS:
+        return None
+    function, name = COMMANDS[command].function, str(parameter.name)
+    asked = get_type_hints(function, include_extras=True)[name]
+    wanted, info = asked.__origin__, asked.__metadata__[0]
+    kind = next((kind for kind in (wanted, *get_args(wanted)) if kind in _NUMBERS), None)
+    if kind is None:
+        return None
+    option, expected = parameter.opts[0], _NUMBERS[kind]
+    if info.min is not None and info.max is not None:
+        expected += f" from {info.min:g} to {info.max:g}"
+    default = signature(function).parameters[name].default
+    example = default if isinstance(default, int | float) else info.max or 4
+    return InputError(option, _value_of(option, arguments), expected, f"{option} {example}")
+
+
+def _value_of(option: str, arguments: Sequence[str]) -> str:
+    """What follows an option on the command line, the last time that it is there."""
+    values = [value for before, value in pairwise(arguments) if before == option]
+    values += [argument.partition("=")[2] for argument in arguments if argument.startswith(f"{option}=")]
+    return quoted(values[-1]) if values else "no number"
