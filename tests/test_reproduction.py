@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
+from itertools import combinations
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast, get_type_hints
@@ -14,6 +15,7 @@ from typing import Any, cast, get_type_hints
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from pages import Page
 from patched import patched
 from refusals import Refused
@@ -51,12 +53,14 @@ from friso.studies.thesis.evidence import RESPONSES
 from friso.studies.thesis.experiments import _RUNS, EXPERIMENTS, GRID, MOVES, ON_RAILS, STANDSTILL, TRACES, Experiments
 from friso.studies.thesis.experiments import BUILT as LOOPS_BUILT
 from friso.studies.thesis.judges import design_rules
+from friso.studies.thesis.judges.identified_in_time import force_swings
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.kept import SOURCES, Kept, kept_findings
 from friso.studies.thesis.laws import conclusions_by_law
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
 from friso.studies.thesis.plausible import PARTS, plausible
+from friso.studies.thesis.reading import OTHERWISE, OWN, read_as, reading
 from friso.studies.thesis.reproduce import _changed
 from friso.studies.thesis.space import OPEN, OpenValue, baseline, draw, enters
 from friso.studies.thesis.studies import rig_gains
@@ -65,12 +69,14 @@ from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.studies.thesis.ways import COUNT, CYCLE, SWING, by_attraction, by_peak_count, by_swing_at_end, weakest
 from friso.views.reproduce.document import reproduce_document
 from friso.views.reproduce.figures import reproduction_figures
-from friso.views.reproduce.page import reproduce_files, reproduce_html
+from friso.views.reproduce.page import COLOURS, reproduce_files, reproduce_html
 from friso.views.reproduce.questions import QUESTIONS
+from friso.views.reproduce.summary import summary_sheet
 from friso.views.reproduce.words import SHORT, details, in_order, short
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
+REPRODUCE = import_module("friso.studies.thesis.reproduce")
 
 pytestmark = pytest.mark.xdist_group("reproduction")
 
@@ -126,7 +132,9 @@ def made_rig() -> Iterator[None]:
 def small() -> Reproduction:
     """Everything, on maps of 5 x 5 cells, with two joint draws of as many: what it judges means little, but all of it
     is there."""
-    with patched({import_module("friso.studies.thesis.plausible"): {"POINTS": 5, "EVERY": 9}}):
+    with patched(
+        {import_module("friso.studies.thesis.plausible"): {"POINTS": 5, "EVERY": 9}, REPRODUCE: {"JUDGED": 5}}
+    ):
         return reproduce(points=5, with_cycles=False, draws=2)
 
 
@@ -311,6 +319,8 @@ def crossover_pair(stiff: float, soft: float, name: str = "isolator-crossover") 
     return {name: made(name, below(stiff)), f"{name}-soft": made(f"{name}-soft", below(soft))}
 
 
+F15B_MAPS = "isolator-friction", "friction"
+
 HOLDS: Mapping[str, tuple[dict[str, xr.Dataset], dict[str, Response]]] = {
     "F5": ({}, {"locked": cell()}),
     "F11A": (
@@ -396,6 +406,51 @@ def test_a_limit_is_lower_by_more_than_what_is_the_same() -> None:
     assert judge(Evidence(crossover_pair(6, 4.4), {})).judgement == "holds"
 
 
+def test_f14b_names_the_stripe_and_its_dampings() -> None:
+    """A band of longer strokes that keeps moving, above strokes at which the stage comes to rest, is told apart."""
+    striped = made("isolator-damping", lambda d, s: 6 * ((s < 1e-4) | ((d > 50) & (s > 2e-4) & (s < 4e-4))))
+    judge = registered()["F14B"].judge
+    part = judge(Evidence({"isolator-damping": striped}, {"locked": cell()})).parts[0]
+    assert "a stripe that keeps moving at strokes of 0.22 to 0.316 mm, damping 79 to 1e+04 N s/m" in part.number
+    plain = judge(Evidence(*HOLDS["F14B"]))
+    assert "stripe" not in plain.parts[0].number
+    assert plain.table is not None
+    assert [row[0] for row in plain.table.rows][::5] == ["0.01 to 0.1 N s/m", "1000 to 10000 N s/m"]
+
+
+def test_f21_tells_how_the_force_itself_oscillates(small: Reproduction) -> None:
+    """Not its mean at each place, in which an oscillation that does not repeat is averaged away."""
+    assert small.experiments is not None
+    for run in small.experiments.constant_speed:
+        for part, swing in zip(run.log.segments, force_swings(run), strict=True):
+            force = run.log["force"][part][len(run.log["force"][part]) // 10 :]
+            assert swing == pytest.approx(np.sqrt(np.mean(force**2) / np.mean(force) ** 2 - 1), abs=1e-6)
+    free, _ = small.experiments.constant_speed
+    assert min(force_swings(free)) > 0.4
+
+
+def test_a_verdict_that_another_reading_turns_says_so() -> None:
+    """“Large” damping, “about” 0.1 mm, “few” cells: each is read to either side of friso's own reading."""
+    only_beyond = {"isolator-damping": made("isolator-damping", lambda d, s: 6 * (s < np.where(d > 1700, 1e-4, 1e-3)))}
+    rare = {name: made(name, friction_map(lambda s, c: 6 * ((s > 4.8) & (c < 0.8)))) for name in F15B_MAPS}
+    for claim, evidence, read, becomes in (
+        ("F14B", Evidence(only_beyond, {"locked": cell()}), "“large” as 1000 N s/m and more", "holds"),
+        ("F15B", Evidence(rare, {}), "“none” as at most 5 %", "holds"),
+    ):
+        judge = registered()[claim].judge
+        findings = {}
+        for name, other in OTHERWISE.items():
+            with read_as(other):
+                findings[name] = judge(evidence)
+        own = judge(evidence)
+        assert own.judgement != becomes
+        item = verdict(claims()[0], "1", {COUNT: own}, own, readings=findings)
+        assert item.reread[read].judgement == becomes
+        assert f"{read}: {becomes}" in item.dependence
+        assert all(other.pattern != own.pattern for other in item.reread.values())
+    assert reading() == OWN
+
+
 def test_every_judge_of_maps_is_tried_both_ways() -> None:
     assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR - LEAVES - RULES - IDENTIFIED - BUILT - FURTHER
 
@@ -425,11 +480,13 @@ def test_the_weakest_way_decides() -> None:
     assert together.judgement == "holds in part"
     assert SWING in together.parts[1].number
     assert f"by {COUNT} met: number 1; by {CYCLE} met: number 1" in together.parts[1].number
-    assert f"not met by {SWING}" in together.parts[1].why
+    assert together.parts[1].why.endswith(f"met by {COUNT} and {CYCLE}, not by {SWING}.")
+    reasoned = replace(ways[SWING], parts=tuple(replace(part, why="It dies out.") for part in ways[SWING].parts))
+    assert weakest({**ways, SWING: reasoned}).parts[1].why == "It dies out."
     assert f"by {CYCLE} met" in together.parts[2].number
     assert together.parts[1].number.startswith(f"by {SWING} not met")  # what fails stands first
     assert all(f"by {way} not met" in together.parts[2].number for way in (COUNT, SWING))
-    assert f"not met by {COUNT} and {SWING}" in together.parts[2].why
+    assert together.parts[2].why.endswith(f"met by {CYCLE}, not by {COUNT} or {SWING}.")
 
 
 def test_a_self_test_counts_for_nothing() -> None:
@@ -508,7 +565,7 @@ def test_trends_are_judged_over_all_cells_too() -> None:
     parts = registered()["F12B"].judge(Evidence({"control": control}, {})).parts
     assert not parts[0].holds
     assert not parts[1].holds
-    assert "over all of them" in parts[0].why
+    assert "not of all" in parts[0].why
 
 
 def test_the_locked_limit_is_that_of_the_mass_of_the_abstract() -> None:
@@ -681,7 +738,7 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         if label.startswith("draw 1"):
             raise KeyboardInterrupt
 
-    with patched({import_module("friso.studies.thesis.plausible"): {"POINTS": 3}}):
+    with patched({import_module("friso.studies.thesis.plausible"): {"POINTS": 3}, REPRODUCE: {"JUDGED": 3}}):
         with pytest.raises(KeyboardInterrupt):
             reproduce(**orders, kept=kept, progress=stop)
         before = {file: file.stat().st_mtime_ns for file in (tmp_path / "kept").iterdir()}
@@ -694,11 +751,6 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
     assert resumed.maps.keys() == {"friction", "isolator-friction"}
     assert (resumed.linear, resumed.experiments) == (None, None)
     assert [item.claim.id for item in resumed.verdicts if item.finding] == ["F15B"]
-    mine = Finding(tuple(replace(part, holds=not part.holds) for part in resumed.plausible.own["F15B"].parts))
-    finer = replace(resumed.plausible, own={"F15B": mine})
-    with patched({import_module("friso.studies.thesis.reproduce"): {"plausible": lambda *_: finer}}):
-        coarse = next(item for item in reproduce(**orders, kept=kept).verdicts if item.finding)
-    assert any("21 x 21" in method for method in coarse.turned)  # three values per axis may miss what finer maps have
     for file in [file for suffix in ("json", "npz") for file in [*(tmp_path / "kept").glob(f"*.{suffix}")][:2]]:
         content = file.read_bytes()
         others = next(other for other in file.parent.iterdir() if other.suffix == file.suffix and other != file)
@@ -709,6 +761,18 @@ def test_one_claim_needs_its_own_evidence_alone_and_an_interrupted_run_goes_on(t
         file.write_bytes(content)
     kept.clear()
     assert kept.count == 0
+
+
+def test_few_points_are_shown_and_not_judged_on() -> None:
+    """Whatever is asked for, claims are judged on maps of as many values as decide: the headline is the same."""
+    orders: dict[str, Any] = {"only": ["F15B"], "with_cycles": False, "draws": 0}
+    with patched({REPRODUCE: {"JUDGED": 7}}):
+        coarse, enough = (reproduce(**orders, points=points) for points in (3, 7))
+    assert {name: runs.sizes for name, runs in coarse.judged.items()} == {n: r.sizes for n, r in enough.maps.items()}
+    assert all(set(runs.sizes.values()) == {3} for runs in coarse.maps.values())
+    first, second = (reproduce_document(item) for item in (coarse, enough))
+    assert first["claims"] == second["claims"]
+    assert (first["points"], first["points_judged"], second["points_judged"]) == (3, 7, 7)
 
 
 def test_experiments_are_kept_whole(tmp_path: Path) -> None:
@@ -775,6 +839,7 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
         covered = entry["judgement"] != "not yet covered"
         assert bool(entry["figure"] and entry["number"] and entry["criterion"]) == covered
         assert entry["reason"] or entry["judgement"] == "holds"
+        assert not covered or not entry["reason"] or re.fullmatch(r"[A-Z].*\.", entry["reason"])
         assert covered == bool(entry["parts"])
         if entry["space"]:
             assert entry["space"]["seeds"] == [[1, number] for number in range(0, entry["space"]["draws"])]
@@ -824,6 +889,23 @@ def test_the_command_writes_its_page_and_claims(
     assert written["F11A"]["judgement"] == "not yet covered"
 
 
+def test_the_summary_has_every_text_whole_on_one_sheet() -> None:
+    """No text is cut, leaves the sheet, or runs into the next one."""
+    space = SimpleNamespace(count=12, draws=48)
+    item: Any = SimpleNamespace
+    verdicts = [
+        item(claim=claim, judgement="holds in part", finding=finding(True, False), space=space) for claim in claims()
+    ]
+    sheet = summary_sheet(verdicts, "Conclusion.", COLOURS)
+    renderer = FigureCanvasAgg(sheet).get_renderer()
+    boxes = [(text.get_text(), text.get_window_extent(renderer)) for text in sheet.texts]
+    for claim in claims():
+        assert any(text.replace("\n", " ") == claim.text for text, _ in boxes)
+    assert all(sheet.bbox.x0 < box.x0 < box.x1 < sheet.bbox.x1 for _, box in boxes)
+    assert all(sheet.bbox.y0 < box.y0 < box.y1 < sheet.bbox.y1 for _, box in boxes)
+    assert not [(a, b) for (a, first), (b, second) in combinations(boxes, 2) if first.overlaps(second)]
+
+
 def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
     assert [runs.attrs["rtol"] for runs in small.tolerances.values()] == [1e-4, 1e-8]
     loose, tight = small.tolerances.values()
@@ -840,6 +922,30 @@ def test_a_count_unknown_at_both_tolerances_does_not_differ(small: Reproduction)
     assert _changed({1e-4: loose, 1e-8: other})[1] == pytest.approx(float(np.isnan(loose["count"]).mean()))
     document = reproduce_document(replace(small, tolerances={1e-4: loose, 1e-8: tight}))
     assert document["figure_14b"]["rtol"] == [1e-8, 1e-4]
+
+
+@pytest.mark.parametrize(("ink", "paper"), [("#222222", "#ffffff"), ("#e8e8e8", "#16181b")], ids=["light", "dark"])
+def test_the_word_of_agreement_stands_out_from_the_page(ink: str, paper: str) -> None:
+    """Coloured words have the contrast that WCAG 2 asks of text, 4.5, in either scheme of page.html."""
+    templates = ROOT / "friso" / "views" / "templates"
+    of_all = "".join(re.findall(r":root \{[^}]*\}", (templates / "page.html").read_text("utf-8")))
+    assert {ink.replace("#222222", "#222"), paper.replace("#ffffff", "#fff")} <= {*re.findall(r"#\w+", of_all)}
+    style = (templates / "reproduce.html").read_text("utf-8")
+    (share,) = re.findall(r"\.judgement \{ color: color-mix\(in srgb, var\(--case\) (\d+)%, var\(--ink\)\)", style)
+    for colour in COLOURS.values():
+        mixed = (int(share) * rgb(colour) + (100 - int(share)) * rgb(ink)) / 100
+        bright, dark = sorted((luminance(mixed), luminance(rgb(paper))), reverse=True)
+        assert (bright + 0.05) / (dark + 0.05) >= 4.5
+
+
+def rgb(colour: str) -> np.ndarray:
+    return np.array([int(colour[place : place + 2], 16) for place in (1, 3, 5)])
+
+
+def luminance(colour: np.ndarray) -> float:
+    shares = colour / 255
+    linear = np.where(shares <= 0.04045, shares / 12.92, ((shares + 0.055) / 1.055) ** 2.4)
+    return float(linear @ [0.2126, 0.7152, 0.0722])
 
 
 def test_titles_say_what_is_drawn_whatever_was_found(small: Reproduction) -> None:

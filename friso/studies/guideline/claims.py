@@ -13,7 +13,7 @@ from friso.hunting.edges import UNKNOWN as NOT_TOLD
 from friso.quantities import percent
 from friso.studies.guideline.thesis_rig import ThesisCase
 from friso.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
-from friso.studies.thesis.claims import ABOUT, about
+from friso.studies.thesis.reading import OWN, about
 
 HOLDS, IN_PART, DIFFERS, UNKNOWN = "holds", "holds in part", "differs", "unknown"
 
@@ -140,7 +140,8 @@ def _edges(worked: Worked) -> GuidelineClaim:
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
-        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of {ABOUT:g} of both "
+        f"free within {percent(NEAR - 1)} of the range, the highest locked edge within a factor of "
+        f"{OWN.about:g} of both "
         "numbers",
         _judgement(near),
     )

@@ -1,6 +1,7 @@
 """The thesis's studies, claims and their reproduction."""
 
-from friso.studies.thesis.claims import CONVENTIONS, Claim, Evidence, Finding, Part, Response, claims, judges
+from friso.studies.thesis.claims import Claim, Evidence, Finding, Part, Response, claims, judges
+from friso.studies.thesis.reading import CONVENTIONS
 from friso.studies.thesis.reproduce import Reproduction, reproduce
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import ClaimVerdict

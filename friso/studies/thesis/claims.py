@@ -10,7 +10,6 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Literal
 
-from friso.quantities import percent
 from friso.stage import Stage
 from friso.studies.thesis.studies import thesis_rig
 
@@ -21,38 +20,6 @@ if TYPE_CHECKING:
     from friso.studies.thesis.linear import Linear
 
 ClaimJudgement = Literal["holds", "holds in part", "differs", "not yet covered"]
-
-ABOUT = 1.5
-"""Factor within which a number is "about" another."""
-
-ORDER = 10**0.5
-"""Factor within which a number is "of the order of" another, and beyond which it is "far below" it."""
-
-FEW = 0.05
-"""Share of a map's cells up to which they are "few"."""
-
-TREND = 0.5
-"""Rank correlation (Spearman) from which there is a "trend"."""
-
-SAME = 0.15
-"""Share within which numbers are “the same”."""
-
-CONVENTIONS = (
-    f"Words have the same meaning in all claims: “about” is within a factor of {ABOUT:g}, “of the order of” within a "
-    f"factor of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(FEW)} of a map, “the "
-    f"same” is within {percent(SAME)}, a “trend” is a rank correlation of at least {TREND:g}. Whether a cell of a map "
-    "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
-    "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
-    "as far as it does in all three ways; one on the path alone (F11A) is judged in the first two, since what attracts "
-    "does not depend on the path. A “limit” lies between the last cell that keeps moving and the next, where "
-    "the swing, interpolated in its logarithm, falls below what counts; none beyond it keeps moving."
-)
-"""How the criteria read the words of the claims: one reading for all."""
-
-
-def about(value: float, expected: float, factor: float = ABOUT) -> bool:
-    """Whether a positive number is within a factor of what is expected; NaN is not."""
-    return expected / factor <= value <= expected * factor
 
 
 @dataclass(frozen=True)
@@ -83,9 +50,10 @@ def claims() -> tuple[Claim, ...]:
 class Part:
     """One testable statement of a claim: the criterion in words, whether it is met, and the number found.
 
-    `why` is the reason found where it is not met. `printed` is a number that the thesis prints and `read` the same as
-    friso finds it, both in the same unit, NaN where there is none. A `self_test` checks that friso finds what friso
-    entered: it says nothing of the thesis, and counts for no judgement.
+    `why` is the reason found where it is not met, in whole sentences, the first of which says the most. `printed` is a
+    number that the thesis prints and `read` the same as friso finds it, both in the same unit, NaN where there is none.
+    A `self_test` checks that friso finds what friso entered: it says nothing of the thesis, and counts for no
+    judgement.
     """
 
     criterion: str

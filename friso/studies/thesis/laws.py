@@ -64,7 +64,7 @@ class ConclusionsByLaw:
 def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) -> ConclusionsByLaw:
     """The conclusions of the thesis under each law, on the studies and the grid of a reproduction: of the claims that
     it judged."""
-    studies, rig = [STUDIES[name] for name in reproduction.maps], thesis_rig()
+    studies, rig = [STUDIES[name] for name in reproduction.judged], thesis_rig()
     own = rig.flat()["friction.model"]
     judged = {item.claim.id for item in reproduction.verdicts if item.finding}
     of_runs = {name: RESPONSES[name] for name in reproduction.responses}
@@ -73,13 +73,13 @@ def conclusions_by_law(reproduction: Reproduction, progress: Progress = silent) 
         for claim in claims()
         if claim.id in CONCLUSIONS and (entry := registered().get(claim.id)) and claim.id in judged
     }
-    evidences = {own: _evidence(reproduction.maps, reproduction.responses, rig)}
+    evidences = {own: _evidence(reproduction.judged, reproduction.responses, rig)}
     (_, *kept), left_out = kept_laws(rig, ELEMENTS)
     converted = [_apart(rig, conversion) for conversion in kept]
     for number, conversion in enumerate(converted):
         progress(number, len(converted), conversion.law)
         changes = {"friction": conversion.stage.as_written()["friction"]}
-        maps = maps_of(studies, reproduction.points, reproduction.rtol, changes=changes)
+        maps = maps_of(studies, reproduction.judged_points, reproduction.rtol, changes=changes)
         responses = {name: run_response(of_run, changes, reproduction.rtol) for name, of_run in of_runs.items()}
         evidences[conversion.law] = _evidence(maps, responses, rig.replace(changes))
     progress(len(converted), len(converted), "laws")

@@ -21,7 +21,7 @@ from friso.studies.thesis.experiments import EXPERIMENTS, Experiments
 from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.linear import NEEDS, Linear
 from friso.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
-from friso.studies.thesis.plausible import POINTS as DRAW_POINTS
+from friso.studies.thesis.reading import OTHERWISE, read_as
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 from friso.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
@@ -31,6 +31,10 @@ if TYPE_CHECKING:
 
 POINTS, MOST_POINTS = 41, 1001
 """Values per axis: 0.4 Hz apart in Fig. 16; at most, a million cells in every map."""
+
+JUDGED = 21
+"""Values per axis of the maps on which claims are judged, at least: a region that falls between two values is missed,
+and what is few, or a trend, means nothing on a handful of cells."""
 
 MOST_DRAWS = 10_000
 
@@ -55,15 +59,18 @@ an experiment."""
 class Reproduction:
     """All results.
 
-    Maps by study name and responses by name, judged by the thesis's count; the linear analysis of the rig, and in
+    Maps by study name and responses by name, judged by the thesis's count, and the maps on which the claims were judged
+    (`judged`), which are finer where few values per axis were asked for; the linear analysis of the rig, and in
     `bode` its curves over the frequency, and the experiments, each None where no claim of this run needs it, with the
     names of those that were made (`experimented`); the map of
     Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one of them only, and whose
     peak count differs between them (NaN if not computed); a verdict per claim; the claims over the joint draws of what
-    the thesis leaves open; the hunting cycles behind each map by study name; values per axis of the maps (`points`).
+    the thesis leaves open; the hunting cycles behind each map by study name; values per axis of the maps (`points`),
+    and of those judged (`judged_points`).
     """
 
     maps: Mapping[str, xr.Dataset]
+    judged: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
     linear: Linear | None
     bode: Bode | None
@@ -75,6 +82,7 @@ class Reproduction:
     plausible: Plausible
     cycles: Mapping[str, CyclesOnMap]
     points: int
+    judged_points: int
     rtol: float
 
 
@@ -89,7 +97,7 @@ def reproduce(
     kept: Kept = NOT_KEPT,
 ) -> Reproduction:
     """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims, or `only`
-    some of them, with what these need.
+    some of them, with what these need, on maps of at least `JUDGED` values per axis.
 
     A claim that is left out is "not yet covered". `with_cycles` the hunting cycles behind every map are computed too,
     the third way in which its claims are judged; with `draws` every claim is judged in as many joint draws of the
@@ -108,19 +116,20 @@ def reproduce(
     needs = _needs(entries, chosen, asked)
     studies = {name: study for name, study in chosen.items() if name in needs}
     parts = sorted(needs & PARTS.keys())
-    cells, coarse = points**2, (-(-points // 2)) ** 2
-    total = len(studies) * (cells + coarse) + PART_WORK * len(parts) + work_of(entries, draws)
-    total += with_cycles * SURVEY_WORK * len(studies) + 2 * cells * ("isolator-damping" in studies)
+    judged_points = max(points, JUDGED)
+    half = -(-judged_points // 2)
+    total = len(studies) * (judged_points**2 + half**2) + PART_WORK * len(parts) + work_of(entries, draws)
+    total += with_cycles * SURVEY_WORK * len(studies) + 2 * points**2 * ("isolator-damping" in studies)
     tally = Tally(progress, total)
     tally.add(0, "responses")
-    base = evidence(needs - STUDIES.keys(), points, rtol, kept=kept)
+    base = evidence(needs - STUDIES.keys(), judged_points, rtol, kept=kept)
     maps: dict[str, xr.Dataset] = {}
     loose: dict[str, xr.Dataset] = {}
     for name, study in studies.items():
-        maps[name] = map_of(study, points, rtol, VERIFIED, kept=kept)
-        tally.add(cells, f"map {study.panel}")
-        loose[name] = map_of(study, -(-points // 2), RTOL, kept=kept)
-        tally.add(coarse, f"map {study.panel} at the thesis's tolerance")
+        maps[name] = map_of(study, judged_points, rtol, VERIFIED, kept=kept)
+        tally.add(judged_points**2, f"map {study.panel}")
+        loose[name] = map_of(study, half, RTOL, kept=kept)
+        tally.add(half**2, f"map {study.panel} at the thesis's tolerance")
     base = replace(base, maps=maps)
     tolerances = _tolerances(studies, points, kept, tally)
     for part in parts:
@@ -139,18 +148,19 @@ def reproduce(
     surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
     cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
     ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
+    readings = {name: _read_otherwise(entry, base, surveyed) for name, entry in entries.items()}
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
-    if points < DRAW_POINTS:
-        finer = {name: finding for name, finding in space.own.items() if entries[name].needs & STUDIES.keys()}
-        others[f"maps of {DRAW_POINTS} x {DRAW_POINTS} values"] = finer
-    verdicts = tuple(_verdict(claim, entries, ways, space, others, chosen) for claim in claims())
+    verdicts = tuple(_verdict(claim, entries, ways, space, others, readings, chosen) for claim in claims())
     curves = bode(thesis_rig(), SHOWN, series=True) if base.linear is not None else None
-    shown = by_way(base, by_peak_count)
+    judged = by_way(base, by_peak_count)
+    shown = judged.maps
+    if points < judged_points:
+        shown = {name: by_peak_count(map_of(study, points, rtol, VERIFIED)) for name, study in studies.items()}
     return Reproduction(
-        shown.maps, shown.responses, base.linear, curves, base.identified if parts else None,
+        shown, judged.maps, judged.responses, base.linear, curves, base.identified if parts else None,
         frozenset(parts) & EXPERIMENTS.keys(), tolerances,
-        _changed(tolerances), verdicts, space, cycles, points, rtol,
+        _changed(tolerances), verdicts, space, cycles, points, judged_points, rtol,
     )  # fmt: skip
 
 
@@ -160,6 +170,7 @@ def _verdict(
     ways: Mapping[str, Mapping[str, Finding]],
     space: Plausible,
     others: Mapping[str, Mapping[str, Finding]],
+    readings: Mapping[str, Mapping[str, Finding]],
     chosen: Mapping[str, ThesisStudy],
 ) -> ClaimVerdict:
     if claim.id not in entries:
@@ -176,6 +187,7 @@ def _verdict(
         space.claims.get(claim.id),
         {name: by_claim[claim.id] for name, by_claim in others.items() if claim.id in by_claim},
         entries[claim.id].undrawn,
+        readings[claim.id],
     )
 
 
@@ -187,6 +199,15 @@ def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -
         attracted = {name: surveyed[name].attracted for name in maps}
         lasting = by_way(replace(base, maps={}), by_peak_count)
         findings[CYCLE] = entry.judge(replace(lasting, maps=attracted))
+    return findings
+
+
+def _read_otherwise(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
+    """The findings by other readings of the thesis's words, by what is read otherwise."""
+    findings = {}
+    for name, other in OTHERWISE.items():
+        with read_as(other):
+            findings[name] = weakest(_ways(entry, base, surveyed))
     return findings
 
 

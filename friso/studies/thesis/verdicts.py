@@ -27,7 +27,8 @@ class ClaimVerdict:
     `ways` are the findings by the way in which hunting is judged, of which the finding is the weakest; `space` the
     claim over joint draws of the values that the thesis leaves open, None where none enters or no draw was made;
     `undrawn` what else is assumed that decides on it, and is in no draw;
-    `turned` is what another grid, or the thesis's tolerance, does to the judgement, by the name of that method.
+    `turned` is what another grid, or the thesis's tolerance, does to the judgement, by the name of that method;
+    `reread` the findings by other readings of the thesis's words that turn a criterion, by what is read otherwise.
     """
 
     claim: Claim
@@ -39,6 +40,7 @@ class ClaimVerdict:
     space: ClaimInSpace | None = None
     turned: Mapping[str, str] = field(default_factory=dict)
     undrawn: str = ""
+    reread: Mapping[str, Finding] = field(default_factory=lambda: NO_WAYS)
 
     @property
     def by_runs(self) -> Finding | None:
@@ -91,9 +93,16 @@ class ClaimVerdict:
             sentence += " It does not hold by an attracting cycle only, which was not tried in draws."
         if self.turned:
             sentence += f" With {' and with '.join(self.turned)} a criterion is judged otherwise by the runs."
+        if self.reread:
+            turns = "; ".join(f"{name}: {self._word_of(finding)}" for name, finding in self.reread.items())
+            sentence += f" Other readings of the thesis's words turn a criterion: {turns}."
         if self.undrawn:
             sentence += f" It hangs also on what is assumed and not drawn: {self.undrawn}."
         return sentence
+
+    def _word_of(self, finding: Finding) -> str:
+        """The judgement by another reading."""
+        return finding.judgement if finding.judgement != self.judgement else f"still {finding.judgement}"
 
 
 _CHOSEN = " The agreement rests on friso's choice: other values, equally plausible, remove it."
@@ -133,10 +142,11 @@ def verdict(
     space: ClaimInSpace | None = None,
     others: Mapping[str, Finding] = NO_WAYS,
     undrawn: str = "",
+    readings: Mapping[str, Finding] = NO_WAYS,
 ) -> ClaimVerdict:
     """The verdict from the findings of all `ways` and the one that they allow `together`; `others` are findings by
-    another method, by its name, in the ways that need the runs alone, which are mentioned where other parts hold than
-    in these ways here."""
+    another method, by its name, in the ways that need the runs alone, and `readings` by another reading of the words,
+    in all ways; both are mentioned where other parts hold than here."""
     runs = _by_runs(ways) or together
     turned = {
         name: f"with {name} {_change(runs, finding)}"
@@ -146,10 +156,11 @@ def verdict(
     reasons = (
         () if together.judgement == "holds" else dict.fromkeys(p.why for p in together.judged if not p.holds and p.why)
     )
-    reason = "; ".join(reasons)
+    reason = " ".join(reasons)
     if not reason and together.judgement != "holds":
-        reason = "no reason was found"
-    return ClaimVerdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned, undrawn)
+        reason = "No reason was found."
+    reread = {name: finding for name, finding in readings.items() if finding.pattern != together.pattern}
+    return ClaimVerdict(claim, together.judgement, figure, together, reason, dict(ways), space, turned, undrawn, reread)
 
 
 def _by_runs(ways: Mapping[str, Finding]) -> Finding | None:

@@ -90,6 +90,7 @@ def _together(parts: Mapping[str, Part]) -> Part:
     number = "; ".join(
         f"by {name} {'met' if part.holds else 'not met'}: {part.number}" for name, part in ordered.items()
     )
-    reason = next((part.why for part in failing.values() if part.why), "")
-    why = f"metric: it is not met by {' and '.join(failing)}" + (f"; {reason}" if reason else "")
+    agreeing = [name for name in parts if name not in failing]
+    decides = f"It depends on how hunting is judged: met by {' and '.join(agreeing)}, not by {' or '.join(failing)}."
+    why = next((part.why for part in failing.values() if part.why), decides)
     return replace(first, holds=False, number=number, why=why)

@@ -53,6 +53,7 @@ def reproduce_document(reproduction: Reproduction, laws: ConclusionsByLaw | None
         "source": thesis_rig().source,
         "friso": VERSION,
         "points": reproduction.points,
+        "points_judged": reproduction.judged_points,
         "rtol": reproduction.rtol,
         "conventions": CONVENTIONS,
         "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
@@ -88,6 +89,7 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
         "contradiction": verdict.contradiction or None,
         "hangs_on_undrawn": verdict.undrawn or None,
         "method": list(verdict.turned.values()),
+        "read_otherwise": {name: finding.judgement for name, finding in verdict.reread.items()},
         "space": _space(verdict.space) if verdict.space else None,
     }
 

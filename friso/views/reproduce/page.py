@@ -90,6 +90,7 @@ def reproduce_html(reproduction: Reproduction, laws: ConclusionsByLaw | None = N
             "method_rows": method_rows(reproduction),
             "draws": len(reproduction.plausible.draws),
             "points": reproduction.points,
+            "judged_points": reproduction.judged_points,
             "rtol": f"{reproduction.rtol:g}",
         },
     ).html()

@@ -11,16 +11,27 @@ from friso.version import VERSION
 from friso.views.reproduce import words
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from friso.studies.thesis import ClaimVerdict
 
 _A4 = 8.27, 11.69
-_COLUMNS = {"id": 0.05, "where": 0.11, "text": 0.23, "word": 0.70, "met": 0.80, "share": 0.86}
-_LETTERS, _LINES = 76, 2
+_COLUMNS = {"id": 0.05, "where": 0.105, "text": 0.22, "word": 0.71, "met": 0.80, "share": 0.87}
+_LETTERS = 84
+_TOP, _BOTTOM = 0.915, 0.035
+_BETWEEN = 0.6
+"""Space between two rows, in lines."""
 
 
 def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str], path: Path) -> None:
-    """Write the sheet: every claim with the word of agreement, criteria met, and the draws in which it holds. Raises
-    OSError."""
+    """Write the sheet. Raises OSError."""
+    metadata = {"CreationDate": None, "Creator": None, "Producer": None}
+    summary_sheet(verdicts, conclusion, colours).savefig(path, format="pdf", metadata=metadata)
+
+
+def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Mapping[str, str]) -> Figure:
+    """Every claim, its whole text, with the word of agreement, criteria met, and the draws in which it holds; rows are
+    as high as their texts need."""
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
     from matplotlib.figure import Figure
 
@@ -32,31 +43,27 @@ def save_summary(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Map
              "share": "holds in draws"}  # fmt: skip
     for name, head in heads.items():
         sheet.text(_COLUMNS[name], 0.925, head, size=6.5, weight="bold")
-    rows = words.in_order(verdicts)
-    step = 0.88 / max(1, len(rows))
-    for number, verdict in enumerate(rows):
-        y = 0.925 - (number + 0.75) * step
-        claim, covered = verdict.claim, verdict.finding is not None
-        text = textwrap.wrap(claim.text, _LETTERS)
-        if len(text) > _LINES:
-            text = [*text[: _LINES - 1], text[_LINES - 1].rsplit(" ", 1)[0] + " …"]
+    rows = [(verdict, textwrap.wrap(verdict.claim.text, _LETTERS)) for verdict in words.in_order(verdicts)]
+    line = (_TOP - _BOTTOM) / max(1.0, sum(len(text) + _BETWEEN for _, text in rows))
+    y = _TOP
+    for verdict, text in rows:
+        middle = y - (len(text) + _BETWEEN) / 2 * line
+        y -= (len(text) + _BETWEEN) * line
         space = verdict.space
-        share = f"{space.count} of {space.draws}" if space else ""
         cells = {
-            "id": claim.id,
-            "where": claim.where,
+            "id": verdict.claim.id,
+            "where": verdict.claim.where,
             "text": "\n".join(text),
             "met": words.met(verdict),
-            "share": share,
+            "share": f"{space.count} of {space.draws}" if space else "",
         }
         for name, cell in cells.items():
-            sheet.text(_COLUMNS[name], y, cell.replace("$", r"\$"), size=6, va="center", linespacing=1.05)
-        colour = colours[verdict.judgement]
+            sheet.text(_COLUMNS[name], middle, cell.replace("$", r"\$"), size=6, va="center", linespacing=1.05)
         sheet.text(
-            _COLUMNS["word"], y, words.AGREEMENT[verdict.judgement], size=6.5, va="center", color=colour,
-            weight="bold" if covered else "normal",
+            _COLUMNS["word"], middle, words.AGREEMENT[verdict.judgement], size=6.5, va="center",
+            color=colours[verdict.judgement], weight="bold" if verdict.finding else "normal",
         )  # fmt: skip
     sheet.text(
         0.05, 0.02, f"friso {VERSION}: friso reproduce. Criteria and numbers: reproduction.html, claims.json.", size=6
     )
-    sheet.savefig(path, format="pdf", metadata={"CreationDate": None, "Creator": None, "Producer": None})
+    return sheet

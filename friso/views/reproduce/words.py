@@ -29,7 +29,7 @@ def in_order(verdicts: Iterable[ClaimVerdict]) -> list[ClaimVerdict]:
 
 
 def short(text: str) -> str:
-    """The first statements of a number or a reason, as many as stand within `SHORT` characters, but one at least."""
+    """The first statements of a number, as many as stand within `SHORT` characters, but one at least."""
     first = text.split(". Assumed", 1)[0]
     ends = [match.start() for match in re.finditer(r"; |\. (?=[A-Z])|$", first)]
     return first[: max((end for end in ends if end <= SHORT), default=ends[0])]
@@ -74,7 +74,7 @@ def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
 
 def reason(verdict: ClaimVerdict) -> str:
     """Why it does not hold, the first sentence; the rest is among the details."""
-    return short(verdict.reason) if verdict.finding else verdict.reason
+    return re.split(r"(?<=\.) (?=[A-Z])", verdict.reason, maxsplit=1)[0]
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:

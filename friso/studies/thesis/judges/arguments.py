@@ -12,10 +12,11 @@ from friso.frequency.crossover import settled_margin
 from friso.hunting.criteria.run_outcome import FAILED, SWINGS
 from friso.quantities import percent
 from friso.stage import loads
-from friso.studies.thesis.claims import FEW, TREND, Evidence, Finding, FindingTable, Part, Response, about, judges
+from friso.studies.thesis.claims import Evidence, Finding, FindingTable, Part, Response, judges
 from friso.studies.thesis.judges.shares import slow_spells
 from friso.studies.thesis.linear import FREE
 from friso.studies.thesis.maps import overlap, trend, trend_text, verdict_table
+from friso.studies.thesis.reading import about, reading
 from friso.studies.thesis.studies import STUDIES
 
 LIGHT, HEAVY = "1.7 kg", "2.5 kg"
@@ -37,6 +38,7 @@ _START = 0.02
 @judges("S341", figure="Sec. 3.4.1, force at full stroke", needs=("isolator-stiffness",))
 def force_at_full_stroke(evidence: Evidence) -> Finding:
     """The rule at the thesis's own values, and over the map of stiffness and stroke."""
+    words = reading()
     flat = evidence.rig.flat()
     force, static = flat["joint.stiffness"] * flat["joint.stroke"], flat["friction.static"]
     stiffness, stroke, moving, valid = verdict_table(
@@ -57,15 +59,15 @@ def force_at_full_stroke(evidence: Evidence) -> Finding:
                 force < _MEASURED[0],
                 f"{force:.3g} N: {force / _MEASURED[0]:.2g} times the least and {force / _MEASURED[1]:.2g} "
                 "times the largest value measured",
-                why="the thesis's own rig breaks its rule where friction is lowest",
+                why="The thesis's own rig breaks its rule where friction is lowest.",
             ),
             Part(
                 "over the map of stiffness and stroke, the stage comes to rest where k_j S_j is below the static "
-                f"friction, but for few cells (at most {percent(FEW)})",
-                kept <= FEW,
+                f"friction, but for few cells (at most {percent(words.few)})",
+                kept <= words.few,
                 f"{percent(kept)} keep moving where the rule is kept, {percent(overlap(moving, ~rule & some))} where "
                 "it is broken",
-                why="the force at full stroke does not decide alone",
+                why="The force at full stroke does not decide alone.",
             ),
         )
     )
@@ -95,7 +97,7 @@ def the_mass_to_tune_for(evidence: Evidence) -> Finding:
                 "their least modulus margin is larger than tuned for the mass of the stage alone",
                 whole > small,
                 f"{whole:.2g} against {small:.2g} (0: not stable)",
-                why="the free joint's loop crosses higher than tuned, and nearer to the parasitic mode",
+                why="The free joint's loop crosses higher than tuned, and nearer to the parasitic mode.",
             ),
         )
     )
@@ -126,7 +128,7 @@ def why_mass_helps(evidence: Evidence) -> Finding:
     """The first slip across the reference after the return move, with both masses at the same crossover."""
     light, heavy = (_overshooting_slip(evidence.responses[name]) for name in (LIGHT, HEAVY))
     names = LIGHT, HEAVY
-    why = "" if np.isfinite([*light, *heavy]).all() else "one of the two has no overshoot: nothing to compare"
+    why = "" if np.isfinite([*light, *heavy]).all() else "One of the two has no overshoot: there is nothing to compare."
     return Finding(
         (
             Part(
@@ -172,6 +174,7 @@ def _overshooting_slip(response: Response) -> tuple[float, float]:
 @judges("F25O", figure="25", needs=("system",))
 def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
     """The swing at the end over the crossover, at every mass of the map."""
+    words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
     swing = runs["peak_to_peak"].transpose(CROSSOVER, "mass").values
@@ -183,8 +186,8 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
         (
             Part(
                 "with the joint locked, over the map of Fig. 11B, the swing of the cycles that last falls as the "
-                f"crossover rises (mean rank correlation over the masses at most {-TREND:g})",
-                mean <= -TREND,
+                f"crossover rises (mean rank correlation over the masses at most {-words.trend:g})",
+                mean <= -words.trend,
                 f"mean rank correlation {trend_text(mean)}, over {some.sum()} of {len(mass)} masses",
             ),
         )
@@ -195,6 +198,7 @@ def overshoot_falls_with_crossover(evidence: Evidence) -> Finding:
 def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
     """Of the cells of every map in which peaks are counted, those whose run still swings at its end; by what attracts,
     of those that are decided those which a cycle attracts."""
+    words = reading()
     rows, counted, lasting = [], 0, 0
     for name, runs in evidence.maps.items():
         peaks = (runs["peaks"].values > 0) & (runs["outcome"].values != FAILED)
@@ -206,12 +210,14 @@ def counted_peaks_mean_cycles(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"of the cells in which peaks are counted, all but a few (at most {percent(FEW)}) still swing at the "
+                f"of the cells in which peaks are counted, all but a few (at most {percent(words.few)}) still "
+                "swing at the "
                 "end of their run (by an attracting cycle: one attracts their stage)",
-                held >= 1 - FEW,
+                held >= 1 - words.few,
                 f"{percent(held)} over all maps" if counted else "no peaks are counted",
-                why="metric: peaks after 10 s also count a transient that dies out by 20 s; a cycle that attracts "
-                "is decided by what the stage does from any start (see Peak count and hunting cycle)",
+                why="Peaks after 10 s also count a transient that dies out by 20 s. A cycle that attracts is "
+                "decided by "
+                "what the stage does from any start (see Peak count and hunting cycle).",
             ),
         ),
         FindingTable(("map", "cells with counted peaks", "of these still swinging at the end"), tuple(rows)),

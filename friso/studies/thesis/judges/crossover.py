@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.quantities import percent
-from friso.studies.thesis.claims import SAME, Evidence, Finding, Part, judges
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import ends, overlap_text, sizes, verdict_table
+from friso.studies.thesis.reading import reading
 from friso.studies.thesis.studies import SOFT, thesis_rig
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ _AXES = (CROSSOVER, "joint.stroke")
 @judges("F16A", figure="16A", needs=("isolator-crossover",))
 def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
     """The crossover below which the isolated rig keeps moving, at each stroke."""
+    words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, valid = verdict_table(runs, *_AXES)
     limits = ends(crossover, moving, sizes(runs, *_AXES))
@@ -38,8 +40,8 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
             ),
             Part(
                 "the mean limits over the third and over the fourth quarter of the strokes differ by at most "
-                f"{percent(SAME)}, and the limit of stroke 0 is higher than both",
-                bool(abs(third - fourth) <= SAME * third and limits[0] > max(third, fourth)),
+                f"{percent(words.same)}, and the limit of stroke 0 is higher than both",
+                bool(abs(third - fourth) <= words.same * third and limits[0] > max(third, fourth)),
                 f"{third:.3g} Hz over the third and {fourth:.3g} Hz over the fourth quarter; {limits[0]:.3g} Hz at "
                 "stroke 0",
             ),
@@ -50,6 +52,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
 @judges("F16B", figure="16B", needs=("isolator-crossover", "isolator-crossover-soft"))
 def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     """The limits of both stiffnesses, stroke by stroke."""
+    words = reading()
     names = ("isolator-crossover", "isolator-crossover-soft")
     stiff, soft = (_limits(evidence.maps[name]) for name in names)
     stroke = verdict_table(evidence.maps[names[0]], *_AXES)[1]
@@ -61,8 +64,8 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
             Part(
                 f"over the strokes of the upper half of the range, the mean limit at {SOFT['joint.stiffness']} is "
                 f"lower than at {thesis_rig().flat()['joint.stiffness']:g} N/m by more than what is the same "
-                f"({percent(SAME)})",
-                ratio < 1 - SAME,
+                f"({percent(words.same)})",
+                ratio < 1 - words.same,
                 f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: a drop of {percent(1 - ratio)}; lower "
                 f"at {percent((drop > 0).mean())} of the strokes, higher at {percent((drop < 0).mean())}",
             ),

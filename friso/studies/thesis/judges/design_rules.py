@@ -10,9 +10,10 @@ from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
 from friso.stage import Stage, loads
-from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges, number_text
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
 from friso.studies.thesis.judges.control_and_friction import smallest_gap
 from friso.studies.thesis.maps import begins, ends, sizes, verdict_table
+from friso.studies.thesis.reading import about, reading
 from friso.studies.thesis.studies import LOCKED, masses, thesis_rig
 
 _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
@@ -87,14 +88,15 @@ def _up_to(rig: Stage) -> Part:
 
 
 def _far(rig: Stage) -> Part:
+    words = reading()
     ratio = _needed_ratio(rig.to_toml())
     return Part(
-        f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {ABOUT:g}) for a "
+        f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {words.about:g}) for a "
         f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
         about(ratio, _RATIO),
         f"{ratio:.3g} times" if np.isfinite(ratio) else f"more than {_RATIOS[-1]:g} times, the highest tried",
-        why="the mass and the damping ratio of the mode, which the thesis leaves open, determine how far away it must "
-        "be",
+        why="The mass and the damping ratio of the mode, which the thesis leaves open, determine how far away it must "
+        "be.",
     )
 
 
@@ -109,15 +111,16 @@ def _stroke(evidence: Evidence) -> Part:
         f"with {stiffness[nearest]:.0f} N/m at 8 Hz, nothing keeps moving from a stroke of {_STROKE * 1e3:g} mm on",
         needed <= _STROKE,
         f"{needed * 1e3:.3g} mm needed",
-        why="it depends on the limiter's damping, which is open",
+        why="The stroke needed depends on the limiter's damping, which is open.",
     )
 
 
 def _gap(evidence: Evidence) -> Part:
+    words = reading()
     smallest = smallest_gap(evidence)
     return Part(
         f"the smallest gap F_s - F_c at which the stage keeps moving at 8 Hz is about {_GAP:g} N (within a factor of "
-        f"{ABOUT:g})",
+        f"{words.about:g})",
         about(smallest, _GAP),
         number_text(smallest, ".2g", "N") if np.isfinite(smallest) else "no cell keeps moving",
     )
@@ -127,14 +130,15 @@ def _gap(evidence: Evidence) -> Part:
 def _locked_edge() -> str:
     """Up to where the cycle of the locked rig attracts with the mass of the rule, as `friso check` finds it."""
     edge = margin(thesis_rig().replace({**masses(_MOVING_MASS), **LOCKED}), attracting=True)
-    rig = f"with the friction of Table 2 and {_MOVING_MASS:g} kg"
+    rig = f"With the friction of Table 2 and {_MOVING_MASS:g} kg"
     if edge is None or edge.crossover is None:
-        return f"{rig} no edge of hunting was found"
-    return f"{rig} a cycle attracts up to {edge.crossover:.2g} Hz; peaks counted above that are those of transients"
+        return f"{rig} no edge of hunting was found."
+    return f"{rig} a cycle attracts up to {edge.crossover:.2g} Hz; peaks counted above that are those of transients."
 
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     """From where on the isolated and the locked rig come to rest."""
+    words = reading()
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, _ = verdict_table(runs, CROSSOVER, "joint.stroke")
     free = float(np.mean(ends(crossover, moving, sizes(runs, CROSSOVER, "joint.stroke"))[stroke >= _STROKE]))
@@ -143,7 +147,7 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
         Part(
             f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing keeps moving from about 5 to "
             "5.5 Hz on "
-            f"(within a factor of {ABOUT:g})",
+            f"(within a factor of {words.about:g})",
             about(free, _WORKS),
             f"{free:.3g} Hz on average",
             printed=_WORKS,
@@ -151,7 +155,7 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
         ),
         Part(
             f"locked, with the {_MOVING_MASS:g} kg that the abstract gives, nothing keeps moving from about "
-            f"{_LOCKED:g} Hz on (within a factor of {ABOUT:g})",
+            f"{_LOCKED:g} Hz on (within a factor of {words.about:g})",
             about(locked, _LOCKED),
             f"{locked:.3g} Hz; {weighed:.3g} Hz with the {_WEIGHED:g} kg weighed",
             why=_locked_edge(),

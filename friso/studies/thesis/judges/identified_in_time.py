@@ -18,7 +18,8 @@ from friso.studies.thesis.experiments import (
     JointSteps,
     SlowMotion,
 )
-from friso.studies.thesis.judges.identified_responses import CLOSE, CONSTANTS, FIRST, MEASURED
+from friso.studies.thesis.judges.identified_responses import CONSTANTS, FIRST, MEASURED
+from friso.studies.thesis.reading import reading
 
 _STIFFNESS = 2.9e3
 """By Fig. 19 [N/m] (Sec. 4.2.2)."""
@@ -38,30 +39,31 @@ def stiffness_from_position_steps(evidence: Evidence) -> Finding:
 
 def judged_steps(steps: JointSteps) -> Finding:
     """The finding from the simulated steps."""
+    words = reading()
     read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
     return Finding(
         (
             Part(
                 f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
-                f"within {percent(CLOSE)} of it",
-                bool(read.holds(steps.stiffness) and read.half_width <= CLOSE * steps.stiffness),
+                f"within {percent(words.close)} of it",
+                bool(read.holds(steps.stiffness) and read.half_width <= words.close * steps.stiffness),
                 f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
                 f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and "
                 "forth, "
                 f"{STANDS:g} s each; no noise",
-                why=read.reason or "method: the interval misses it, or is wide",
+                why=read.reason or "The interval misses it, or is wide.",
                 self_test=True,
             ),
             Part(
-                f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(CLOSE)})",
-                bool(abs(read.value / _STIFFNESS - 1) <= CLOSE),
+                f"it is {_STIFFNESS / 1e3:g} N/mm (within {percent(words.close)})",
+                bool(abs(read.value / _STIFFNESS - 1) <= words.close),
                 f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
-                why="not in the model: cables, misalignment, the motor constant (Sec. 4.2.2). The latter alone, "
+                why="Cables, misalignment and the motor constant (Sec. 4.2.2) are not in the model. The last alone, "
                 f"wrong by as much as the masses of Fig. 17 and 18 require, would make it {larger / 1e3:.3g} N/mm, "
                 f"and {FIRST:g} Hz "
                 f"with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} too: the force was scaled differently there, or "
-                "the joint was softer. Simulation alone cannot decide this",
+                "the joint was softer. Simulation alone cannot decide this.",
             ),
         )
     )
@@ -94,17 +96,17 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
                 bool(read.determined and read.holds(truth)),
                 f"{number_text(read.value, unit='N')} ({read.low:.3g} to {read.high:.3g}) of {truth:.3g} N: "
                 f"{read.method}",
-                why=read.reason or "method: the interval misses it",
+                why=read.reason or "The interval misses it.",
                 self_test=True,
             ),
             Part(
                 f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
                 bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
                 f"{range_read}, lower the faster the motion",
-                why=f"input: Table 2 takes {truth:g} N, more than was measured. Besides, peaks read at a finite speed "
-                f"lie below the static friction, here by up to {percent(1 - forces.min() / truth)}"
+                why=f"Table 2 takes {truth:g} N, more than was measured. Besides, peaks read at a finite speed "
+                f"lie below the static friction, here by up to {percent(1 - forces.min() / truth)}."
                 if slips
-                else "no slips",
+                else "There are no slips.",
             ),
         )
     )
@@ -123,13 +125,17 @@ def force_at_constant_speed(evidence: Evidence) -> Finding:
     return judged_speeds(*evidence.experiments.constant_speed)
 
 
+def force_swings(runs: ConstantSpeed) -> list[float]:
+    """The standard deviation of the force over its mean at each speed, from a tenth of the way on."""
+    forces = [runs.log["force"][part] for part in runs.log.segments]
+    return [float(np.std(late) / abs(np.mean(late))) for late in (force[len(force) // 10 :] for force in forces)]
+
+
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     """The finding from the simulated runs."""
+    words = reading()
     named = {"free": free.result, "locked": locked.result}
-    swings = {
-        name: [passage.spread / abs(passage.mean.value) for passage in friction.passes]
-        for name, friction in named.items()
-    }
+    swings = {"free": force_swings(free), "locked": force_swings(locked)}
     listed = "; ".join(f"{name} {', '.join(map(percent, shares))}" for name, shares in swings.items())
     rows = tuple(
         (name, f"{1e3 * speed:g} mm/s", f"{passage.mean.value:.3g} N", percent(swing))
@@ -140,12 +146,12 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     return Finding(
         (
             Part(
-                f"the force oscillates at both speeds, joint free or locked (by more than {percent(CLOSE)} of "
+                f"the force oscillates at both speeds, joint free or locked (by more than {percent(words.close)} of "
                 "its mean)",
-                all(shares and min(shares) > CLOSE for shares in swings.values()),
+                all(shares and min(shares) > words.close for shares in swings.values()),
                 f"standard deviation over mean at {' and '.join(f'{v * 1e3:g}' for v in free.speeds)} mm/s: {listed}. "
                 f"Assumed: {_UNIFORM}",
-                why="locked, the simulated rig slides steadily where it is fast enough",
+                why="Locked, the simulated rig slides steadily where it is fast enough.",
             ),
             Part(
                 "the oscillation depends on the position: passes over the same places repeat it",
@@ -153,8 +159,8 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
                     friction.repeatability.determined and friction.repeatability.low > 0 for friction in named.values()
                 ),
                 f"correlation of the two speeds: {repeats}",
-                why="not in the model: its friction is uniform along the rail, and it is the loop that oscillates, by "
-                "sticking and slipping. Simulation alone cannot decide this",
+                why="The friction of the model is uniform along the rail, and it is the loop that oscillates, by "
+                "sticking and slipping. Simulation alone cannot decide this.",
             ),
             Part(
                 "dynamic friction cannot be determined, joint free or locked",

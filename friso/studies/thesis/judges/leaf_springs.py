@@ -13,7 +13,8 @@ from friso.leaf_springs.evaluation import Evaluation
 from friso.leaf_springs.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 from friso.quantities import percent
-from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso.studies.thesis.reading import reading
 from friso.studies.thesis.studies import thesis_rig
 
 _STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
@@ -89,6 +90,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
     """The first mode other than the drive mode, over the parameters left open."""
+    words = reading()
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
     visible = np.array(
         [evaluation.interfering.frequency if evaluation.interfering else np.nan for evaluation in evaluations]
@@ -96,12 +98,13 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
     frequencies = np.array([mode.frequency for mode in modes])
     names = sorted({mode.name for mode in modes})
     return Part(
-        f"the first parasitic mode is about {_PARASITIC:g} Hz (within a factor of {ABOUT:g}), whatever spacing of "
+        f"the first parasitic mode is about {_PARASITIC:g} Hz (within a factor of {words.about:g}), whatever "
+        "spacing of "
         f"{_millimetres(_SPACINGS)} and height of the centre of mass of {_millimetres(_HEIGHTS)} above the leaf ends",
-        bool(np.all((frequencies >= _PARASITIC / ABOUT) & (frequencies <= _PARASITIC * ABOUT))),
+        bool(np.all((frequencies >= _PARASITIC / words.about) & (frequencies <= _PARASITIC * words.about))),
         f"{_range(frequencies)} Hz: {' or '.join(names)}; the first that actuator and sensor, underneath the leaves, "
         f"see: {_range(visible)} Hz",
-        why="the sideways mode of the stage falls with its height, which the thesis leaves open",
+        why="The sideways mode of the stage falls with its height, which the thesis leaves open.",
     )
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, FindingTable, Part, about, judges
+from friso.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
 from friso.studies.thesis.linear import PARASITIC, PLANT, LimitCase
+from friso.studies.thesis.reading import about, reading
 
 _FIRST = 10.0
 """Where the thesis finds the eigenfrequency of the free joint [Hz] (Sec. 3.4.2)."""
@@ -37,12 +38,13 @@ def _table(plants: Mapping[str, LimitCase]) -> FindingTable:
 
 def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
     """The eigenfrequency of the free joint, and its pair where the cart slides."""
+    words = reading()
     low = {name: [f for f in plants[name].antiresonances if f < plants[name].first] for name in _FREE}
     pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
     return (
         Part(
-            f"with the limiter free, the first resonance is about {_FIRST:g} Hz (from {_FIRST / ABOUT:.3g} to "
-            f"{_FIRST * ABOUT:.3g} Hz), stuck and sliding",
+            f"with the limiter free, the first resonance is about {_FIRST:g} Hz (from {_FIRST / words.about:.3g} to "
+            f"{_FIRST * words.about:.3g} Hz), stuck and sliding",
             all(about(plants[name].first, _FIRST) for name in _FREE),
             ", ".join(f"{name} {plants[name].first:.3g} Hz" for name in _FREE),
         ),
@@ -56,6 +58,7 @@ def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
 
 def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
     """The parasitic mode, and the pair above it where the limiter is touched."""
+    words = reading()
     names = (*_FREE, *_TOUCHED)
     pairs = {name: plants[name].pair_above for name in _TOUCHED}
     free = [name for name in _FREE if plants[name].pair_above]
@@ -65,11 +68,11 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
     above = all(pairs.values())
     return (
         Part(
-            f"in all four cases a resonance is about {PARASITIC:g} Hz (from {PARASITIC / ABOUT:.3g} to "
-            f"{PARASITIC * ABOUT:.3g} Hz)",
+            f"in all four cases a resonance is about {PARASITIC:g} Hz (from {PARASITIC / words.about:.3g} to "
+            f"{PARASITIC * words.about:.3g} Hz)",
             all(about(plants[name].parasitic, PARASITIC) for name in names),
             ", ".join(f"{name} {plants[name].parasitic:.4g} Hz" for name in names),
-            why="with the limiter touched the parasitic mass swings against cart and stage, not against the stage",
+            why="With the limiter touched the parasitic mass swings against cart and stage, not against the stage.",
         ),
         Part(
             "with the limiter touched, an antiresonance and then a resonance lie above the parasitic mode, and with it "
@@ -79,8 +82,8 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
             f"than with it free: {'; '.join(series)}",
         ),
         Part(
-            f"that pair lies just above it: its resonance within half a decade of it (a factor of {ORDER:.2g})",
-            above and ratio <= ORDER,
+            f"that pair lies just above it: its resonance within half a decade of it (a factor of {words.order:.2g})",
+            above and ratio <= words.order,
             f"a factor of {ratio:.2g}" if above else "no pair",
             why=_why_far(ratio) if above else "",
         ),
@@ -88,12 +91,15 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
 
 
 def _why_far(ratio: float) -> str:
+    words = reading()
     return (
-        "idealisation: the pair is that of the cart on the limiter, and of cart and stage against each other on it, "
-        "with k_l of 2e7 N/m as printed (Sec. 3.2.3). Its frequency scales roughly with the root of k_l, which would "
+        "The model idealises the pair: it is that of the cart on the limiter, and of cart and stage against "
+        "each other on "
+        "it, with k_l of 2e7 N/m as printed (Sec. 3.2.3). Its frequency scales roughly with the root of k_l, "
+        "which would "
         "have to be "
-        f"{(ratio / ORDER) ** 2:.2g} times smaller, and its resonance with the part of the stage's mass that the "
-        "parasitic mode leaves"
+        f"{(ratio / words.order) ** 2:.2g} times smaller, and its resonance with the part of the stage's mass that the "
+        "parasitic mode leaves."
     )
 
 
@@ -105,10 +111,12 @@ def _masses(evidence: Evidence) -> dict[bool, float]:
 
 
 def _mass_lines(plants: Mapping[str, LimitCase], expected: Mapping[bool, float]) -> Part:
+    words = reading()
     masses = {name: plants[name].mass for name in (*_FREE, *_TOUCHED)}
     listed = ", ".join(f"{name} {mass:.3g} kg at {plants[name].mass_at:.3g} Hz" for name, mass in masses.items())
     return Part(
-        f"below the parasitic mode the magnitude follows about {expected[False]:.3g} kg (within a factor of {ABOUT:g}) "
+        f"below the parasitic mode the magnitude follows about {expected[False]:.3g} kg (within a factor of "
+        f"{words.about:g}) "
         f"with the limiter free and about {expected[True]:.3g} kg with it touched",
         all(about(mass, expected[name in _TOUCHED]) for name, mass in masses.items()),
         f"{listed}; it is the limiter that distinguishes them, not, as Sec. 3.4.2 says, sticking and slipping",

@@ -7,12 +7,13 @@ import numpy as np
 from friso.frequency.crossover import HIGHEST, WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
-from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, FindingTable, Part, about, judges, number_text
+from friso.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso.studies.thesis.experiments import BUILT
 from friso.studies.thesis.judges.rig_loops import RAIL, measured_free, measured_locked, on_the_rig
 from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
 from friso.studies.thesis.linear.loops import SAMPLED
 from friso.studies.thesis.linear.trials import IDENTIFIED, LITTLE
+from friso.studies.thesis.reading import about, reading
 
 _SIMULATED, _MEASURED = 60.0, 48.0
 """The highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
@@ -24,20 +25,23 @@ _CROSSES = 20.0
 @judges("F8", figure="8", needs=(FREE, LOCKED_LOOP))
 def stable_at_every_speed(evidence: Evidence) -> Finding:
     """Stability over the speed of the cart, what speed does to the loop, and the crossover by the design method."""
+    words = reading()
     analysis = evidence.analysis
     single = analysis.free.single
     return Finding(
         (
             _stable_at_speeds(analysis.speeds),
             Part(
-                f"between the prescribed speeds the loop differs far (by more than a factor of {ORDER:.2g}) at a tenth "
-                f"of the crossover, and hardly (at most {ABOUT:g}) at ten times",
-                analysis.speeds.slow > ORDER and analysis.speeds.fast <= ABOUT,
+                "between the prescribed speeds the loop differs far (by more than a factor of "
+                f"{words.order:.2g}) at a tenth "
+                f"of the crossover, and hardly (at most {words.about:g}) at ten times",
+                analysis.speeds.slow > words.order and analysis.speeds.fast <= words.about,
                 f"factor {analysis.speeds.slow:.3g} at a tenth, {analysis.speeds.fast:.3g} at ten times",
             ),
             Part(
                 "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
-                f"crossover may be about {_SIMULATED:g} Hz (from {_SIMULATED / ABOUT:.3g} to {_SIMULATED * ABOUT:.3g} "
+                f"crossover may be about {_SIMULATED:g} Hz (from {_SIMULATED / words.about:.3g} to "
+                f"{_SIMULATED * words.about:.3g} "
                 "Hz)",
                 single is not None and about(single, _SIMULATED),
                 f"up to {_hertz(single)}, where {_beyond(analysis.locked)}; all limit cases are stable up to "
@@ -56,19 +60,19 @@ def _beyond(locked: CrossoverLoops) -> str:
 def _stable_at_speeds(speeds: Speeds) -> Part:
     unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
-    why = "idealisation: there friction falls as the speed rises (Stribeck effect)"
+    why = "There friction falls as the speed rises (Stribeck effect)"
     if speeds.incurable:
         why += f", and in the middle of that range no faster controller up to {HIGHEST / 1e3:g} kHz is stable"
     if not speeds.undeflected:
         why += (
-            "; linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves this out, "
+            ". Linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves this out, "
             "the loop is stable at every speed: probably what the thesis plotted"
         )
     return Part(
         "the loop is stable at every speed of the cart, its limiter free or touched",
         not where,
         f"unstable: {', '.join(where)}" if where else "stable at every speed",
-        why=why if where else "",
+        why=f"{why}." if where else "",
     )
 
 
@@ -79,17 +83,18 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 @judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT), undrawn=RAIL)
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     """The crossings of the locked rig, sliding, at the thesis's settings."""
+    words = reading()
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
     tuned = {f: crossing_nearest(loop, f) for f, loop in settings.items()}
     lowest, highest = min(settings), max(settings)
     further = _further(settings[highest], highest)
     near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
-    why = f"idealisation: {_why_elsewhere(evidence.analysis.contact)}"
+    why = _why_elsewhere(evidence.analysis.contact)
     return Finding(
         (
             Part(
                 f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
-                f"a factor of {ABOUT:g})",
+                f"a factor of {words.about:g})",
                 all(about(crossing, f) for f, crossing in tuned.items()),
                 ", ".join(f"{crossing:.3g} Hz tuned to {f:g}" for f, crossing in tuned.items()),
             ),
@@ -100,8 +105,8 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
                 why=why,
             ),
             Part(
-                f"one of these crossings is about {FURTHER:g} Hz (from {FURTHER / ABOUT:.3g} to "
-                f"{FURTHER * ABOUT:.3g} Hz)",
+                f"one of these crossings is about {FURTHER:g} Hz (from {FURTHER / words.about:.3g} to "
+                f"{FURTHER * words.about:.3g} Hz)",
                 about(near, FURTHER),
                 f"nearest {near:.3g} Hz" if further else "none",
                 why=why,
@@ -116,10 +121,10 @@ def _why_elsewhere(contact: Contact) -> str:
     """What it would take to cross 0 dB where the thesis measured it."""
     soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
     return (
-        "no mode of the locked model lies there. The contact of cart and stage would with k_l of "
+        "No mode of the locked model lies there. The contact of cart and stage would with k_l of "
         f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
         f"{_frequencies(soft)} with the limiter damping of the rig, {_frequencies(undamped)} with {LITTLE}. Or it is "
-        "the frame of the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model"
+        "the frame of the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model."
     )
 
 
@@ -134,8 +139,8 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
         f"{WANTED:g} (or it is unstable)",
         bool(further) and (not margins.stable or (close and margins.modulus_margin < WANTED)),
         where,
-        why=f"tuned to {setting:g} Hz, the model is far from instability even there: it would take a delay of "
-        f"{_micro(margins.delay_margin)}"
+        why=f"Tuned to {setting:g} Hz, the model is far from instability even there: it would take a delay of "
+        f"{_micro(margins.delay_margin)}."
         if further and margins.stable
         else "",
     )
@@ -144,6 +149,7 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT), undrawn=RAIL)
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
     """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
+    words = reading()
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
     crossing = {name: crossing_nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
@@ -153,18 +159,20 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
         (
             Part(
                 f"tuned to {min(analysis.free.margins):g} Hz for the whole mass, the free joint's loop crosses 0 dB "
-                f"about {_CROSSES:g} Hz (from {_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
+                f"about {_CROSSES:g} Hz (from {_CROSSES / words.about:.3g} to {_CROSSES * words.about:.3g} Hz), "
+                "stuck and sliding",
                 all(about(f, _CROSSES) for f in crossing.values()),
                 f"{crossed}; with the masses identified ({', tuned for '.join(IDENTIFIED.values())}) "
                 f"{crossing_nearest(analysis.identified, _CROSSES):.3g} Hz",
             ),
             Part(
                 f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
-                f"{_MEASURED / ABOUT:.3g} to {_MEASURED * ABOUT:.3g} Hz)",
+                f"{_MEASURED / words.about:.3g} to {_MEASURED * words.about:.3g} Hz)",
                 highest is not None and about(highest, _MEASURED),
                 f"in continuous time {_hertz(highest)}; sampled, see the table; {_edges(analysis, _MEASURED)}",
-                why="idealisation: the simulated controller neither samples nor delays; the rig's does, but the thesis "
-                "gives no delay. Besides, its frame has resonances (Sec. 4.3.1) that the model does not have",
+                why="The simulated controller neither samples nor delays; the rig's does, but the thesis gives "
+                "no delay. "
+                "Besides, its frame has resonances (Sec. 4.3.1) that the model does not have.",
             ),
             *on_the_rig(evidence, measured_free),
         ),

@@ -7,7 +7,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.equations.motion import CRUISE
 from friso.quantities import percent
-from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import (
     ends,
     free_square,
@@ -19,6 +19,7 @@ from friso.studies.thesis.maps import (
     trend_text,
     verdict_table,
 )
+from friso.studies.thesis.reading import reading
 from friso.studies.thesis.studies import STUDIES
 
 _ENDS = 20.0
@@ -31,6 +32,7 @@ TRAVEL = 0.16
 @judges("F11A", figure="11A", needs=("path",))
 def path_is_no_cure(evidence: Evidence) -> Finding:
     """Scattered cells that settle below a hyperbola of acceleration and its time, none above it."""
+    words = reading()
     acceleration, time, moving, valid = verdict_table(
         evidence.maps["path"], "motion.acceleration", "motion.acceleration_time"
     )
@@ -48,19 +50,19 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
         (
             Part(
                 "all but a few of the accelerations and acceleration times that move the stage have cells that keep "
-                f"moving, and the largest square at rest covers few cells (at most {percent(FEW)})",
-                free_lines <= FEW and square <= FEW,
+                f"moving, and the largest square at rest covers few cells (at most {percent(words.few)})",
+                free_lines <= words.few and square <= words.few,
                 f"{percent(overlap(moving, moved))} of the paths that move the stage keep it moving; "
                 f"{percent(free_lines)} of the lines and a square of {percent(square, 3)} come to rest",
             ),
             Part(
                 f"so it is among the paths that fit the {TRAVEL * 1e3:g} mm of the rig (Sec. 3.5): the largest square "
                 "at rest covers few of them",
-                bool(moving[fits].any() and short_square <= FEW),
+                bool(moving[fits].any() and short_square <= words.few),
                 f"{percent(overlap(fits, moved))} of the paths fit; {percent(overlap(moving, fits))} of these keep it "
                 f"moving, and a square of {percent(short_square, 3)} of them comes to rest",
-                why="most of the paths of Fig. 11A are longer than the rig is, and among the others a block comes to "
-                "rest",
+                why="Most of the paths of Fig. 11A are longer than the rig is, and among the others a block comes to "
+                "rest.",
             ),
             Part(
                 "above some hyperbola, acceleration times its time constant, every path keeps the stage "
@@ -77,6 +79,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
     """The highest crossover that keeps moving, over all masses and for each."""
+    words = reading()
     runs = evidence.maps["system"]
     crossover, mass, moving, _ = verdict_table(runs, CROSSOVER, "mass")
     by_mass = ends(crossover, moving, sizes(runs, CROSSOVER, "mass"))
@@ -86,9 +89,9 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"the limit above which no mass keeps moving is about {_ENDS:g} Hz (from {_ENDS / ABOUT:.3g} to "
-                f"{_ENDS * ABOUT:.3g} Hz)",
-                bool(_ENDS / ABOUT <= highest <= _ENDS * ABOUT),
+                f"the limit above which no mass keeps moving is about {_ENDS:g} Hz (from {_ENDS / words.about:.3g} to "
+                f"{_ENDS * words.about:.3g} Hz)",
+                bool(_ENDS / words.about <= highest <= _ENDS * words.about),
                 f"limit {highest:.3g} Hz{_at_the_limit(moving, peak_counts(runs, CROSSOVER, 'mass'))}; "
                 f"median over the masses {np.median(by_mass):.3g} Hz",
                 printed=_ENDS,
@@ -96,8 +99,8 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
             ),
             Part(
                 "at some crossovers the stage keeps moving with the marker's mass and comes to rest with the "
-                f"heaviest, and the limit falls with the mass (rank correlation at most {-TREND:g})",
-                bool(ended.any() and falls <= -TREND),
+                f"heaviest, and the limit falls with the mass (rank correlation at most {-words.trend:g})",
+                bool(ended.any() and falls <= -words.trend),
                 f"{ended.sum()} of {marker.sum()} crossovers; rank correlation {trend_text(falls)}: limit "
                 f"{by_mass[0]:.3g} Hz at {mass[0]:g} kg, {by_mass[-1]:.3g} Hz at {mass[-1]:g} kg",
             ),

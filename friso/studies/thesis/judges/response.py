@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from friso.hunting import BANDS
-from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, judges
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso.studies.thesis.reading import reading
 
 
 @judges("F5", figure="5", needs=("locked",))
 def locked_rig_hunts(evidence: Evidence) -> Finding:
     """Counted peaks, period and amplitude of the locked rig."""
+    words = reading()
     cell = evidence.responses["locked"].cell
     peaks, period, amplitude = int(cell["count"]), float(cell["period"]), float(cell["peak_to_peak"]) / 2
     size = f"amplitude {amplitude * 1e3:.3g} mm" if amplitude > BANDS[0] else "no amplitude"
@@ -22,13 +24,13 @@ def locked_rig_hunts(evidence: Evidence) -> Finding:
                 f"{peaks} peaks",
             ),
             Part(
-                f"the period lies between {1 / ORDER:.2g} s and 10 s",
-                1 / ORDER <= period <= 10,
+                f"the period lies between {1 / words.order:.2g} s and 10 s",
+                1 / words.order <= period <= 10,
                 f"period {period:.3g} s" if np.isfinite(period) else "no period",
             ),
             Part(
-                f"the amplitude (half of peak to peak) lies between {1 / ORDER:.2g} and {ORDER:.2g} mm",
-                1e-3 / ORDER <= amplitude <= 1e-3 * ORDER,
+                f"the amplitude (half of peak to peak) lies between {1 / words.order:.2g} and {words.order:.2g} mm",
+                1e-3 / words.order <= amplitude <= 1e-3 * words.order,
                 size,
             ),
         )

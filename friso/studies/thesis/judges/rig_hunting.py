@@ -13,9 +13,10 @@ from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMIL
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
-from friso.studies.thesis.claims import ORDER, Evidence, Finding, FindingTable, Part, about, judges, number_text
+from friso.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges, number_text
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 from friso.studies.thesis.judges.rig_loops import RAIL
+from friso.studies.thesis.reading import about, reading
 
 _ASSUMED = (
     f"Assumed: friction that varies by {percent(AS_BUILT['rail.static_deviation'])} over "
@@ -62,7 +63,7 @@ def judged_move(moves: MovesOnRails) -> Finding:
                 "with the joint locked peaks are counted, on at least half of the rails",
                 2 * locked[0] >= locked[1] > 0,
                 f"{_rails(locked)}. {_ASSUMED}",
-                why="where friction differs between the two places at which the stage sticks, its swings die out",
+                why="Where friction differs between the two places at which the stage sticks, its swings die out.",
             ),
             Part("with the joint free on none", free[0] == 0 < free[1], _rails(free)),
         )
@@ -100,7 +101,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
                 f"{started} of {int(settle.sum())} such rails, released {percent(max(DISPLACEMENTS))} of the "
                 "move to either "
                 "side",
-                why="none of the starts tried on these rails keeps swinging",
+                why="None of the starts tried on these rails keeps swinging.",
             ),
         )
     )
@@ -142,6 +143,7 @@ def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
 
 def judged_cycles(cycles: CyclesOnRails) -> Finding:
     """The finding from the cycles on an even rail, which is the simulation of the thesis, and on rails that vary."""
+    words = reading()
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
     slower = np.where(swings, rails.period, np.nan) / even.period[0]
@@ -157,18 +159,19 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
             Part(
                 "on an even rail the cycle is symmetric, of the order of a millimetre from peak to peak",
                 bool(even.swings[0])
-                and about(float(even.swing[0]), 1e-3, ORDER)
+                and about(float(even.swing[0]), 1e-3, words.order)
                 and about(float(even.above[0] / even.below[0]), 1.0),
                 f"{even.swing[0] * 1e3:.3g} mm, period {even.period[0]:.3g} s, one side "
                 f"{even.above[0] / even.below[0]:.3g} times the other",
-                why="no lasting swing on an even rail",
+                why="There is no lasting swing on an even rail.",
             ),
             Part(
                 f"on a rail that varies its period is nearly twice as long (at least {AS_SLOW:g} times) at a similar "
                 f"swing (within a factor of {SIMILAR:g}), on at least half of those that keep swinging",
                 bool(swings.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= swings.sum()),
                 f"{swinging}{times}. {_ASSUMED}",
-                why="not because of the rail: friction that differs between the two sides slows a cycle down, and ends "
+                why="The rail is not the cause: friction that differs between the two sides slows a cycle down, "
+                "and ends "
                 f"it before it is twice as slow. {_weak_motor(cycles)}",
             ),
             Part(
@@ -178,14 +181,14 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
                 f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
                 if len(lopsided)
                 else "nothing swings on",
-                why="too few keep swinging",
+                why="Too few keep swinging.",
             ),
             Part(
                 f"there it is less regular from cycle to cycle (period scatters by more than {percent(_IRREGULAR)})",
                 scatter > _IRREGULAR,
                 f"median scatter of the period {percent(scatter)}",
-                why="friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
-                "the model",
+                why="Friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
+                "the model.",
             ),
         )
     )
@@ -198,10 +201,10 @@ def _weak_motor(cycles: CyclesOnRails) -> str:
         f"and {COULOMB_LEVEL:g} times the Coulomb friction,"
     )
     if not (cycles.weak.swings[0] and cycles.even.swings[0]):
-        return f"{cause} there is no cycle to compare"
+        return f"{cause} there is no cycle to compare."
     period, swing = (float(getattr(cycles.weak, name)[0] / getattr(cycles.even, name)[0]) for name in _COMPARED)
     return (
-        f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig measured-cycles)"
+        f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig measured-cycles)."
     )
 
 
@@ -216,6 +219,7 @@ def free_joint_stands_less_still(evidence: Evidence) -> Finding:
 
 def judged_standstill(standstill: InPosition) -> Finding:
     """The finding from the standstills."""
+    words = reading()
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
     expected = _DEVIATIONS[1] / _DEVIATIONS[0]
@@ -235,7 +239,7 @@ def judged_standstill(standstill: InPosition) -> Finding:
             ),
             Part(
                 f"free it is of the order of {expected:g} times as large as locked",
-                about(ratio, expected, ORDER),
+                about(ratio, expected, words.order),
                 f"ratio of RMS values: {number_text(ratio, '.2g')}",
             ),
             Part(
@@ -243,8 +247,9 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 tenfold >= _RECOVERED,
                 f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
                 f"{percent(standstill.recovered.max())} at the most tried",
-                why="stiffness: the sticking bearing holds the locked stage with its bristles, the free one is held "
-                "only by the joint and the controller",
+                why="The sticking bearing holds the locked stage with its stiff bristles, the free one is held "
+                "only by the "
+                "joint and the controller.",
             ),
         ),
         _noises(standstill),
@@ -252,7 +257,8 @@ def judged_standstill(standstill: InPosition) -> Finding:
 
 
 def _sized(peaks: tuple[float, float]) -> bool:
-    return all(about(peak, size, ORDER) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
+    words = reading()
+    return all(about(peak, size, words.order) for peak, size in zip(peaks, _DEVIATIONS, strict=True))
 
 
 def _over_noise(standstill: InPosition) -> str:
@@ -260,9 +266,9 @@ def _over_noise(standstill: InPosition) -> str:
     met = [f"{factor:g}" for factor, peaks in standstill.louder.items() if _sized(peaks)]
     tried = ", ".join(f"{factor:g}" for factor in standstill.louder)
     if not tried:
-        return "the disturbances are assumed"
+        return "The disturbances are assumed."
     where = f"with {' and '.join(met)} times the noise it is met" if met else "it is met with none"
-    return f"the disturbances are assumed: {where} ({tried} times the assumed noise of the force were tried)"
+    return f"The disturbances are assumed: {where} ({tried} times the assumed noise of the force were tried)."
 
 
 def _noises(standstill: InPosition) -> FindingTable | None:

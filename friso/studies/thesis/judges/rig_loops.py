@@ -10,7 +10,8 @@ from friso.quantities import percent
 from friso.studies.rig.excitation import SLIDING
 from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, crossing_near_target, highest_stable
 from friso.studies.thesis.as_built import AS_BUILT, RigLoops
-from friso.studies.thesis.claims import ABOUT, Evidence, Part, about, number_text
+from friso.studies.thesis.claims import Evidence, Part, number_text
+from friso.studies.thesis.reading import about, reading
 
 _HIGHEST, _OTHER, _FREE = 48.0, 600.0, 20.0
 """Highest setting, crossing that threatens stability (Fig. 22), and the crossing of the free joint (Fig. 23) [Hz]."""
@@ -40,28 +41,30 @@ def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
 
 
 def _crossings(loops: RigLoops) -> Part:
+    words = reading()
     read = {loop.tuned: crossing_near_target(loop) for loop in loops.locked}
     return Part(
-        f"measured on the rig as built, every open loop crosses 0 dB about where it is tuned (within {ABOUT:g})",
+        f"measured on the rig as built, every open loop crosses 0 dB about where it is tuned (within {words.about:g})",
         all(about(crossed, tuned) for tuned, crossed in read.items()),
         ", ".join(f"{number_text(crossed, unit='Hz')} tuned to {tuned:.3g} Hz" for tuned, crossed in read.items())
         + f". {ASSUMED}",
-        why="not in the model: friction bends the response at low frequency, or another",
+        why="Friction, which the loop of the model does not have, bends the response at low frequency.",
     )
 
 
 def _further(loops: RigLoops) -> Part:
     """Whether the loop with the highest setting crosses again."""
+    words = reading()
     last = loops.locked[-1]
-    above = [crossing.value for crossing in last.crossings if crossing.value > ABOUT * last.tuned]
+    above = [crossing.value for crossing in last.crossings if crossing.value > words.about * last.tuned]
     near, gain = _peak(last, BEYOND * last.tuned)
     return Part(
         f"measured on the rig as built, that tuned to {last.tuned:g} Hz crosses 0 dB again about {_OTHER:g} Hz",
         any(about(f, _OTHER) for f in above),
         f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
         f"{number_text(gain, '.2g')} at {number_text(near, unit='Hz')}",
-        why=f"not in the model: its only parasitic mode, that of Fig. 18, is at {near:.3g} Hz with the joint locked. "
-        "Simulation alone cannot decide this"
+        why=f"The only parasitic mode of the model, that of Fig. 18, is at {near:.3g} Hz with the joint locked. "
+        "Simulation alone cannot decide this."
         if np.isfinite(near)
         else "",
     )
@@ -84,15 +87,16 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
             f"measured on the rig as built, tuned to {loops.free.tuned:g} Hz, it crosses 0 dB about {_FREE:g} Hz",
             about(crossed, _FREE),
             f"last crossing: {number_text(crossed, unit='Hz')}. {ASSUMED}",
-            why="not in the model: with the masses identified instead of weighed it crosses lower",
+            why="With the masses weighed it crosses higher than with those identified, which the model does not have.",
         ),
         Part(
             f"the highest setting at which the rig as built comes to rest is about {_HIGHEST:g} Hz",
             about(highest, _HIGHEST),
             f"{number_text(highest, unit='Hz')}, of settings 10 % apart, released away from its reference, the "
             "limiters not touched",
-            why="not in the model: the thesis found “resonances in the compliant joint”, of which the model has one, "
-            "and its delays are our choice",
+            why="The thesis found “resonances in the compliant joint”, of which the model has one, and the "
+            "delays of the "
+            "model are friso's choice.",
         ),
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import sympy as sp
 
 from friso.frequency.stiffness import in_series, series_sensitivity
@@ -31,6 +33,7 @@ def printed_formulas(evidence: Evidence) -> Finding:
     )
 
 
+@cache
 def judged_formulas(stiffness: sp.Expr, slope_printed: sp.Expr) -> tuple[Part, Part, Part]:
     """The given formulas, in K_F and K_J, against two springs that carry one force."""
     force, middle, end = sp.symbols("F u x")

@@ -67,7 +67,7 @@ def narrow_gap_breaks_away_later(evidence: Evidence) -> Finding:
     why = (
         ""
         if wide.both and narrow.both
-        else "one of the two does not stick in both directions: there is nothing to compare"
+        else "One of the two does not stick in both directions: there is nothing to compare."
     )
     return Finding(
         (

@@ -12,7 +12,8 @@ from friso.evidence import findings_on_file
 from friso.hunting.criteria.run_outcome import SWINGS
 from friso.quantities import percent
 from friso.studies.sweep import sweep
-from friso.studies.thesis.claims import SAME, Evidence, Finding, FindingTable, Part, judges
+from friso.studies.thesis.claims import Evidence, Finding, FindingTable, Part, judges
+from friso.studies.thesis.reading import reading
 from friso.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
@@ -88,6 +89,7 @@ def _counted(cell: xr.Dataset) -> Counted:
 
 def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loose: Mapping[str, Counted]) -> Finding:
     """The finding from runs by name: of ode23s, and of friso at the tight tolerance and at the thesis's."""
+    words = reading()
     swinging = [name for name, (_, swing, _) in tight.items() if swing > 0]
     counts = [name for name in tight if theirs[name][0] != tight[name][0]]
     off = {name: abs(theirs[name][1] / tight[name][1] - 1) for name in swinging}
@@ -102,13 +104,13 @@ def judged_runs(theirs: Mapping[str, Counted], tight: Mapping[str, Counted], loo
                 not counts,
                 f"in {len(tight) - len(counts)} of {len(tight)}"
                 + (f"; not in {', '.join(map(_title, counts))}" if counts else ""),
-                why="tolerance: these runs are near an edge of hunting, or bounce on the limiter",
+                why="The tolerance decides where a run is near an edge of hunting, or bounces on the limiter.",
             ),
             Part(
-                f"the swing at the end is the same (within {percent(SAME)}) in each run that swings at {TIGHT:g}",
-                bool(off) and max(off.values()) <= SAME,
+                f"the swing at the end is the same (within {percent(words.same)}) in each run that swings at {TIGHT:g}",
+                bool(off) and max(off.values()) <= words.same,
                 f"off by at most {percent(max(off.values()), 2)} in {len(off)} runs" if off else "no run swings",
-                why="tolerance",
+                why="The tolerance is too loose for these.",
             ),
             Part(
                 f"friso at {RTOL:g}, without a largest step but the two hundredth of the run, counts as many in each",

@@ -1,0 +1,101 @@
+"""How the words of the thesis are read in numbers: “about”, “far”, “few”, “the same”, “trend”, “large”; and how they
+might be read as well."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+from friso.quantities import percent
+
+
+@dataclass(frozen=True)
+class WordReading:
+    """The numbers behind the words: the factor within which a number is `about` another, and that within which it is
+    `of the order` of another and beyond which it is far below it; the share of a map's cells up to which they are
+    `few`, and up to which there are `none`; the rank correlation (Spearman) from which there is a `trend`; the share
+    within which numbers are the `same`, and within which they are `close`, as far as one reads them off a figure; and
+    the damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied."""
+
+    about: float = 1.5
+    order: float = 10**0.5
+    few: float = 0.05
+    none: float = 0.0
+    trend: float = 0.5
+    same: float = 0.15
+    close: float = 0.1
+    large: float = 1e2
+
+
+OWN = WordReading()
+"""Friso's own reading."""
+
+_READ: ContextVar[WordReading] = ContextVar("reading", default=OWN)
+
+
+def reading() -> WordReading:
+    """The reading by which claims are judged now."""
+    return _READ.get()
+
+
+@contextmanager
+def read_as(other: WordReading) -> Iterator[None]:
+    """Judge by another reading within."""
+    before = _READ.set(other)
+    try:
+        yield
+    finally:
+        _READ.reset(before)
+
+
+def _otherwise() -> dict[str, WordReading]:
+    factors = {"about": ("about", (1.25, 2.0)), "order": ("of the order of", (2.0, 10.0))}
+    shares = {
+        "few": ("few", (0.02, 0.1)),
+        "none": ("none", (OWN.few,)),
+        "same": ("the same", (0.1, 0.25)),
+        "close": ("close", (0.05, 0.2)),
+    }
+    others = {
+        f"“{word}” as within a factor of {value:g}": replace(OWN, **{name: value})
+        for name, (word, values) in factors.items()
+        for value in values
+    }
+    others |= {
+        f"“{word}” as {'within' if name in ('same', 'close') else 'at most'} {percent(value)}": replace(
+            OWN, **{name: value}
+        )
+        for name, (word, values) in shares.items()
+        for value in values
+    }
+    others |= {f"“trend” as a rank correlation of {value:g}": replace(OWN, trend=value) for value in (0.3, 0.7)}
+    return others | {f"“large” as {value:g} N s/m and more": replace(OWN, large=value) for value in (10.0, 1e3)}
+
+
+OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
+"""Other readings, as reasonable, by what is read otherwise: each in one word, to either side."""
+
+
+def about(value: float, expected: float, factor: float | None = None) -> bool:
+    """Whether a positive number is within a factor (by default that of “about”) of what is expected; NaN is not."""
+    within = reading().about if factor is None else factor
+    return expected / within <= value <= expected * within
+
+
+CONVENTIONS = (
+    f"Words have the same meaning in all claims: “about” is within a factor of {OWN.about:g}, “of the order of” within "
+    f"a factor of {OWN.order:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(OWN.few)} of a "
+    f"map, “the same” is within {percent(OWN.same)}, “close” within {percent(OWN.close)}, a “trend” is a rank "
+    f"correlation of at least {OWN.trend:g}, a “large” limiter damping is {OWN.large:g} N s/m and more (the upper two "
+    "of the six decades studied). Every claim is judged by other readings too: "
+    f"{', '.join(OTHERWISE)}; where one of them turns a criterion, its dependence says so. Whether a cell of a map "
+    "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
+    "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
+    "as far as it does in all three ways; one on the path alone (F11A) is judged in the first two, since what attracts "
+    "does not depend on the path. A “limit” lies between the last cell that keeps moving and the next, where "
+    "the swing, interpolated in its logarithm, falls below what counts; none beyond it keeps moving."
+)
+"""How the criteria read the words of the claims: one reading for all."""
