@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
@@ -15,6 +16,7 @@ from friso.studies.thesis.claims import registered
 from friso.studies.thesis.evidence import run_response
 from friso.studies.thesis.linear import Linear, analysed
 from friso.studies.thesis.studies import LOCKED
+from friso.studies.thesis.ways import by_peak_count
 
 pytestmark = pytest.mark.xdist_group("linear-claims")
 
@@ -105,11 +107,28 @@ def test_s35_the_leaves_as_two_clamped_beams() -> None:
     assert stress < 50e6
 
 
-def test_s341_s352_the_arithmetic() -> None:
-    assert pytest.approx(2.4) == JOINT * 1e-3
-    assert pytest.approx(8.2, abs=0.05) == 200 / 2.5 / 9.81
-    assert 100 * 2.5 == 250
-    assert "8.2 g" in judged_by("S352").parts[0].number
+def test_s341_s352_the_forces() -> None:
+    """k_j S_j against the friction of Table 2 and that measured; what 200 N accelerate, and what 100 m/s^2 take."""
+    still = xr.Dataset(
+        {name: (("joint.stiffness", "joint.stroke"), value) for name, value in STILL.items()},
+        coords={"joint.stiffness": [500.0, 15e3], "joint.stroke": [0.0, 1e-3]},
+    )
+    table_2, measured, _ = registered()["S341"].judge(Evidence({"isolator-stiffness": by_peak_count(still)}, {})).parts
+    force = float(table_2.number.split(" N")[0])
+    assert force == pytest.approx(JOINT * 1e-3)
+    assert table_2.holds == (JOINT * 1e-3 < STATIC)
+    assert measured.holds == (JOINT * 1e-3 < 1.0)
+    finding = judged_by("S352")
+    found = re.findall(r"([\d.]+) g with ([\d.]+) kg", finding.parts[0].number)
+    assert [float(mass) for _, mass in found] == [CART + STAGE, 2.5]
+    for g, mass in found:
+        assert float(g) == pytest.approx(200 / float(mass) / 9.81, rel=0.01)
+    assert finding.table is not None
+    for mass, needed, _ in finding.table.rows:
+        assert float(needed.split()[0]) == pytest.approx(100 * float(mass.split()[0]))
+
+
+STILL = {"peaks": np.zeros((2, 2)), "peak_to_peak": np.zeros((2, 2)), "outcome": np.full((2, 2), "rests")}
 
 
 def test_f5_the_locked_rig_hunts() -> None:
