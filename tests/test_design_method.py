@@ -267,12 +267,15 @@ def tuned_gains(stage: Stage) -> Tuning:
 def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
     stage = stage.replace({"controller.crossover": "40 Hz"})
-    loop_limits = limits(stage.flat())
-    assert comfortable_below(loop_limits.comfortable, 43.0) == pytest.approx(43.0)
-    assert comfortable_below(loop_limits.comfortable, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
-    expected = choose_controller(
-        stage, beams_module.beams(Mechanism.of(stage.flat()), 1e-3), loop_limits, corners(SPEC, stage.flat())
-    )
+    ranges = limits(stage.flat()).comfortable
+    assert comfortable_below(ranges, 43.0) == pytest.approx(43.0)
+    assert comfortable_below(ranges, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
+    leaves = beams_module.beams(Mechanism.of(stage.flat()), 1e-3)
+    modal, crossovers = Modal.of(stage.flat(), leaves), np.geomspace(1, 400, 7)
+    together = modal.margin(crossovers).tolist()
+    assert together == [float(modal.margin(crossover)[0]) for crossover in crossovers]
+    assert min(together) < 0.5 < max(together)
+    expected = choose_controller(stage, leaves, corners(SPEC, stage.flat()))
     assert expected.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
     assert expected.margin >= 0.5
     worth = expected.damping.worth

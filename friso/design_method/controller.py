@@ -11,7 +11,6 @@ import numpy as np
 from friso.design_method.modal import Modal
 from friso.design_method.population import Population
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
-from friso.frequency.crossover import Limits
 from friso.frequency.ranges import Range, shared
 from friso.frequency.tuning import Tuning, tuning
 from friso.leaf_springs.evaluation import Evaluation
@@ -39,13 +38,11 @@ class Damping:
 
 @dataclass(frozen=True)
 class DesignedController:
-    """Gains by van Dijk's rules at the `crossover` [Hz] chosen; the ranges of crossovers that are stable and
-    comfortable; the least modulus margin of the settled states, in the stage of the design and in each corner (n,); and
-    what joint damping adds."""
+    """Gains by van Dijk's rules at the `crossover` [Hz] chosen; the least modulus margin of the settled states, in the
+    stage of the design and in each corner (n,); and what joint damping adds."""
 
     crossover: float
     gains: Tuning
-    limits: Limits
     margin: float
     corners: np.ndarray
     damping: Damping
@@ -72,14 +69,14 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
     return ranges
 
 
-def choose_controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> DesignedController:
+def choose_controller(stage: Stage, leaves: Evaluation, population: Population) -> DesignedController:
     """The controller of a stage with leaf springs, its crossover chosen."""
     flat = stage.flat()
     gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))
     corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
     tried = dampings(flat)
     damping = Damping(tried, np.array([_margin({**flat, "joint.damping": trial}, leaves) for trial in tried]))
-    return DesignedController(flat[CROSSOVER], gains, ranges, _margin(flat, leaves), corners, damping)
+    return DesignedController(flat[CROSSOVER], gains, _margin(flat, leaves), corners, damping)
 
 
 def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:

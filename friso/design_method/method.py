@@ -29,7 +29,7 @@ from friso.design_method.spec import Spec
 from friso.design_method.verification import Verification, verification
 from friso.equations.breakaway import least_breakaway
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.frequency.crossover import Limits, limits
+from friso.frequency.ranges import Range
 from friso.progress import Progress, silent
 from friso.quantities import percent
 from friso.stage import Stage
@@ -73,12 +73,12 @@ class NoDesign(Exception):
 @dataclass(frozen=True)
 class LeavesAndCrossover:
     """Leaves and crossover that go together: the task the leaves were chosen for, the choice, the stage with both, and
-    how fast its controller may be."""
+    the ranges of crossovers [Hz] that are `comfortable` with these leaves."""
 
     task: LeafTask
     choice: ChosenLeaves
     stage: Stage
-    limits: Limits
+    comfortable: tuple[Range, ...]
 
 
 @dataclass(frozen=True)
@@ -159,7 +159,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     edges = worst_edges(isolated)
     _does_not_hunt(fit, edges)
     progress(0, 1, "margins")
-    control = choose_controller(fit.stage, fit.choice.beams, fit.limits, population)
+    control = choose_controller(fit.stage, fit.choice.beams, population)
     progress(0, 1, "hunting map")
     edges_map = hunting_map(fit.stage, spec, population)
     by_beams = tuple(confirmed(fit.task, candidates))
@@ -245,8 +245,8 @@ def fit_leaves(base: Stage, task: LeafTask, candidates: list[Candidate], populat
             target *= LOWER
             continue
         stage = with_leaves(base, choice.geometry, task.stroke)
-        ranges = replace(limits(stage.flat()), comfortable=comfortable(stage, choice.beams, population))
-        best = comfortable_below(ranges.comfortable, target)
+        ranges = comfortable(stage, choice.beams, population)
+        best = comfortable_below(ranges, target)
         if best is None:
             raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
         if best >= ALIKE * target:
@@ -283,7 +283,7 @@ def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners) -> None:
 def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
     """What would let the crossover keep its distance from the edge [Hz]."""
     spec, name = fit.task.spec, "crossover above the edge of hunting"
-    above = [max(low, needed) for low, high in fit.limits.comfortable if high > needed]
+    above = [max(low, needed) for low, high in fit.comfortable if high > needed]
     allowed_ = fit.choice.frequency / spec.safety.parasitic
     if spec.limit < needed and above and min(above) <= allowed_:
         yield Relaxation(name, "machine.bandwidth_limit", spec.limit, min(above), "Hz")

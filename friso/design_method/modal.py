@@ -45,14 +45,17 @@ class Modal:
 
     def margin(self, crossover: np.ndarray) -> np.ndarray:
         """The least modulus margin of all states at each crossover [Hz], shape (n,); 0 where one is unstable."""
-        return np.array([self._margin(float(value)) for value in np.atleast_1d(crossover)])
+        factors = np.atleast_1d(crossover) / bandwidth(self.flat)
+        keys = faster(self.flat, np.repeat(factors, len(self.members)))
+        settled = stability_by_poles(keys, self.members.repeated(len(factors))).abscissa.reshape(len(factors), -1) < 0
+        stable = np.asarray(settled.all(axis=1))
+        return np.array([self._margin(factors[k]) if stable[k] else 0.0 for k in range(len(factors))])
 
-    def _margin(self, crossover: float) -> float:
-        keys = faster(self.flat, np.array(crossover) / bandwidth(self.flat))
-        shape = controller_response(keys, self.omega)
+    def _margin(self, factor: np.ndarray) -> float:
+        """That of states which are stable without the modes, at a factor of the bandwidth."""
+        shape = controller_response(faster(self.flat, factor), self.omega)
         bare, loop = self.bare * shape, self.with_modes * shape
-        settled = stability_by_poles(keys, self.members).abscissa < 0
-        stable = settled & (np.abs(_turns((1 + loop) / (1 + bare))) < 0.5)
+        stable = np.abs(_turns((1 + loop) / (1 + bare))) < 0.5
         return float(distance_to_lines(loop).min()) if stable.all() else 0.0
 
     @property

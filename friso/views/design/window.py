@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.design_method.method import Design
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import WANTED, searched_crossovers
 from friso.frequency.ranges import Range
 
 
@@ -21,7 +21,7 @@ class CrossoverBound:
 
 def comfortable(design: Design) -> Range:
     """The range of crossovers [Hz] with a modulus margin above 0.5 that holds the one chosen."""
-    below = [window for window in design.fitted.limits.comfortable if window[0] <= 1.01 * design.controller.crossover]
+    below = [window for window in design.fitted.comfortable if window[0] <= 1.01 * design.controller.crossover]
     return below[-1]
 
 
@@ -48,7 +48,7 @@ def lower(design: Design) -> list[CrossoverBound]:
     low = comfortable(design)[0]
     bounds = (
         [CrossoverBound(low, f"below it the modulus margin is below {WANTED:g}")]
-        if low > design.fitted.limits.searched[0]
+        if low > searched_crossovers(design.fitted.stage.flat())[0]
         else []
     )
     if edges.hunts:

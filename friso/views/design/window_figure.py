@@ -28,7 +28,7 @@ def window_figure(design: Design) -> Figure:
     allowed = [
         ("machine", [(0.0, design.spec.limit)]),
         ("leaves", [(0.0, stiffest(design))]),
-        ("margin", list(design.fitted.limits.comfortable)),
+        ("margin", list(design.fitted.comfortable)),
     ]
     hunting = [("isolator", design.edges), ("without", design.without)]
     rows = [name for name, _ in (*allowed, *hunting)][::-1]
