@@ -247,6 +247,8 @@ def test_limits() -> None:
     hunts = np.array([[1, 1, 0, 0], [1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=bool)
     assert ends(values, hunts).tolist() == [2.5, 3.5, 1.0, 4.0]
     assert begins(values, hunts).tolist() == [1.0, 1.0, 4.0, 1.5]
+    left = np.array([[100, 100, 100], [100, 100, 100], [0.1, 1e-12, 0.0], [0.1, 1e-12, 0.0]])
+    assert ends(values, left > 1, left).tolist() == pytest.approx([2 + 2 / 3, 2.5, 2.5])  # gone at once: anywhere there
 
 
 def test_trend() -> None:

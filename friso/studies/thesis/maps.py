@@ -36,7 +36,8 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
     """For each column of `moving`, shape (n, columns), the value beyond which no run keeps moving.
 
     `values` ascend, shape (n,). The limit lies between the last that keeps moving and the next, where the `size` of
-    their swings, interpolated in its logarithm, is 1; halfway where no sizes are known, or both are on one side.
+    their swings, interpolated in its logarithm, is 1; halfway where no sizes are known, both are on one side, or
+    nothing is left of the swing beyond, which tells no more than that it ended in between.
     Where it is outside the range, the end of the range stands for it."""
     last = np.where(moving.any(axis=0), len(values) - 1 - np.argmax(moving[::-1], axis=0), -1)
     after = np.minimum(last + 1, len(values) - 1)
@@ -44,9 +45,9 @@ def ends(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = None)
     if size is not None:
         columns = np.arange(len(last))
         with np.errstate(divide="ignore", invalid="ignore"):
-            inside, outside = (np.log(np.maximum(size[row, columns], LEAST)) for row in (last, after))
+            inside, outside = (np.log(size[row, columns]) for row in (last, after))
             between = inside / (inside - outside)
-        share = np.where((inside > 0) & (outside < 0), between, share)
+        share = np.where((inside > 0) & (outside < 0) & (outside > np.log(GONE)), between, share)
     within = values[last] + share * (values[after] - values[last])
     return np.where(last < 0, values[0], within)
 
@@ -56,8 +57,8 @@ def begins(values: np.ndarray, moving: np.ndarray, size: np.ndarray | None = Non
     return -ends(-values[::-1], moving[::-1], None if size is None else size[::-1])
 
 
-LEAST = 1e-9
-"""Swing over what counts as one, below which none is told from rest."""
+GONE = 1e-3
+"""Swing over what counts as one, below which nothing is left of one."""
 
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:

@@ -96,6 +96,7 @@ CONVENTIONS = (
     "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "
     "as far as it does in all three ways; one on the path alone (F11A) is judged in the first two, since what attracts "
     "does not depend on the path. A “limit” lies between the last cell that keeps moving and the next, where "
-    "the swing, interpolated in its logarithm, falls below what counts; none beyond it keeps moving."
+    "the swing, interpolated in its logarithm, falls below what counts, or halfway where nothing is left of it; none "
+    "beyond it keeps moving."
 )
 """How the criteria read the words of the claims: one reading for all."""

@@ -35,7 +35,7 @@ samples to what a fieldbus takes."""
 CURVE = (1.0, 3e3)
 """Frequencies [Hz] over which the loops are drawn."""
 
-POINTS = 1500
+POINTS = 600
 """Frequencies of a curve, besides those about resonances."""
 
 LOWEST, STEPS = 1.0, 61
