@@ -119,9 +119,9 @@ def test_s341_s352_the_forces() -> None:
     assert table_2.holds == (JOINT * 1e-3 < STATIC)
     assert measured.holds == (JOINT * 1e-3 < 1.0)
     finding = judged_by("S352")
-    found = re.findall(r"([\d.]+) g with ([\d.]+) kg", finding.parts[0].number)
-    assert [float(mass) for _, mass in found] == [CART + STAGE, 2.5]
-    for g, mass in found:
+    reached = re.findall(r"([\d.]+) g with ([\d.]+) kg", finding.parts[0].number)
+    assert [float(mass) for _, mass in reached] == [CART + STAGE, 2.5]
+    for g, mass in reached:
         assert float(g) == pytest.approx(200 / float(mass) / 9.81, rel=0.01)
     assert finding.table is not None
     for mass, needed, _ in finding.table.rows:
