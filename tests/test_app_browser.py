@@ -175,6 +175,20 @@ def test_the_verdict_is_asked_for_where_the_run_is_left_before_it_answers(browse
         page.click("#tab-bode")
 
 
+def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None:
+    """Where the new one takes longer than a moment: a kernel may have to be compiled."""
+    page, held = browsed.page, []
+    page.wait_for_selector("#answer .rest .note")
+    assert page.locator("#answer .case.stale").count() == 0
+    page.route("**/ask/check", lambda _: None)
+    page.route("**/ask/verdict", lambda route: held.append(route))
+    with page.expect_request("**/ask/verdict"):
+        browsed.type("controller.crossover", "11 Hz")
+    page.wait_for_selector("#answer .case.stale")
+    held[0].continue_()
+    page.wait_for_selector("#answer .case:not(.stale)")
+
+
 def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> None:
     page = browsed.page
     browsed.type_meanwhile("11 Hz", "10.5 H")

@@ -10,11 +10,13 @@ import { tour } from "./tour.js";
 import { ask, end, first, Live, onReach } from "./wire.js";
 
 const CHECKED_AFTER = 500;
+const OLD_AFTER = 300;
 let shown = null; // the machine as the server describes it
 let chosen = "controller";
 let wrong = null;
 let given = new Map(); // the answers about this machine, by the tabs of their pictures
 let timer = 0;
+let aging = 0;
 let held = "";
 let begun = false;
 let late = false; // what is on the left is drawn again once that takes nothing from under the hand
@@ -37,11 +39,24 @@ const form = new Live("machine", "machine", 2000, described);
 const verdict = new Live("verdict", "verdict", 5000, (part, tag) => {
   if (tag.machine !== machines.current()) return; // another one is shown by now
   if (part.kind === "message") return answers.progress(part);
-  if (part.kind === "failed") return answers.refused(part.text);
+  if (part.kind === "failed") return refused(part.text);
   if (part.kind !== "answer") return; // what is wrong with the machine is said where it was set
   answers.quick(part);
+  if (tag.given === machines.changes()) clearTimeout(aging);
+  else age();
   answers.note(part.verdict, tag, machines.back);
 });
+
+/** Unless a new answer comes soon, the one that is there is shown as that of an earlier machine. */
+function age() {
+  clearTimeout(aging);
+  aging = setTimeout(answers.earlier, OLD_AFTER);
+}
+
+function refused(text) {
+  clearTimeout(aging);
+  answers.refused(text);
+}
 
 function withUnits(values) {
   const all = shown.tables.flatMap((table) => table.keys);
@@ -60,6 +75,7 @@ function changed(dragged) {
   if (!machine) return;
   clearTimeout(timer);
   end("check");
+  age();
   given = new Map();
   answers.progress(null);
   if (shown && drawn.machine !== machine) {
@@ -91,7 +107,7 @@ function described(part, machine) {
     usable();
     left();
     if ($("keys").querySelector(".wrong")) answers.earlier();
-    else answers.refused(part.text);
+    else refused(part.text);
     return;
   }
   if (part.kind !== "answer") return;
@@ -131,15 +147,16 @@ function without(part) {
   const again = part.kind === "failed";
   const onclick = again ? () => changed(false) : () => edit(toml, (mended) => machines.add(name, mended, true));
   $("keys").replaceChildren(el("button", { type: "button", onclick }, again ? "Ask again" : "Edit the file"));
-  answers.refused(part.text);
+  refused(part.text);
 }
 
 async function check(draws) {
   const part = await ask("check", pictures.body(draws ? { draws } : {}), "check", (item) => item.kind !== "answer" && answers.progress(item));
   if (!part) return;
   answers.progress(null);
-  if (part.kind !== "answer") return answers.refused(part.text);
+  if (part.kind !== "answer") return refused(part.text);
   verdict.stop();
+  clearTimeout(aging);
   answers.whole(part, shown.uncertain.length ? check : null);
   given.set("check", part);
   pictures.checked(part);
