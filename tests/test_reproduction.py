@@ -413,7 +413,7 @@ def test_f14b_names_the_stripe_and_its_dampings() -> None:
     striped = made("isolator-damping", lambda d, s: 6 * ((s < 1e-4) | ((d > 50) & (s > 2e-4) & (s < 4e-4))))
     judge = registered()["F14B"].judge
     part = judge(Evidence({"isolator-damping": striped}, {"locked": cell()})).parts[0]
-    assert "a stripe that keeps moving at strokes of 0.22 to 0.316 mm, damping 79 to 1e+04 N s/m" in part.number
+    assert "a stripe that keeps moving at strokes of 0.22 to 0.32 mm, damping 79 to 10000 N s/m" in part.number
     plain = judge(Evidence(*HOLDS["F14B"]))
     assert "stripe" not in plain.parts[0].number
     assert plain.table is not None

@@ -137,8 +137,13 @@ def _stripe(stroke: np.ndarray, damping: np.ndarray, moving: np.ndarray) -> str:
 
 def _span(values: np.ndarray) -> str:
     """The least and the greatest of the values, or the one that there is."""
-    low, high = f"{values.min():.2g}", f"{values.max():.3g}"
-    return low if values.min() == values.max() else f"{low} to {high}"
+    low, high = _rounded(values.min()), _rounded(values.max())
+    return low if low == high else f"{low} to {high}"
+
+
+def _rounded(value: float) -> str:
+    """Two digits, without an exponent."""
+    return f"{float(f'{value:.2g}'):g}"
 
 
 def _by_decade(damping: np.ndarray, needed: np.ndarray) -> FindingTable:
@@ -151,8 +156,8 @@ def _by_decade(damping: np.ndarray, needed: np.ndarray) -> FindingTable:
             (
                 f"{10**decade:g} to {10 ** (decade + 1):g} N s/m",
                 f"{np.median(strokes):.2g} mm",
-                f"{strokes.min():.2g} mm, at {at[strokes.argmin()]:.2g} N s/m",
-                f"{strokes.max():.2g} mm, at {at[strokes.argmax()]:.2g} N s/m",
+                f"{strokes.min():.2g} mm, at {_rounded(at[strokes.argmin()])} N s/m",
+                f"{strokes.max():.2g} mm, at {_rounded(at[strokes.argmax()])} N s/m",
             )
         )
     return FindingTable(("limiter damping", "stroke needed, median", "shortest", "longest"), tuple(rows))
