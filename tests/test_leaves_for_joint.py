@@ -11,10 +11,13 @@ from friso import Stage, load, loads
 from friso.answers.tune import TuneAnswer
 from friso.design_method.geometry import Sheet, mechanisms
 from friso.design_method.leaves_for_joint import leaves_for_joint
+from friso.design_method.outline import outline
+from friso.design_method.spec import read_spec
 from friso.leaf_springs import closed_forms
 from friso.leaf_springs.beams import beams
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
+from friso.remedies.catalogue import remedies
 from friso.remedies.goal import Goal
 from friso.remedies.method import Advice, Unmade, tune
 from friso.remedies.search import Budget
@@ -23,6 +26,7 @@ from friso.views.tune.words import DOUBTS, UNMADE, answer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG = load(EXAMPLES / "thesis_rig.toml")
+LEAVES = load(EXAMPLES / "thesis_leaves.toml")
 
 
 def joint(stiffness: str, stroke: str) -> Stage:
@@ -36,7 +40,7 @@ def joint(stiffness: str, stroke: str) -> Stage:
 )
 def test_leaves_have_the_stiffness_and_bear_the_stroke(stiffness: str, stroke: str) -> None:
     rig = joint(stiffness, stroke)
-    made = leaves_for_joint(rig)
+    made = leaves_for_joint(rig, rig)
     assert made is not None
     flat, wanted = made.flat(), rig.flat()["joint.stiffness"]
     by_beams = beams(Mechanism.of(flat), flat["joint.stroke"])
@@ -69,11 +73,39 @@ def best_of_a_grid(flat: dict[str, float], wanted: float) -> float:
 
 
 def test_a_joint_too_stiff_for_the_sheets_has_none() -> None:
-    assert leaves_for_joint(joint("100 kN/m", "20 um")) is None
+    stiff = joint("100 kN/m", "20 um")
+    assert leaves_for_joint(stiff, stiff) is None
 
 
 def test_a_name_with_quotes_is_a_name() -> None:
-    assert leaves_for_joint(joint("2.4 kN/m", "1 mm").replace({"name": 'the "old" rig \\ 2'})) is not None
+    rig = joint("2.4 kN/m", "1 mm").replace({"name": 'the "old" rig \\ 2'})
+    assert leaves_for_joint(rig, rig) is not None
+
+
+def test_a_coulomb_friction_close_to_a_static_one_that_is_known_well_is_outlined() -> None:
+    rig = RIG.replace({"friction.static": "3 N +/- 5 %", "friction.coulomb": "2.8 N"})
+    friction = read_spec(outline(rig)).friction
+    assert friction.coulomb is not None
+    assert (friction.coulomb.low, friction.coulomb.high) == pytest.approx((0.7 * 2.8, 1.05 * 3))
+
+
+@pytest.mark.parametrize("load", [-200.0, 20.0])
+def test_other_leaves_guide_and_carry_what_those_of_the_file_do(load: float) -> None:
+    carried = {"flexure.sensor_x": "110 mm", "flexure.inertia_y": "1 g*m^2", "flexure.load": f"{load} N"}
+    present = LEAVES.replace(carried)
+    (free,) = (remedy.stage for remedy in remedies(present, Goal(controller=False)) if remedy.name == "isolator")
+    made = leaves_for_joint(free, present)
+    assert made is not None
+    flat = made.flat()
+    assert flat["flexure.sensor_x"] - flat["flexure.length"] == pytest.approx(40e-3)
+    assert (flat["flexure.inertia_y"], flat["flexure.load"]) == (1e-3, load)
+    assert flat["joint.stiffness"] == pytest.approx(present.flat()["joint.stiffness"], rel=0.01)
+    assert closed_forms.buckling_load(Mechanism.of(flat)) > 3 * load
+
+
+def test_a_load_under_which_no_leaves_stand_has_none() -> None:
+    present = LEAVES.replace({"flexure.thickness": "2 mm", "flexure.load": "3 kN"})
+    assert leaves_for_joint(joint("2.4 kN/m", "1 mm"), present) is None
 
 
 @pytest.fixture(scope="module")

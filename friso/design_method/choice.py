@@ -60,19 +60,25 @@ def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | No
             passed.append(str(failure))
             continue
         choice = ChosenLeaves(geometry, evaluation, tuple(needs), excess, tuple(passed))
-        if choice.frequency >= task.spec.safety.parasitic * task.crossover and bears(task, evaluation):
+        clear = choice.frequency >= task.spec.safety.parasitic * task.crossover
+        if clear and stays(task, evaluation) and bears(task, evaluation):
             return choice
         passed.append(f"beams: {evaluation.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
     return None
 
 
-def bears(task: LeafTask, by_beams: Evaluation) -> bool:
-    """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
+def stays(task: LeafTask, by_beams: Evaluation) -> bool:
+    """Whether by beams, too, the cart does not break away inside the stroke."""
     safety = task.spec.safety
-    stays = safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction
+    return bool(safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction)
+
+
+def bears(task: LeafTask, by_beams: Evaluation) -> bool:
+    """Whether by beams, too, the leaves bear bending and load."""
+    safety = task.spec.safety
     swing = 0.0 if np.isnan(by_beams.fatigue_margin) else 1 / by_beams.fatigue_margin
     lasts = safety.fatigue * (swing + load_stress(by_beams.mechanism, task) / by_beams.mechanism.yield_strength) <= 1
-    return bool(stays and lasts and safety.buckling * buckling_share(by_beams.mechanism, task, by_beams.buckling) <= 1)
+    return bool(lasts and safety.buckling * buckling_share(by_beams.mechanism, task, by_beams.buckling) <= 1)
 
 
 def _in_order(

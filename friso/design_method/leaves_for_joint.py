@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import suppress
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.optimize import differential_evolution
@@ -11,15 +13,16 @@ from scipy.optimize import differential_evolution
 from friso.axis import LINEAR
 from friso.design_method.choice import STEP, bears, evaluated
 from friso.design_method.front import evaluate_geometries
-from friso.design_method.geometry import Geometry, Sheet, box, mechanisms, sheets
+from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms, moved_along, sheets
 from friso.design_method.outline import outline
 from friso.design_method.requirements import BREAKAWAY, PARASITIC, LeafTask, requirements
 from friso.design_method.spec import read_spec
 from friso.equations.breakaway import least_breakaway
 from friso.errors import InputError
 from friso.leaf_springs.beams import BeamFailure
-from friso.leaf_springs.closed_forms import loaded_drive_stiffness
+from friso.leaf_springs.closed_forms import drive_stiffness, loaded_drive_stiffness
 from friso.leaf_springs.joint import first_interfering
+from friso.quantities import exactly
 from friso.stage import Stage
 
 SEED, GENERATIONS, POINTS = 36, 60, 20
@@ -32,33 +35,51 @@ WORST = 1e3
 """Cost from which on leaves break a requirement."""
 
 WIDTHS = 5
-"""Steps to the width that gives the stiffness, which is nearly proportional to it."""
+"""Steps to the width that gives the stiffness, which rises nearly as the width, whatever the load takes off."""
+
+OF_LEAVES = (*SIZES, "leaves", "thickness", "material", "young", "poisson", "density", "yield", "fatigue")
+"""Keys of [flexure] that are of the leaves; the others are of what they guide."""
 
 NEAR = 0.01
 """Share by which the stiffness of leaves in whole sizes may be off."""
 
 
-def leaves_for_joint(stage: Stage) -> Stage | None:
+def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     """The stage with leaf springs in place of the numbers of its joint and of the parasitic mode: those of the same
     stiffness that interfere at the highest frequency, of the sizes, sheets, loads and factors of safety that `friso
-    init --spec` begins with; None where none bear the stroke. Raises InputError for a stage whose joint leaf springs
-    cannot be.
+    init --spec` begins with; None where none bear stroke and load. What they guide and carry is as in [flexure] of the
+    stage as it is at `present`, if it has that: its points stay where they are from the leaf ends. Raises InputError
+    for a stage whose joint leaf springs cannot be.
     """
     if stage.axis_kind != LINEAR:
         axis = f"an axis with {stage.axis_kind.described}"
         raise InputError("joint", axis, "a linear axis: leaf springs guide along a line", 'axis = "linear"')
     spec = read_spec(outline(stage))
-    first = Geometry.of(box(spec)[1], sheets(spec)[0])
+    low, high = box(spec)
+    first = Geometry.of(np.array([low[0], *high[1:]]), sheets(spec)[-1])  # what bears the largest load
     replaced = {"joint.stiffness": None} | ({"parasitic": None} if stage.parasitic else {})
-    base = stage.replace({**replaced, **first.keys()})
+    written = present.flexure.as_written() if present.flexure else {}
+    carried = {f"flexure.{key}": entry for key, entry in written.items() if key not in OF_LEAVES}
+    try:
+        base = stage.replace({**replaced, **carried, **first.keys()})
+        base = base.replace(_moved(present.flat(), first))
+    except InputError:  # even these buckle under the load
+        return None
     flat, friction = base.flat(), float(least_breakaway(base.flat()))
     task = LeafTask(spec, flat["joint.stroke"], 0.0, friction, flat)
     search = _Search(task, stage.flat()["joint.stiffness"])
-    for geometry in search.whole_sizes(search.best()):
+    with np.errstate(all="ignore"):  # what has no width of this stiffness breaks the requirements
+        geometries = search.whole_sizes(search.best())
+    for geometry in geometries:
         with suppress(BeamFailure):
             if bears(task, evaluated(task, geometry)):
-                return base.replace(geometry.keys())
+                return base.replace({**geometry.keys(), **_moved(base.flat(), geometry)})
     return None
+
+
+def _moved(flat: Mapping[str, Any], geometry: Geometry) -> dict[str, str]:
+    """The points of a stage given as its flat keys as far from the ends of other leaves as they are from its own."""
+    return {key: exactly(place, "m") for key, place in moved_along(flat, geometry.length).items()}
 
 
 class _Search:
@@ -99,7 +120,8 @@ class _Search:
         """Lengths, widths and spacings [m], (count, 3), of the stiffness wanted."""
         sizes = np.insert(spans, 1, self.high[1], axis=1)
         for _ in range(WIDTHS):
-            sizes[:, 1] *= self.stiffness / loaded_drive_stiffness(mechanisms(self.task.flat, sizes, bought))
+            built = mechanisms(self.task.flat, sizes, bought)
+            sizes[:, 1] *= 1 + (self.stiffness - loaded_drive_stiffness(built)) / drive_stiffness(built)
         return sizes
 
     def broken(self, sizes: np.ndarray, bought: list[Sheet]) -> np.ndarray:

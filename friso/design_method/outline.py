@@ -15,6 +15,8 @@ FRICTION, MASS = 0.3, 0.05
 TRAVELS = 0.1
 """The shortest move, as a share of the stage file's travel."""
 
+STATIC, COULOMB = "friction.static", "friction.coulomb"
+
 SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
 
 
@@ -73,11 +75,16 @@ def outline(stage: Stage) -> str:
 
 
 def _line(stage: Stage, key: str, share: float) -> str:
-    """A range of a key: its own, or a share about its value."""
+    """A range of a key: its own, or a share about its value; Coulomb friction at most up to the static friction."""
     flat, own = stage.flat(), stage.uncertain().get(key)
     name, unit = key.split(".")[1], numeric_keys(flat)[key].unit
     low, high = (own.low, own.high) if own else ((1 - share) * flat[key], (1 + share) * flat[key])
-    why = "as in the stage file" if own else f"assumed: {percent(share)} about the stage file's"
+    cut = ""
+    if key == COULOMB and STATIC in flat:
+        static = stage.uncertain().get(STATIC)
+        most = static.high if static else (1 + share) * flat[STATIC]
+        cut, high = ", up to the static friction" if high > most else "", min(high, most)
+    why = ("as in the stage file" if own else f"assumed: {percent(share)} about the stage file's") + cut
     return f'{name} = "{low:.4g} {unit} .. {high:.4g} {unit}"   # {why}'
 
 

@@ -32,10 +32,11 @@ class LeafTask:
 
     @property
     def load(self) -> float:
-        """Force along the leaves [N]: what the specification says and the weight of the heaviest stage."""
+        """Force along the leaves [N]: what the specification says and the weight of the heaviest stage, or the load of
+        the stage file if that is more."""
         masses = self.spec.masses.stage
         heaviest = masses.high if masses else float(self.flat["masses.stage"])
-        return float(self.spec.load.force_x) + GRAVITY * heaviest
+        return max(float(self.spec.load.force_x) + GRAVITY * heaviest, self.flat.get("flexure.load", 0.0))
 
 
 @dataclass(frozen=True)

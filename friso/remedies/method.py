@@ -248,7 +248,7 @@ class _Session:
             self.unmade[remedy.name] = "rotary"
         elif self.stage.parasitic and not self.stage.joint:
             self.unmade[remedy.name] = "mode"
-        elif (stage := leaves_for_joint(outcome.stage)) is None:
+        elif (stage := leaves_for_joint(outcome.stage, self.stage)) is None:
             self.unmade[remedy.name] = "none"
         else:
             made = Remedy(f"{remedy.name}, of leaf springs", stage, (), True, remedy.name)
