@@ -11,6 +11,7 @@ from inside import friso_inside
 from refusals import Wording
 from variants import VARIANTS, gains, lugre, release, stage
 
+from friso.hunting.outward import PRECISE
 from friso.stage import violations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert
@@ -29,7 +30,9 @@ def case(
     """As much of a case as the verdicts across laws look at."""
     cycle = SimpleNamespace(amplitude=5e-4, multiplier=-0.5) if verdict == "hunts" else None
     quiet = None if edge is None else edge / (4 if edge_certain else 3)
-    margin = edge and SimpleNamespace(crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet)
+    margin = edge and SimpleNamespace(
+        crossover=edge, factor=edge / 4, certain=edge_certain, quiet=quiet, reserve=PRECISE
+    )
     hunting = SimpleNamespace(certain=certain, target=cycle)
     judgement = SimpleNamespace(cycle=cycle, margin=margin, hunting=hunting, given_up=given_up, observed=False)
     return SimpleNamespace(verdict=verdict, judgement=judgement)
@@ -154,7 +157,7 @@ def test_edges_that_were_given_up_are_not_told_as_absent(wording: Wording) -> No
 
 
 def test_edges_as_factors_that_look_the_same_are_one_number() -> None:
-    laws = across(under("lugre", ("settles", 8.0)), under("gms", ("settles", 8.001), ("settles", 8.1)))
+    laws = across(under("lugre", ("settles", 8.0)), under("gms", ("settles", 8.001), ("settles", 8.08)))
     for trial in (trial for verdict in laws.verdicts for trial in verdict.trials):
         trial.cases["given"].judgement.margin.crossover = None
     gains = replace(laws, stage=PD)
@@ -169,6 +172,12 @@ def test_an_edge_that_is_not_certain_says_so(wording: Wording) -> None:
     assert dict(laws_rows(laws))["As given: edge"] == ["6.00 Hz", "7.00 to 9.33 Hz (not certain)"]
     trial = laws_document(laws)["cases"]["given"]["laws"]["gms"]["trials"][0]
     assert not trial["edge_certain"]
+
+
+def test_an_edge_that_is_known_up_to_a_share_is_a_range() -> None:
+    laws = across(under("lugre", ("settles", 6.0)), under("gms", ("settles", 7.0)))
+    laws.verdicts[0].trials[0].cases["given"].judgement.margin.reserve = 0.01
+    assert dict(laws_rows(laws))["As given: edge"] == ["5.94 to 6.06 Hz", "7.00 Hz"]
 
 
 def test_laws_keep_what_is_measured_of_each_of_several_machines() -> None:

@@ -91,13 +91,18 @@ class LawVerdict:
 
     def edges(self, case: str) -> tuple[float, float] | None:
         """Lowest and highest edge of hunting [Hz], or in factors of the bandwidth where there is no crossover, in a
-        case; None without any. One that is not certain reaches up to where none was found."""
+        case; None without any. One that is certain reaches as far as it is known to both sides, one that is not up to
+        where none was found."""
         margins = [margin for trial in self.trials if (margin := trial.cases[case].judgement.margin)]
         units = [1.0 if edge.crossover is None else edge.crossover / edge.factor for edge in margins]
-        lowest = [edge.factor * unit for edge, unit in zip(margins, units, strict=True)]
-        highest = [
-            (edge.factor if edge.certain else edge.quiet) * unit for edge, unit in zip(margins, units, strict=True)
+        ends = [
+            (edge.factor * (1 - edge.reserve), edge.factor * (1 + edge.reserve))
+            if edge.certain
+            else (edge.factor, edge.quiet)
+            for edge in margins
         ]
+        lowest = [low * unit for (low, _), unit in zip(ends, units, strict=True)]
+        highest = [high * unit for (_, high), unit in zip(ends, units, strict=True)]
         return (min(lowest), max(highest)) if margins else None
 
     def edges_certain(self, case: str) -> bool:
