@@ -140,6 +140,7 @@ def test_version() -> None:
         ["simulate", RIG, "--sample-time", "1"],
         ["simulate", RIG, "--sample-time", "100 s"],
         ["simulate", RIG, "--sample-time", "1 mm"],
+        ["tune", RIG, "--only", "jont"],
     ],
 )
 def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, tmp_path: Path, refused: Refused) -> None:

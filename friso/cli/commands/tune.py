@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 import typer
 
@@ -30,8 +30,9 @@ BandwidthLimit = Annotated[
         "--bandwidth-limit", metavar="FREQUENCY", help="Highest bandwidth that modes missing from the stage file allow."
     ),
 ]
-OnlyOption = Annotated[Changeable | None, typer.Option("--only", help="Change this part alone.")]
-KeepOption = Annotated[Changeable | None, typer.Option("--keep", help="Leave this part unchanged.")]
+_PARTS = f"<{'|'.join(get_args(Changeable))}>"
+OnlyOption = Annotated[str | None, typer.Option("--only", metavar=_PARTS, help="Change this part alone.")]
+KeepOption = Annotated[str | None, typer.Option("--keep", metavar=_PARTS, help="Leave this part unchanged.")]
 SeedOption = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
 ]
