@@ -12,7 +12,7 @@ from benchmarks.trust.arguments import TEXTS, Computed, assert_clear, nothing_co
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.inputs import LEAVES, RIG, ready
 from friso.app.frames import frame
-from friso.app.questions import QUESTIONS, REPORTS, PageRequest, report
+from friso.app.questions import COMMANDS, QUESTIONS, PageRequest, report
 from friso.app.uploads import Uploads
 from friso.app.work import Work
 from friso.errors import InputError
@@ -41,7 +41,7 @@ VALUES: tuple[Any, ...] = (
 
 def questions(rng: random.Random, folder: Path) -> None:
     """One or two parts of what a page sends replaced."""
-    name = rng.choice([*QUESTIONS, *REPORTS])
+    name = rng.choice([*QUESTIONS, *(f"{name}.zip" for name in COMMANDS)])
     stage = Path(LEAVES if name.startswith("flexure") else RIG)
     machine = {"name": stage.name, "text": stage.read_text("utf-8"), "changes": dict(CHANGES)}
     data: dict[str, Any] = {"machine": machine, "options": dict(OPTIONS.get(name, {})), "narrow": rng.random() < 0.5}
@@ -52,7 +52,8 @@ def questions(rng: random.Random, folder: Path) -> None:
     sent = json.loads(json.dumps(data))
     uploads = Uploads()
     uploads.files["1/log.csv"] = folder / "log.csv"
-    job = (lambda asked, work: report(REPORTS[name], asked, work)) if name in REPORTS else QUESTIONS[name]
+    command = name.removesuffix(".zip")
+    job = QUESTIONS[name] if command == name else (lambda asked, work: report(command, asked, work))
     what = f"{name}: {json.dumps(sent)[:300]}"
     with ready(folder), nothing_computed():
         try:

@@ -232,17 +232,18 @@ def sweep(
             metric = metric or "outcome"
             chosen = read_stage(stage, set)
             study = study_for(chosen, varied, metric, refine, None if yes else LARGE, crew)
-            mention_unstable_loop(chosen)
             study = replace(study, rtol=_chosen_rtol(1e-6 if rtol is None else rtol, study, crew))
             study = study if store is None else as_stored(study, store, metric, overwrite)
         speak_of(study.stage.axis_kind)
         if store is None:
             for path in exports:
                 check_file("export", path, overwrite)
+            mention_unstable_loop(study.stage)
             runs, can_note = run_in_memory([study], crew, share, progress)[0], False
         else:
             example = f"--out {shell_word(f'{store.stem}-2.zarr')}" if resumed is None else "--out figures"
             refuse_overwriting(study, store, exports, overwrite, example if beside else "")
+            mention_unstable_loop(study.stage)
             runs, can_note = _filled(study, store, crew, share, overwrite, metric, beside, progress)
     held = in_memory(runs) if store is not None and study.cells <= LARGE else runs
     if store is None:

@@ -15,7 +15,6 @@ from typer.models import ArgumentInfo
 from friso import paths
 from friso.cli.command import COMMANDS
 from friso.errors import InputError
-from friso.quantities import quoted
 
 
 def refuse_empty(arguments: Iterable[str]) -> None:
@@ -82,4 +81,6 @@ def _value_of(option: str, arguments: Sequence[str]) -> str:
     """What follows an option on the command line, the last time that it is there."""
     values = [value for before, value in pairwise(arguments) if before == option]
     values += [argument.partition("=")[2] for argument in arguments if argument.startswith(f"{option}=")]
+    from friso.quantities import quoted  # its libraries are not needed where nothing is refused
+
     return quoted(values[-1]) if values else "no number"
