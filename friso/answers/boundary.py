@@ -132,11 +132,13 @@ def boundary(
     if not ranges:
         raise wrong("x", "no key", "one key or two with their ranges", example)
     links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')
-    mention_unstable_loop(chosen)
-    progress(0, 0, f"following cycles over {' and '.join(ranges)}")
     from friso.studies.boundary import boundary as traced_boundary
 
-    traced = traced_boundary(chosen, ranges, links, tolerance, log)
+    def begins() -> None:
+        mention_unstable_loop(chosen)
+        progress(0, 0, f"following cycles over {' and '.join(ranges)}")
+
+    traced = traced_boundary(chosen, ranges, links, tolerance, log, begins)
     return BoundaryAnswer(chosen, traced, [*ranges.values()], stem_of(stage))
 
 

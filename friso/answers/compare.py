@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, AnswerTable, question
@@ -124,5 +125,5 @@ def compare(
     from friso.studies.compare.study import compare as compared
 
     correlations = correlations_of(stage, chosen)
-    mention_unstable_loop(chosen)
-    return CompareAnswer(compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also)))
+    begins = partial(mention_unstable_loop, chosen)
+    return CompareAnswer(compared(chosen, machines, seed, tolerance, correlations, progress, tuple(also), begins))

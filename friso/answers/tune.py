@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -174,10 +175,10 @@ def tune(
     goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, only, keep)
     whole_number(seed, "seed", 0, MOST_SEED, "1")
     correlations = correlations_of(stage, chosen)
-    mention_unstable_loop(chosen)
     from friso.remedies.method import tune as tuned
 
-    return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress))
+    begins = partial(mention_unstable_loop, chosen)
+    return TuneAnswer(tuned(chosen, goal, seed, correlations, progress=progress, begins=begins))
 
 
 def _goal(

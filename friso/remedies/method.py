@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any, Literal
@@ -142,11 +142,13 @@ def tune(
     budget: Budget | None = None,
     chosen: Collection[str] | None = None,
     progress: Progress = silent,
+    begins: Callable[[], None] = lambda: None,
 ) -> Advice:
-    """The best points of every remedy that the goal allows, or of those with the names `chosen`. Raises InputError for
-    a motion after which nothing has to settle."""
+    """The best points of every remedy that the goal allows, or of those with the names `chosen`; `begins` is called
+    before the first of the work. Raises InputError for a motion after which nothing has to settle."""
     goal, budget, correlations = goal or Goal(), budget or Budget(), correlations or Correlations()
     _moves(stage)
+    begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
     later = (PAIRS + 1) * (budget.generations + budget.refined + 4)  # pairs and the least change, about

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.tolerance import checked_rtol
@@ -29,14 +29,15 @@ def boundary(
     links: Mapping[str, str] | None = None,
     rtol: float = RTOL,
     log: bool = False,
+    begins: Callable[[], None] = lambda: None,
 ) -> Diagram | Plane:
     """Where the hunting cycle of a stage stops attracting, over one key or two.
 
     `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``, logarithmic if ":log" is behind
     or with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
     `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
-    `Plane`: the curves on which they do. The motion of the stage file plays no part. Raises InputError for a wrong
-    range, link, tolerance or stage (one that cannot hunt).
+    `Plane`: the curves on which they do. The motion of the stage file plays no part. `begins` is called once nothing
+    of the input is wrong. Raises InputError for a wrong range, link, tolerance or stage (one that cannot hunt).
     """
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())
@@ -57,6 +58,7 @@ def boundary(
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))
     _refuse_impossible(space, example)
     kernels([KernelRequest(space.form, variational) for variational in (False, True)])
+    begins()
     return diagram(space, rtol) if len(ranges) == 1 else plane(space, rtol)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -175,9 +175,11 @@ def compare(
     correlations: Correlations | None = None,
     progress: Progress = silent,
     also: tuple[str, ...] = (),
+    begins: Callable[[], None] = lambda: None,
 ) -> Comparison:
     """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position, and by what is
-    named `also`: settings against friction (`friso.equations.settings`), or "adrc".
+    named `also`: settings against friction (`friso.equations.settings`), or "adrc". `begins` is called before the first
+    work that takes time, once nothing of the input is wrong.
 
     Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
     """
@@ -186,6 +188,7 @@ def compare(
     settings = settings_named(also, (ADRC,))
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     corner = _corner(machines.stage)
+    begins()
     progress(0, 1, "how fast the controller may be")
     tried = options(machines, within, settings, bool({ADRC, "all"} & {*also}))
     work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(tried.options))
