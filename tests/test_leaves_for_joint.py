@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import get_args
 
 import numpy as np
@@ -19,7 +20,7 @@ from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.remedies.catalogue import remedies
 from friso.remedies.goal import Goal
-from friso.remedies.method import Advice, Unmade, tune
+from friso.remedies.method import Advice, Unmade, _Session, tune
 from friso.remedies.search import Budget
 from friso.views.tune.page import stage_files
 from friso.views.tune.words import DOUBTS, UNMADE, answer
@@ -154,3 +155,14 @@ def test_leaves_that_are_not_sure_to_work_are_not_recommended(tuning: Advice) ->
     assert all("not-sure" in name for name in names)
     paths = [Path("tuned") / name for name in stage_files(doubted)]
     assert TuneAnswer(doubted).next_steps(paths) == ["friso design tuned/tuned-isolator.toml"]
+
+
+def test_the_least_change_has_leaves_of_its_own(tuning: Advice, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It stands first in the answer, and is searched otherwise than what it was found from."""
+    (isolator, _), tried = tuning.outcomes, []
+    monkeypatch.setattr(_Session, "_verified", lambda self, search, shares: isolator)
+    monkeypatch.setattr(_Session, "tries", lambda self, remedy: tried.append(remedy.makes))
+    rest = SimpleNamespace(after=lambda steps: None)
+    session = _Session(tuning.stage, tuning.stage, tuning.goal, *[None] * 3, Budget(), rest, outcomes=[isolator])
+    session._ended(SimpleNamespace(remedy=isolator.remedy, tried=[], attracted=0), iter([np.zeros(0)]))
+    assert tried == [isolator.remedy.name]

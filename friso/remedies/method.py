@@ -239,8 +239,6 @@ class _Session:
         search = self._begun(remedy, self.budget.machines)
         search.optimise()
         self._ended(search, search.surveyed())
-        if remedy.buys_joint and not remedy.makes and self.outcomes[-1].certainty == "works":
-            self._made_of_leaves(self.outcomes[-1])
 
     def _made_of_leaves(self, outcome: RemedyOutcome) -> None:
         """The leaf springs that make the joint of a remedy, verified as that was."""
@@ -302,6 +300,9 @@ class _Session:
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted)
         self.outcomes[-1] = unsure or none
         self.report.after(_steps(search.remedy, self.budget))
+        last = self.outcomes[-1]
+        if last.remedy.buys_joint and not last.remedy.makes and last.certainty == "works":
+            self._made_of_leaves(last)
 
     def _verified(self, search: Search, shares: np.ndarray) -> RemedyOutcome:
         """A point on machines that the optimiser did not see and, where these meet the goal, by its cycles. As several
