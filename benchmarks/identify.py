@@ -33,7 +33,7 @@ from friso.identification.experiments.steps import stiffness_from_steps
 from friso.identification.experiments.stick_slip import static_from_stick_slip
 from friso.identification.logs.log import Log
 from friso.identification.moves import identify_moves
-from friso.identification.output_error.parameters import MASS, RATIO, fit_parameters
+from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, fit_parameters
 from friso.identification.output_error.problem import loop_problem
 from friso.identification.readings.friction_velocity import friction_velocity
 from friso.identification.response.analysis import analyse
@@ -178,6 +178,7 @@ def shown_by(log: Log, machine: Machine) -> set[str]:
     levels |= {"mass": mass_of(flat), "offset": -flat["bias.cart"]}
     top = flat["motion.acceleration"] * flat["motion.acceleration_time"]
     parameters = fit_parameters(flat, levels, top, float(np.ptp(log["position"])), True)
+    flat |= {parameter.name: parameter.start for parameter in parameters if parameter.name == EXPONENT}
     problem = loop_problem(flat, log, log.longest, parameters)
     truth = np.array([parameter.inner(parameter.start) for parameter in parameters])
     names = [parameter.name for parameter in parameters]

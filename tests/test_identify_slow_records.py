@@ -14,7 +14,7 @@ from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.output_error.break_aways import exceeded_at_break_away
 from friso.identification.output_error.drawn import DRAWS, drawn_from
-from friso.identification.output_error.parameters import MASS, RATIO, FitParameter
+from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, FitParameter
 from friso.identification.readings.common import record
 from friso.identification.readings.ramps import Ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
@@ -118,7 +118,7 @@ def test_static_friction_below_that_of_break_aways_is_not_believed() -> None:
         unsure = np.full(count, 0.1)
         return Ramps(*rest, directions, forces, np.ones(count), unsure, np.zeros(count), np.full(count, 0.05), 0.0, ())
 
-    assert exceeded_at_break_away([static, bias], curve, ramps(13.9), "N").keys() == {RATIO, STRIBECK.name}
+    assert exceeded_at_break_away([static, bias], curve, ramps(13.9), "N").keys() == {RATIO, STRIBECK.name, EXPONENT}
     assert not exceeded_at_break_away([static, bias], curve, ramps(11.9), "N")
     assert not exceeded_at_break_away([static, bias], curve, ramps(13.9, 2), "N")
     assert not exceeded_at_break_away([bias], curve, ramps(13.9), "N")

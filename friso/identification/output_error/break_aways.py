@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.identification.estimate import Estimate
-from friso.identification.output_error.identifiable import STRIBECK
+from friso.identification.output_error.identifiable import CURVE
 from friso.identification.readings.common import by_direction, robust, stribeck_curve
 from friso.identification.readings.ramps import Ramps
 from friso.intervals import COVERAGE
@@ -47,7 +47,7 @@ def exceeded_at_break_away(
     if middle - unsure <= static.high:
         return {}
     why = f"motions begin with {middle:.3g} {unit} of friction, more than the {static.value:.3g} {unit} of the fit"
-    return dict.fromkeys(STRIBECK, why)
+    return dict.fromkeys(CURVE, why)
 
 
 def _rises(flat: Mapping[str, Any], speeds: np.ndarray) -> np.ndarray:

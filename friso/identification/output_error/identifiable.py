@@ -11,13 +11,14 @@ from scipy.stats import chi2
 from friso.identification.output_error.coverage import NEAR, Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled
-from friso.identification.output_error.parameters import MASS, RATIO, SHARE, bends
+from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, SHARE, bends
 from friso.identification.output_error.problem import Problem
-from friso.identification.output_error.profile import Profile, profile
+from friso.identification.output_error.profile import WORSE, Profile, profile
 from friso.identification.readings.common import low_pass
 from friso.progress import Progress, silent
 
 STRIBECK = (RATIO, "friction.stribeck_velocity")
+CURVE = (*STRIBECK, EXPONENT)
 BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 
 STEP_OUT = 1.5
@@ -25,6 +26,9 @@ STEP_OUT = 1.5
 
 SURE = 0.99
 """Probability that parameters which no motion shows one by one improve the fit all the same."""
+
+AGAIN = 3
+"""Times at most that a profile leads to a better fit."""
 
 STEPS = 10
 """Pieces of about the same work that a fit with its profiles is."""
@@ -71,7 +75,7 @@ def fit_identifiable(
         progress(1, STEPS, "moves: all parameters in closed loop")
         full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]))
         if full.explains(noise):
-            return _believed(full, core, covered, progress, explained=True)
+            return believed(full, core, covered, progress, explained=True)
     progress(3, STEPS, "moves: all parameters along the log")
     along = _identifiable_on_log(follows, plain, core, covered, noise, progress)
     if loop is None:
@@ -94,29 +98,35 @@ def _identifiable_on_log(
         return IdentifiableFit(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
     full = with_force_settled(fit(follows, numbers, everywhere(follows, numbers, plain.inner)), noise)
-    believed = _believed(full, core, covered, progress)
+    answer = believed(full, core, covered, progress)
     if full.problem.inputs.held != plain.problem.inputs.held:
         plain = polished(full.problem, plain.free, plain.inner)
-    if _pays(full, plain) or believed.shown == hopeful:
-        return believed
-    if not believed.shown:
-        return replace(believed, fit=plain)
-    free = _numbers(names, core | believed.shown)
+    if _pays(full, plain) or answer.shown == hopeful:
+        return answer
+    if not answer.shown:
+        return replace(answer, fit=plain)
+    free = _numbers(names, core | answer.shown | ({EXPONENT} if RATIO in answer.shown else set()))
     neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
-    return replace(believed, fit=fit(full.problem, free, neutral[None]))
+    return replace(answer, fit=fit(full.problem, free, neutral[None]))
 
 
-def _believed(
+def believed(
     full: OutputErrorFit, core: set[str], covered: Coverage, progress: Progress, explained: bool = False
 ) -> IdentifiableFit:
     """A fit with the profiles of all that not every motion shows; one that has `explained` the record is believed
-    wherever its profiles are sharp."""
+    wherever its profiles are sharp. Where a profile finds a fit that is clearly better, that one takes its place."""
     names = [parameter.name for parameter in full.problem.parameters]
     asked = [i for i in full.free if names[i] not in core]
-    profiles = {}
-    for number, i in enumerate(asked):
-        progress(4 + min(number, STEPS - 6), STEPS, f"moves: how well {names[i]} is known")
-        profiles[names[i]] = profile(full, i, tuple(other for other in full.free if other != i), full.cost)
+    profiles: dict[str, Profile] = {}
+    again = AGAIN
+    while len(profiles) < len(asked):
+        i = asked[len(profiles)]
+        progress(4 + min(len(profiles), STEPS - 6), STEPS, f"moves: how well {names[i]} is known")
+        seen, fits = profile(full, i, tuple(other for other in full.free if other != i), full.cost)
+        profiles[names[i]] = seen
+        if again and fits.cost.min() < full.cost * (1 - WORSE / full.independent):
+            again -= 1
+            full, profiles = polished(full.problem, full.free, fits.inner[np.argmin(fits.cost)]), {}
     shown = {
         name for name, seen in profiles.items() if _sharp(full, seen) and (explained or _covers(full, name, covered))
     }
@@ -144,13 +154,13 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
 def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
     """Without either of the Stribeck effect's parameters, the other one means nothing."""
     effect = set(STRIBECK) & optional
-    return identifiable if effect <= identifiable else identifiable - effect
+    return identifiable if effect <= identifiable else identifiable - set(CURVE)
 
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     """Whether the motion covers anything that the parameter could show itself in."""
     parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
-    if name in STRIBECK:
+    if name in CURVE:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
         return covered.shows_length(min(bends(problem.flat)[1], float(np.ptp(problem.inputs.reference))))
@@ -166,7 +176,7 @@ def _sharp(full: OutputErrorFit, seen: Profile) -> bool:
 
 def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
     """Whether the motion covers where a parameter acts."""
-    if name in STRIBECK:
+    if name in CURVE:
         return covered.shows_speed(full.value("friction.stribeck_velocity"))
     if name in BRISTLES:
         stiffness = full.value("friction.bristle_stiffness")
@@ -178,7 +188,7 @@ def _covers(full: OutputErrorFit, name: str, covered: Coverage) -> bool:
 
 def why_not_shown(name: str, covered: Coverage) -> str:
     """Why a parameter is not shown, in a sentence."""
-    if name in STRIBECK:
+    if name in CURVE:
         low, high = covered.gap
         if not np.isfinite(high):
             return "no steady motion at all, in which the Stribeck effect would show"

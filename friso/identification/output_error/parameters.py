@@ -21,6 +21,12 @@ HIGHEST_RATIO = 4.0
 SHORTEST, LONGEST = 5e-8, 3e-4
 """Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
 
+EXPONENT = "friction.stribeck_exponent"
+
+EXPONENTS, SLIGHTLY_LESS = (0.5, 2.5), 0.995
+"""Exponents that are believed of a Stribeck curve: 0.5 to 1 (Bo, Pavelescu), 1 (Tustin), 2 (Armstrong-Helouvry, Dupont,
+Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7); and the share of the given one at which its fit begins."""
+
 RADII = 5e-3, 0.5
 """Radii [m] between which bearings that turn are believed to be: their bristles bend by an angle [rad]."""
 
@@ -118,6 +124,7 @@ def _friction(
         parameters += [
             FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, max(speed, stribeck_up_to(flat))),
+            _exponent(flat["friction.stribeck_exponent"]),
         ]
     if "friction.bristle_stiffness" in flat:
         shortest, longest = bends(flat)
@@ -127,6 +134,13 @@ def _friction(
         critical = 2 * np.sqrt(flat["friction.bristle_stiffness"] * levels["mass"])
         parameters.append(_slow("friction.bristle_damping", "N*s/m", flat, critical / 50, 10 * critical))
     return parameters
+
+
+def _exponent(stated: float) -> FitParameter:
+    """The exponent of the Stribeck curve, from a little below what the stage has: 1 and 2 have equations of their own,
+    in which it does not occur."""
+    start, (least, most) = SLIGHTLY_LESS * stated, EXPONENTS
+    return FitParameter(EXPONENT, "", start, min(least, start), max(most, start), logarithmic=False, core=False)
 
 
 def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:

@@ -34,6 +34,10 @@ CONTINUOUS = "the controller is simulated in continuous time"
 SLOW = 10.0
 """Bandwidth [Hz] at most of the controller that holds a stage to a log's position."""
 
+REMEMBERED, BEGINNING = 0.1, 0.05
+"""Time [s] for which a closed loop is taken to show where, how fast and with what bristles it was started, and share of
+a record that this takes at most: our choice."""
+
 FIRST = 10
 """Samples from which the velocity at the beginning is taken."""
 
@@ -202,7 +206,7 @@ def loop_problem(flat: Mapping[str, Any], log: Log, part: slice, parameters: Seq
         tuple(parameters),
         True,
         _start(log, part),
-        log.measured(part),
+        _after_start(count, log.sample_time) * log.measured(part),
     )
 
 
@@ -266,6 +270,13 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
     late = round(settling / sample_time)
     recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
     return np.where(recent, 0.0, 1.0)
+
+
+def _after_start(count: int, sample_time: float) -> np.ndarray:
+    """0 while a closed loop still shows how it was started, which a log tells but roughly, and 1 from there on, shape
+    (count,)."""
+    first = round(min(REMEMBERED / sample_time, BEGINNING * count))
+    return np.where(np.arange(count) < first, 0.0, 1.0)
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:

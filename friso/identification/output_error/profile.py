@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.refine import bounds_of, costs, refine_fit
+from friso.identification.output_error.refine import Refined, bounds_of, costs, refine_fit
 
 POINTS = 7
 """Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
@@ -19,8 +19,9 @@ WIDE = 4.0
 WIDER = 5.0
 """Times as far each time that the interval does not end within."""
 
-ROUNDS = 3
-"""Iterations of each of these fits."""
+ROUNDS, SETTLED = 6, 0.1
+"""Iterations of each of these fits at most, and the share of what ends an interval by which one may still fall: along a
+ridge, such as that of a Stribeck curve that is passed quickly, a fit that is ended early makes intervals too narrow."""
 
 WORSE = float(chi2.ppf(0.95, 1))
 """By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
@@ -42,8 +43,8 @@ class Profile:
     open_high: bool
 
 
-def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> Profile:
-    """The profile of parameter `number`, with the `others` fitted at each of its values.
+def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> tuple[Profile, Refined]:
+    """The profile of parameter `number`, with the `others` fitted at each of its values, and what these fits are.
 
     `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
     or over the whole range.
@@ -57,22 +58,27 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     while True:
         near, far = max(low, centre - half), min(high, centre + half)
         values = np.unique([*np.linspace(near, far, POINTS), centre])
-        cost = _costs(fit, number, others, values)
+        fits = _fits(fit, number, others, values)
+        cost = fits.cost
         left, right, open_left, open_right = _ends(values, cost, limit)
         if not ((open_left and near > low) or (open_right and far < high)):
             break
         half *= WIDER
     ends = float(parameter.outer(left)), float(parameter.outer(right))
-    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
+    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right), fits
 
 
-def _costs(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
-    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted."""
+def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> Refined:
+    """The fits at values of a parameter, shape (values,), the others free."""
     starts = np.repeat(fit.inner[None], len(values), axis=0)
     starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
-    return refine_fit(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
+    return (
+        refine_fit(fit.problem, starts, free, ROUNDS, SETTLED * WORSE / fit.independent)
+        if others
+        else Refined(starts, costs(fit.problem, starts))
+    )
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:

@@ -12,7 +12,7 @@ FIRST, LESS, MORE = 1e-2, 0.3, 10.0
 """Damping of the first step, as a share of the curvature, and by how much it falls and grows afterwards."""
 
 ENOUGH = 1e-4
-"""A fit is done when its sum of squares falls by less than this share."""
+"""Share by which the sum of squares of a fit falls at last, unless that has to be told more precisely."""
 
 BOUND = 1e-9
 """Share of a range by which a number is kept inside it."""
@@ -41,9 +41,11 @@ def costs(problem: Problem, inner: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(costs), costs, np.inf)
 
 
-def refine_fit(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: int) -> Refined:
+def refine_fit(
+    problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: int, enough: float = ENOUGH
+) -> Refined:
     """Fit from several starts, shape (starts, parameters); of each only the numbers that are `free`, a mask of the same
-    shape."""
+    shape. A fit is done when its sum of squares falls by less than the share `enough`."""
     low, high = bounds_of(problem)
     margin = BOUND * (high - low)
     inner = np.clip(starts, low + margin, high - margin)
@@ -59,7 +61,7 @@ def refine_fit(problem: Problem, starts: np.ndarray, free: np.ndarray, iteration
         trial_cost = np.full(len(inner), np.inf)
         trial_cost[busy] = costs(problem, trial[busy])
         better = trial_cost < cost
-        done = better & (trial_cost > cost * (1 - ENOUGH))
+        done = better & (trial_cost > cost * (1 - enough))
         inner, cost = np.where(better[:, None], trial, inner), np.where(better, trial_cost, cost)
         damping = np.where(better, damping * LESS, damping * MORE)
         busy &= ~done & (damping < 1e3)

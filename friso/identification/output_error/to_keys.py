@@ -97,7 +97,7 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
         interval = profiles.get(parameter.name)
         if interval is None or not np.isfinite(spread[i]) or interval.open_low or interval.open_high:
             continue
-        half = float(parameter.inner(interval.high) - parameter.inner(interval.low)) / 2
+        half = max(abs(float(parameter.inner(end)) - fit.inner[number]) for end in (interval.low, interval.high))
         if spread[i] > 0:
             factors[i] = max(1.0, half / (COVERAGE * spread[i]))
     return fit.covariance * np.outer(factors, factors)
