@@ -27,7 +27,7 @@ from friso.identification.output_error import profile as profiles
 from friso.identification.output_error.compliance import with_compliance
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled
-from friso.identification.output_error.identifiable import BRISTLES, believed
+from friso.identification.output_error.identifiable import BRISTLES, believed, bounds_as_much
 from friso.identification.output_error.one_way import either_way
 from friso.identification.output_error.parameters import HIGHEST_RATIO, MASS, RATIO, SHORTEST, fit_parameters
 from friso.identification.output_error.problem import loop_problem, tracking
@@ -132,6 +132,16 @@ def test_a_better_fit_on_a_profile_takes_the_place_of_the_fit(
     assert off.cost > 1.01 * best.cost
     core = {parameter.name for parameter in best.problem.parameters if parameter.core}
     assert believed(off, core, quick[2].covered, silent).fit.cost < 1.01 * best.cost
+
+
+def test_a_loop_that_bounds_less_than_the_log_does_not_take_its_place(
+    quick: tuple[dict[str, Any], Log, IdentifiedMoves],
+) -> None:
+    """Of one that stuck and slipped nothing at all was told, with an infinite variance of all that it had fitted."""
+    best = quick[2].fit
+    lost = replace(best, covariance=np.full_like(best.covariance, np.inf))
+    assert bounds_as_much(best, lost)
+    assert not bounds_as_much(lost, best)
 
 
 def test_correlations_are_of_what_is_shown(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:

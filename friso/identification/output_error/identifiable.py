@@ -85,7 +85,8 @@ def fit_identifiable(
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
     looped = fit(loop, along.fit.free, starts)
-    return replace(along, fit=looped) if _in_step(looped, along.fit, bandwidth) else along
+    followed = _in_step(looped, along.fit, bandwidth) and bounds_as_much(looped, along.fit)
+    return replace(along, fit=looped) if followed else along
 
 
 def _identifiable_on_log(
@@ -145,6 +146,13 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
     step, counted = looped.problem.inputs.sample_time, direct.problem.counted > 0
     powers = [np.sum(low_pass(fit.residual, step, bandwidth)[counted] ** 2) for fit in (looped, direct)]
     return bool(powers[0] <= STEP_OUT**2 * powers[1])
+
+
+def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
+    """Whether a closed loop bounds all that the stage that follows the log does. Of a stage that sticks and slips it
+    may end where a few break-aways, a little late or early, are all that its derivatives know."""
+    ends = [np.isfinite(np.diag(fit.covariance)) for fit in (looped, direct)]
+    return bool(np.all(ends[0] | ~ends[1]))
 
 
 def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
