@@ -533,7 +533,7 @@ def test_an_edge_is_told_with_what_is_known_of_it() -> None:
     assert edge in changed_rows(tabled(settles()), tabled(settles(margin=rough)))
 
 
-def test_a_motion_that_does_not_move_the_stage_says_so(wording: Wording) -> None:
+def test_a_motion_that_does_not_break_the_stage_away_says_so(wording: Wording) -> None:
     judgements = settles(), hunts(verdict="bistable")
     unmoved = [sentence(judgement, unmoved=True, largest_force=2.44) for judgement in judgements]
     wording("\n".join(unmoved))

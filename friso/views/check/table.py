@@ -134,8 +134,6 @@ def _peaks(case: Case) -> str:
 def _settled_within(band: float) -> Callable[[Case], str]:
     def text(case: Case) -> str:
         time = case.settling_time.get(band)
-        if case.unmoved:
-            return "not moved"
         if time is not None:
             return with_unit(time, "s")
         return "never" if case.verdict == "hunts" else "not in this run"

@@ -107,7 +107,7 @@ def _bistable(case: Case) -> str:
     if (moves := case.judgement.moves) and moves.hunting:
         like = f"this move at {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and acceleration time"
         starts.append(f"{percent(moves.fraction)} of the moves tried ({like})")
-    first = _unmoved(case) if case.unmoved else "settles after this move"
+    first = f"settles after this move{_stuck(case)}"
     if not starts and STARTS in case.judgement.given_up:
         return f"{first}, but another move or a kick may start hunting, {_swing(case)}; {_too_much('which ones do')}."
     if case.judgement.hunting.passing:
@@ -167,23 +167,29 @@ def _forces(*forces: float) -> list[str]:
 
 def _settling(case: Case) -> str:
     hunting = case.judgement.hunting
-    says = f"settles: {_unmoved(case)}." if case.unmoved else _settling_sentence(case)
+    says = _settling_sentence(case)
     return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
 
 
-def _unmoved(case: Case) -> str:
+def _stuck(case: Case) -> str:
+    """That the motion does not break the stage away, if it does not: only its bristles give way."""
+    if not case.unmoved:
+        return ""
     force, least = _forces(case.largest_force, case.breakaway)
-    return f"this motion does not move the stage (it exerts at most {force}; break-away takes {least})"
+    return f" without breaking away (it exerts at most {force}; break-away takes {least})"
 
 
 def _settling_sentence(case: Case) -> str:
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
+    stuck = _stuck(case)
     if fine is not None:
-        return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}."
+        return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}{stuck}."
     if coarse is not None:
-        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}"
-        return f"{within}, but does not stay within {band_text(_MICRON)}{_small_swing(case)}."
-    return " ".join([f"settles, but not to within {band_text(_TEN_MICRON)} ({_end(case)}).", *_held(case)])
+        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}{stuck}"
+        swing = _small_swing(case)
+        finer = f"does not stay within {band_text(_MICRON)}{swing}" if swing else f"not to within {band_text(_MICRON)}"
+        return f"{within}, but {finer}."
+    return " ".join([f"settles{stuck}, but not to within {band_text(_TEN_MICRON)} ({_end(case)}).", *_held(case)])
 
 
 def _small_swing(case: Case) -> str:
