@@ -205,7 +205,7 @@ def test_a_force_limit_that_keeps_a_stage_off_its_reference_is_named(
 
 
 def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved() -> None:
-    """Released at 15 um the stage creeps home, of which both sentence and table tell the time; at 2 mm it breaks away."""
+    """Released at 15 um the stage creeps home, and sentence and table tell the time; at 2 mm it breaks away."""
     settled = VARIANTS["rigid"].replace({"controller.crossover": "12 Hz", "motion.duration": "5 s"})
     answers = {d: friso.check(settled.replace({"motion.displacement": d})) for d in ("15 um", "2 mm")}
     cases = {d: answer["given"] for d, answer in answers.items()}
@@ -215,5 +215,6 @@ def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved()
     assert np.ptp(run.position.values) < 16e-6
     last = float(run.time.values[np.abs(run.error.values) > 10e-6][-1])
     assert cases["15 um"].settling_time[1e-5] == pytest.approx(last, abs=1e-3)
-    assert f"in {1e3 * last:.0f} ms without breaking away" in answers["15 um"].sentences()[0]
-    assert [row[1:] for row in answers["15 um"].tables()[0].rows if "into 10 µm" in row[0]] == [([f"{1e3 * last:.0f} ms"],)]
+    time = f"{1e3 * last:.0f} ms"
+    assert f"in {time} without breaking away" in answers["15 um"].sentences()[0]
+    assert [row[1:] for row in answers["15 um"].tables()[0].rows if "into 10 µm" in row[0]] == [([time],)]
