@@ -539,6 +539,9 @@ def test_a_motion_that_does_not_break_the_stage_away_says_so(wording: Wording) -
     wording("\n".join(unmoved))
     moved = [sentence(judgement, largest_force=2.44) for judgement in judgements]
     assert ["2.44 N" in text for text in (*unmoved, *moved)] == [True, True, False, False]
+    still = sentence(settles(), unmoved=True, largest_force=0.0, settling_time={1e-6: 0.0, 1e-5: 0.0})
+    assert "ends within 1 µm of its reference without breaking away" in still
+    assert "0 s" not in still
     hardly = sentence(settles(), unmoved=True, largest_force=2.9996)
     assert "(it exerts at most 2.9996 N; break-away takes 3.0000 N)" in hardly
 

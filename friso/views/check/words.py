@@ -182,6 +182,8 @@ def _stuck(case: Case) -> str:
 def _settling_sentence(case: Case) -> str:
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
     stuck = _stuck(case)
+    if fine == 0 and stuck:
+        return f"settles: it ends within {band_text(_MICRON)} of its reference{stuck}."
     if fine is not None:
         return f"settles to within {band_text(_MICRON)} in {with_unit(fine, 's')}{stuck}."
     if coarse is not None:
