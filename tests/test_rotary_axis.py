@@ -2,6 +2,8 @@
 
 import json
 import re
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from inside import friso_inside
 
 import friso
 from friso.axis import LINEAR, ROTARY, speak_of, unit_shown
+from friso.design_method.outline import outline
 from friso.errors import InputError, StageError
 from friso.intervals import UncertainValue
 from friso.stage import Stage, numeric_keys
@@ -116,6 +119,15 @@ def test_a_torque_is_no_force(pair: tuple[Stage, Stage]) -> None:
         pair[0].replace({"axis.kind": "round"})
     with pytest.raises(StageError, match="leaf springs on an axis"):
         rotary(friso.load(EXAMPLES / "thesis_leaves.toml"))
+
+
+@pytest.mark.parametrize(
+    "asks", [friso.design, outline, partial(friso.design, spec=EXAMPLES / "specs" / "thesis.toml")]
+)
+def test_no_leaf_springs_are_designed_for_an_axis_that_turns(pair: tuple[Stage, Stage], asks: Callable) -> None:
+    """Neither from a specification nor without; none is written to begin with."""
+    with pytest.raises(InputError, match="leaf springs guide along a line"):
+        asks(pair[1])
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from friso.answers.answer import Answer, question
 from friso.answers.inputs import AS_BUILT, LOGGER, Changes, StageLike, mention_unstable_loop, read_stage
 from friso.design_method.method import Design
 from friso.design_method.outline import outline
-from friso.design_method.prepare import assumed, by_rules
+from friso.design_method.prepare import assumed, by_rules, check_designable
 from friso.design_method.spec import Spec, load_spec, read_spec
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
@@ -118,6 +118,7 @@ def design(
     >>> friso.design(friso.example("thesis_rig"), friso.example("specs/thesis"))  # doctest: +SKIP
     """
     chosen = read_stage(stage, set, leaves_out=AS_BUILT[1:])
+    check_designable(chosen)
     specification = specification_of(chosen, spec)
     _tell_what_is_assumed(chosen, specification, spec is None)
     mention_unstable_loop(chosen)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from friso.axis import LINEAR
 from friso.design_method.choice import STEP, bears, evaluated
 from friso.design_method.front import evaluate_geometries
 from friso.design_method.geometry import SIZES, Geometry, Sheet, box, mechanisms, moved_along, sheets
@@ -51,9 +50,6 @@ def leaves_for_joint(stage: Stage, present: Stage) -> Stage | None:
     stage as it is at `present`, if it has that: its points stay where they are from the leaf ends. Raises InputError
     for a stage whose joint leaf springs cannot be.
     """
-    if stage.axis_kind != LINEAR:
-        axis = f"an axis with {stage.axis_kind.described}"
-        raise InputError("joint", axis, "a linear axis: leaf springs guide along a line", 'axis = "linear"')
     spec = read_spec(outline(stage))
     low, high = box(spec)
     first = Geometry.of(np.array([low[0], *high[1:]]), sheets(spec)[-1])  # what bears the largest load

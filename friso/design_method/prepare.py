@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from friso.axis import LINEAR
 from friso.design_method.geometry import Geometry, moved_along
 from friso.design_method.isolator import isolated
 from friso.design_method.spec import Spec
@@ -9,7 +10,7 @@ from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, controll
 from friso.errors import InputError
 from friso.frequency.bandwidth import loop_bandwidth
 from friso.materials import materials
-from friso.quantities import exactly
+from friso.quantities import as_toml, exactly
 from friso.stage import Stage
 
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
@@ -88,6 +89,9 @@ def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
 
 def check_designable(stage: Stage) -> None:
     """Raises InputError for a stage that `friso design` cannot design a friction isolator for."""
+    if stage.axis_kind != LINEAR:
+        expected = '"linear": leaf springs guide along a line (friso tune gives any axis a joint)'
+        raise InputError("axis.kind", as_toml(stage.axis_kind.name), expected, '[axis] kind = "linear"')
     if stage.joint is not None and stage.joint.damping is None:
         expected = "a [joint] with its damping and its limiter, or none; its stiffness follows from the design"
         raise InputError("joint", "no damping", expected, JOINT)
