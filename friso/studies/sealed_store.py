@@ -31,6 +31,10 @@ class SealedStore(WrapperStore[LocalStore]):
     def _with_store(self, store: LocalStore) -> SealedStore:
         return type(self)(store, self.files)
 
+    def with_read_only(self, read_only: bool = False) -> SealedStore:
+        """The same store, for reading alone or not: Zarr before 3.1.6 has it for no store of this kind."""
+        return self._with_store(self._store.with_read_only(read_only))
+
     async def get(self, key: str, prototype: BufferPrototype, byte_range: ByteRequest | None = None) -> Buffer | None:
         if key in self.files:
             return prototype.buffer.from_bytes(json.dumps(self.files[key]).encode())
