@@ -4,7 +4,7 @@ import json
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import is_dataclass, replace
+from dataclasses import fields, is_dataclass, replace
 from importlib import import_module
 from importlib.resources import files
 from itertools import combinations
@@ -451,6 +451,26 @@ def test_a_verdict_that_another_reading_turns_says_so() -> None:
         assert f"{read}: {becomes}" in item.dependence
         assert all(other.pattern != own.pattern for other in item.reread.values())
     assert reading() == OWN
+
+
+def test_every_word_is_read_otherwise() -> None:
+    """Each by itself; all but “none”, below which there is nothing, to either side."""
+    for word in fields(OWN):
+        own = getattr(OWN, word.name)
+        others = [other for other in OTHERWISE.values() if getattr(other, word.name) != own]
+        values = [getattr(other, word.name) for other in others]
+        assert (min(values) < own) is (word.name != "none")
+        assert max(values) > own
+        assert all(replace(other, **{word.name: own}) == OWN for other in others)
+
+
+def test_the_long_strokes_are_those_of_the_reading() -> None:
+    """Whose limit is the same."""
+    evidence = Evidence(crossover_pair(8.0, 4.0), {})
+    with read_as(replace(OWN, long=0.75)):
+        few = registered()["F16A"].judge(evidence)
+    assert "upper 25 %" in few.parts[0].criterion
+    assert few.pattern == registered()["F16A"].judge(evidence).pattern
 
 
 def test_every_judge_of_maps_is_tried_both_ways() -> None:

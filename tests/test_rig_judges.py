@@ -14,6 +14,7 @@ from friso.studies.thesis.claims import registered
 from friso.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments
 from friso.studies.thesis.judges.identified_responses import MEASURED, WEIGHED
 from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig, weaker_motor
+from friso.studies.thesis.reading import OWN, read_as
 
 Y, N = True, False
 H, F = HUNTS, FAILED
@@ -137,6 +138,26 @@ EACH = [
 def test_made_evidence(what: str, made: Any, pattern: tuple[bool, ...]) -> None:
     finding = judged(what, made)
     assert tuple(part.holds for part in finding.parts) == pattern, finding  # self-tests too
+
+
+@pytest.mark.parametrize(
+    ("words", "what", "made", "part"),
+    [
+        ({"half": 0.7}, "F24", moves((H, 0, H, 0)), 0),
+        ({"half": 0.7}, "F27", cycles(swing=[1e-3, 1e-3, 3e-3, 3e-3]), 1),
+        ({"half": 0.2}, "F27", cycles(above=[5e-4, 5e-4, 5e-4, 9e-4]), 2),
+        ({"half": 0.7}, "F28", standstill(), 2),
+        ({"twice": 1.9}, "F27", cycles(period=0.93), 1),
+        ({"similar": 3.0}, "F27", cycles(swing=2e-3), 1),
+        ({"unequal": 1.05}, "F27", cycles(above=5.4e-4), 2),
+        ({"uneven": 0.02}, "F27", cycles(period_scatter=0.04), 3),
+    ],
+)
+def test_other_readings_turn_what_they_are_about(words: dict[str, float], what: str, made: Any, part: int) -> None:
+    own = judged(what, made).pattern
+    with read_as(replace(OWN, **words)):
+        turned = judged(what, made).pattern
+    assert [n for n, (before, after) in enumerate(zip(own, turned, strict=True)) if before != after] == [part]
 
 
 @pytest.mark.parametrize("what", MADE)

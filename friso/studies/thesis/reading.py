@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from friso.quantities import percent
+from friso.studies.rig.experiments.measured_cycles import AS_SLOW, SIMILAR
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,11 @@ class WordReading:
     `of the order` of another and beyond which it is far below it; the share of a map's cells up to which they are
     `few`, and up to which there are `none`; the rank correlation (Spearman) from which there is a `trend`; the share
     within which numbers are the `same`, and within which they are `close`, as far as one reads them off a figure; and
-    the damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied."""
+    the damping [N s/m] from which that of the limiter is `large`: the upper two of the six decades studied; the share
+    that is at least `half` or “most” of them; the share of the range of strokes from which they are `long`; and of
+    cycles on the rig, the factor from which one is nearly `twice` as long as another, that within which swings are
+    `similar`, that from which their two sides are `unequal`, and the scatter of the period over its mean from which one
+    is less regular, `uneven`."""
 
     about: float = 1.5
     order: float = 10**0.5
@@ -28,6 +33,12 @@ class WordReading:
     same: float = 0.15
     close: float = 0.1
     large: float = 1e2
+    half: float = 0.5
+    long: float = 0.5
+    twice: float = AS_SLOW
+    similar: float = SIMILAR
+    unequal: float = 1.1
+    uneven: float = 0.05
 
 
 OWN = WordReading()
@@ -52,7 +63,12 @@ def read_as(other: WordReading) -> Iterator[None]:
 
 
 def _otherwise() -> dict[str, WordReading]:
-    factors = {"about": ("about", (1.25, 2.0)), "order": ("of the order of", (2.0, 10.0))}
+    factors = {
+        "about": ("about", (1.25, 2.0)),
+        "order": ("of the order of", (2.0, 10.0)),
+        "similar": ("similar", (1.25, 2.0)),
+    }
+    least = {"twice": ("nearly twice", (1.5, 1.9)), "unequal": ("unequal", (1.05, 1.25))}
     shares = {
         "few": ("few", (0.02, 0.1)),
         "none": ("none", (OWN.few,)),
@@ -70,6 +86,16 @@ def _otherwise() -> dict[str, WordReading]:
         )
         for name, (word, values) in shares.items()
         for value in values
+    }
+    others |= {
+        f"“{word}” as at least {value:g} times": replace(OWN, **{name: value})
+        for name, (word, values) in least.items()
+        for value in values
+    }
+    others |= {f"“half” as {percent(value)}": replace(OWN, half=value) for value in (0.3, 0.7)}
+    others |= {f"“long” as the upper {percent(1 - value)}": replace(OWN, long=value) for value in (0.25, 0.75)}
+    others |= {
+        f"“less regular” from a scatter of {percent(value)} on": replace(OWN, uneven=value) for value in (0.02, 0.1)
     }
     others |= {f"“trend” as a rank correlation of {value:g}": replace(OWN, trend=value) for value in (0.3, 0.7)}
     return others | {f"“large” as {value:g} N s/m and more": replace(OWN, large=value) for value in (10.0, 1e3)}
@@ -90,7 +116,10 @@ CONVENTIONS = (
     f"a factor of {OWN.order:.2g} (half a decade) and “far” beyond it, “few” cells are at most {percent(OWN.few)} of a "
     f"map, “the same” is within {percent(OWN.same)}, “close” within {percent(OWN.close)}, a “trend” is a rank "
     f"correlation of at least {OWN.trend:g}, a “large” limiter damping is {OWN.large:g} N s/m and more (the upper two "
-    "of the six decades studied). Every claim is judged by other readings too: "
+    f"of the six decades studied), “most” and “half” are {percent(OWN.half)}, “long” strokes the upper "
+    f"{percent(1 - OWN.long)} of the range, “similar” swings are within a factor of {OWN.similar:g}, “nearly twice” is "
+    f"at least {OWN.twice:g} times, sides are “unequal” from a factor of {OWN.unequal:g} on, and a period is “less "
+    f"regular” from a scatter of {percent(OWN.uneven)} on. Every claim is judged by other readings too: "
     f"{', '.join(OTHERWISE)}; where one of them turns a criterion, its dependence says so. Whether a cell of a map "
     "“keeps moving” or “comes to rest” is judged in three ways: by the thesis's count, where at least one peak is "
     "counted (Sec. 3.2.2); where the run swings at its end; where a cycle attracts, whatever the move. A claim holds "

@@ -25,24 +25,23 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
     runs = evidence.maps["isolator-crossover"]
     crossover, stroke, moving, valid = verdict_table(runs, *_AXES)
     limits = ends(crossover, moving, sizes(runs, *_AXES))
-    long, longest = stroke >= stroke[-1] / 2, stroke >= 0.75 * stroke[-1]
-    third, fourth = limits[long & ~longest].mean(), limits[longest].mean()
+    long, longest = stroke >= words.long * stroke[-1], stroke >= (1 + words.long) / 2 * stroke[-1]
+    shorter, longer = limits[long & ~longest].mean(), limits[longest].mean()
     below = (crossover[:, None] < limits[None, :]) & long[None, :] & valid
     return Finding(
         (
             Part(
-                "at every stroke of the upper half of the range it keeps moving at some crossover, and at none from a "
-                "higher "
-                "one on",
+                f"at every stroke of the upper {percent(1 - words.long)} of the range it keeps moving at some "
+                "crossover, and at none from a higher one on",
                 bool(moving[:, long].any(axis=0).all() and not moving[-1, long].any()),
                 f"mean limit {limits[long].mean():.3g} Hz ({limits[long].min():.3g} to {limits[long].max():.3g} Hz); "
                 f"{overlap_text(moving, below)} of the cells below it keep moving",
             ),
             Part(
-                "the mean limits over the third and over the fourth quarter of the strokes differ by at most "
+                "the mean limits over the lower and over the upper half of these strokes differ by at most "
                 f"{percent(words.same)}, and the limit of stroke 0 is higher than both",
-                bool(abs(third - fourth) <= words.same * third and limits[0] > max(third, fourth)),
-                f"{third:.3g} Hz over the third and {fourth:.3g} Hz over the fourth quarter; {limits[0]:.3g} Hz at "
+                bool(abs(shorter - longer) <= words.same * shorter and limits[0] > max(shorter, longer)),
+                f"{shorter:.3g} Hz over the lower and {longer:.3g} Hz over the upper half; {limits[0]:.3g} Hz at "
                 "stroke 0",
             ),
         )
@@ -56,15 +55,15 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
     names = ("isolator-crossover", "isolator-crossover-soft")
     stiff, soft = (_limits(evidence.maps[name]) for name in names)
     stroke = verdict_table(evidence.maps[names[0]], *_AXES)[1]
-    long = stroke >= stroke[-1] / 2
+    long = stroke >= words.long * stroke[-1]
     drop = (stiff - soft)[long]
     ratio = float(soft[long].mean() / stiff[long].mean())
     return Finding(
         (
             Part(
-                f"over the strokes of the upper half of the range, the mean limit at {SOFT['joint.stiffness']} is "
-                f"lower than at {thesis_rig().flat()['joint.stiffness']:g} N/m by more than what is the same "
-                f"({percent(words.same)})",
+                f"over the strokes of the upper {percent(1 - words.long)} of the range, the mean limit at "
+                f"{SOFT['joint.stiffness']} is lower than at {thesis_rig().flat()['joint.stiffness']:g} N/m by more "
+                f"than what is the same ({percent(words.same)})",
                 ratio < 1 - words.same,
                 f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: a drop of {percent(1 - ratio)}; lower "
                 f"at {percent((drop > 0).mean())} of the strokes, higher at {percent((drop < 0).mean())}",

@@ -9,6 +9,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
+from friso.quantities import percent
 from friso.stage import Stage, loads
 from friso.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
 from friso.studies.thesis.judges.control_and_friction import smallest_gap
@@ -48,8 +49,8 @@ def _soft(evidence: Evidence) -> Part:
     limit = begins(stiffness, moving, sizes(runs, *axes))[enough]
     return Part(
         f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range comes to rest, "
-        "and at most of these strokes the stage keeps moving with a stiffer one",
-        bool(softest.all() and np.mean(limit < stiffness[-1]) > 0.5),
+        f"and at most of these strokes, more than {percent(reading().half)}, the stage keeps moving with a stiffer one",
+        bool(softest.all() and np.mean(limit < stiffness[-1]) > reading().half),
         f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
         f"{limit.min():.3g} to "
         f"{limit.max():.0f} N/m on",

@@ -67,8 +67,8 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
             Part(
                 "above some hyperbola, acceleration times its time constant, every path keeps the stage "
                 "moving; below it some do not; "
-                "and at least half of the paths that move lie above it",
-                bool(resting.any() and above >= 0.5),
+                f"and at least {percent(words.half)} of the paths that move lie above it",
+                bool(resting.any() and above >= words.half),
                 f"all keep it moving above {bound:.2g} m/s, {percent(above)} of the paths; "
                 f"{overlap_text(moving, moved & (speed <= bound))} keep it moving below",
             ),

@@ -9,7 +9,7 @@ import numpy as np
 from friso.quantities import percent
 from friso.shares import share_interval
 from friso.studies.rig.experiments.in_position import BITS, InPosition
-from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMILAR
+from friso.studies.rig.experiments.measured_cycles import MOTORS
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.moves_on_rails import RailRuns
 from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
@@ -25,15 +25,6 @@ _ASSUMED = (
 
 _DEVIATIONS = 0.1e-6, 1e-6
 """Peaks by Fig. 28 with the joint locked and free [m]."""
-
-_LOPSIDED = 1.1
-"""Larger side of a cycle over the other from which its sides differ."""
-
-_IRREGULAR = 0.05
-"""Scatter of the period over its mean from which a cycle is less regular."""
-
-_RECOVERED = 0.5
-"""Share of a difference from which a thing is taken for its cause."""
 
 
 def _runs_with_peaks(runs: RailRuns, which: Any = ...) -> tuple[int, int]:
@@ -56,12 +47,13 @@ def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
 
 def judged_move(moves: MovesOnRails) -> Finding:
     """The finding from the moves on several rails."""
+    words = reading()
     locked, free = _runs_with_peaks(moves.locked, 0), _runs_with_peaks(moves.free)
     return Finding(
         (
             Part(
-                "with the joint locked peaks are counted, on at least half of the rails",
-                2 * locked[0] >= locked[1] > 0,
+                f"with the joint locked peaks are counted, on at least {percent(words.half)} of the rails",
+                locked[0] >= words.half * locked[1] > 0,
                 f"{_rails(locked)}. {_ASSUMED}",
                 why="Where friction differs between the two places at which the stage sticks, its swings die out.",
             ),
@@ -148,7 +140,7 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
     swings = rails.swings
     slower = np.where(swings, rails.period, np.nan) / even.period[0]
     larger = np.where(swings, rails.swing, np.nan) / even.swing[0]
-    similar = swings & (abs(np.log(larger)) <= np.log(SIMILAR))
+    similar = swings & (abs(np.log(larger)) <= np.log(words.similar))
     sides = np.where(swings, rails.above / rails.below, np.nan)
     lopsided = abs(np.log(sides[np.isfinite(sides)]))
     swinging = f"{int(swings.sum())} of {len(swings)} rails still swing at the end"
@@ -166,26 +158,27 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
                 why="There is no lasting swing on an even rail.",
             ),
             Part(
-                f"on a rail that varies its period is nearly twice as long (at least {AS_SLOW:g} times) at a similar "
-                f"swing (within a factor of {SIMILAR:g}), on at least half of those that keep swinging",
-                bool(swings.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= swings.sum()),
+                f"on a rail that varies its period is nearly twice as long (at least {words.twice:g} times) at a "
+                f"similar swing (within a factor of {words.similar:g}), on at least {percent(words.half)} of those "
+                "that keep swinging",
+                bool(swings.any() and (slower[similar] >= words.twice).sum() >= words.half * swings.sum()),
                 f"{swinging}{times}. {_ASSUMED}",
                 why="The rail is not the cause: friction that differs between the two sides slows a cycle down, "
                 "and ends "
                 f"it before it is twice as slow. {_weak_motor(cycles)}",
             ),
             Part(
-                f"there its two sides differ (by a factor of more than {_LOPSIDED:g}, on at least half of those that "
-                "keep swinging)",
-                bool(len(lopsided) and np.median(lopsided) > np.log(_LOPSIDED)),
+                f"there its two sides differ (by a factor of more than {words.unequal:g}, on at least "
+                f"{percent(words.half)} of those that keep swinging)",
+                bool(len(lopsided) and np.quantile(lopsided, 1 - words.half) > np.log(words.unequal)),
                 f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
                 if len(lopsided)
                 else "nothing swings on",
                 why="Too few keep swinging.",
             ),
             Part(
-                f"there it is less regular from cycle to cycle (period scatters by more than {percent(_IRREGULAR)})",
-                scatter > _IRREGULAR,
+                f"there it is less regular from cycle to cycle (period scatters by more than {percent(words.uneven)})",
+                scatter > words.uneven,
                 f"median scatter of the period {percent(scatter)}",
                 why="Friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
                 "the model.",
@@ -243,8 +236,8 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 f"ratio of RMS values: {number_text(ratio, '.2g')}",
             ),
             Part(
-                f"the joint lacks damping: ten times as much removes at least {percent(_RECOVERED)} of the difference",
-                tenfold >= _RECOVERED,
+                f"the joint lacks damping: ten times as much removes at least {percent(words.half)} of the difference",
+                tenfold >= words.half,
                 f"{percent(tenfold)} at {10 * standstill.own_damping:g} N s/m, "
                 f"{percent(standstill.recovered.max())} at the most tried",
                 why="The sticking bearing holds the locked stage with its stiff bristles, the free one is held "
