@@ -138,6 +138,17 @@ def test_tune_sizes_the_leaves_of_an_isolator_and_verifies_them(tuning: Advice) 
     ]
 
 
+def test_the_mode_of_the_file_whose_place_the_leaves_take_is_named(tuning: Advice) -> None:
+    """That of the joint as it is, as a number; not that of leaf springs, which are in the file."""
+
+    def replaced(present: Stage) -> bool:
+        sentences = " ".join(answer(replace(tuning, stage=present)))
+        assert "Leaf springs for its joint" in sentences
+        return ", in place of the parasitic mode of the file (300 Hz). With them" in sentences
+
+    assert [replaced(stage) for stage in (tuning.stage, RIG, LEAVES)] == [False, True, False]
+
+
 @pytest.mark.parametrize("why", get_args(Unmade))
 def test_why_no_leaves_were_sized_is_said(tuning: Advice, why: Unmade) -> None:
     (isolator, _) = tuning.outcomes

@@ -208,10 +208,17 @@ def _made_of_leaves(outcome: RemedyOutcome, tuning: Advice) -> Iterator[str]:
         mode = f"first interfering frequency {with_unit(disturbs, 'Hz')}" if math.isfinite(disturbs) else "no mode"
         yield (
             f"Leaf springs for its joint: {leaf_words(Geometry.of_stage(flat))}; "
-            f"{with_unit(flat['joint.stiffness'], 'N/m')}, {mode}. {_verified(made, tuning)}"
+            f"{with_unit(flat['joint.stiffness'], 'N/m')}, {mode}{_replaced(tuning.stage)}. {_verified(made, tuning)}"
         )
     elif outcome.remedy.name in tuning.unmade:
         yield f"No leaf springs were sized for its joint: {UNMADE[tuning.unmade[outcome.remedy.name]]}."
+
+
+def _replaced(stage: Stage) -> str:
+    """Of what mode the leaf springs of a remedy take the place: that of the joint which the stage file has."""
+    if stage.parasitic is None or stage.flexure is not None:
+        return ""
+    return f", in place of the parasitic mode of the file ({with_unit(stage.flat()['parasitic.frequency'], 'Hz')})"
 
 
 def _verified(made: RemedyOutcome, tuning: Advice) -> str:
