@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import html
 import io
 import json
 import os
@@ -12,6 +13,8 @@ import sys
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from urllib.parse import unquote
+from xml.etree import ElementTree
 
 import matplotlib
 import numpy as np
@@ -32,6 +35,7 @@ from made_up import (
 from pages import packed_values
 
 from friso.quantities import percent
+from friso.views import pages
 from friso.views.check.figures import check_figures
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
@@ -285,6 +289,15 @@ def test_fonts_of_a_pdf_hold_letters_alone():
     assert subset.Options().drop_tables == usual
 
 
+def test_apostrophes_of_a_picture_do_not_end_its_attributes() -> None:
+    """In the address of a picture its quotation marks are apostrophes."""
+    picture = """<svg a="it's" b="2 % &amp; #">d'or</svg>"""
+    address = re.search(r'src="([^"]*)"', f'<img src="{pages._plain(picture)}">')
+    assert address is not None
+    shown = ElementTree.fromstring(unquote(html.unescape(address[1])))
+    assert (shown.attrib, shown.text) == ({"a": "it's", "b": "2 % & #"}, "d'or")
+
+
 @pytest.mark.parametrize(
     ("limits", "readable"),
     [
@@ -310,11 +323,23 @@ def test_a_narrow_page_breaks_titles_above_their_legends() -> None:
     panel = Panel("A title that is too long for the width of a telephone", Axis("x", ""), Axis("y", ""), lines)
     figure = Figure("f", "", "", (panel, panel), columns=2, note="a long note, " * 8)
     narrow, wide = (make(figure)["layout"] for make in (plotly_renderer.narrow_parts, plotly_renderer.parts))
-    note, title = (text["text"].split("<br>") for text in narrow["annotations"][:2])
-    assert len(title) > 1
+    (note,) = (text["text"].split("<br>") for text in narrow["annotations"])
+    assert all(len(narrow[name]["title"]["text"].split("<br>")) > 1 for name in ("legend", "legend2"))
     assert max(map(len, note)) < plotly_renderer.NARROW / 6
     assert narrow["height"] > wide["height"]
-    assert narrow["annotations"][1]["yshift"] >= 4 * plotly_renderer.KEY_ROW
+    assert narrow["height"] - 2 * (plotly_renderer.PLOT + plotly_renderer.FOOTER) >= 8 * plotly_renderer.KEY_ROW
+
+
+def test_a_title_stands_upon_the_legend_or_upon_the_axes() -> None:
+    """However many rows the legend takes: on a wide page they are fewer."""
+    lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"line {k}", GREY) for k in range(2))
+    with_legend, alone = (
+        plotly_renderer.parts(Figure("f", "", "", (Panel("A title", Axis("x", ""), Axis("y", ""), some),)))["layout"]
+        for some in (lines, lines[:1])
+    )
+    assert (with_legend["legend"]["title"]["text"], with_legend["annotations"]) == ("<b>A title</b>", [])
+    assert [text["text"] for text in alone["annotations"]] == ["<b>A title</b>"]
+    assert "legend" not in alone
 
 
 @pytest.mark.parametrize(("columns", "lines", "orientation"), [(1, 6, "h"), (2, 2, "h"), (2, 6, "v")])

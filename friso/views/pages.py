@@ -117,4 +117,4 @@ def _plain(svg: str) -> str:
 
 
 _UNSEEN = re.compile(r"<!--.*?-->|<metadata>.*?</metadata>", re.DOTALL)
-_IN_ADDRESSES = str.maketrans({'"': "'", "&": "&amp;", "%": "%25", "#": "%23"})
+_IN_ADDRESSES = str.maketrans({"'": "&amp;apos;", '"': "'", "&": "&amp;", "%": "%25", "#": "%23"})

@@ -73,7 +73,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
         "The whole run; the error is the reference minus the position, at the scale of what follows the move: the move "
         "itself is cut off."
     )
-    return Figure("response", "time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
+    return Figure("response", "Time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
 
 
 def _late(trace: xr.Dataset) -> float:

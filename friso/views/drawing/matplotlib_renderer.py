@@ -202,16 +202,21 @@ def _cut(lines: bytes, height: float, low: float, high: float) -> bytes:
 @contextmanager
 def _letters_alone() -> Iterator[None]:
     """Fonts are embedded without the tables by which letters find their places, as they have them: to cut these down to
-    the letters that occur takes two thirds of the time of a PDF. FontTools is told by the list that its options begin
-    with, since matplotlib makes them."""
-    from fontTools.subset import Options
+    the letters that occur takes two thirds of the time of a PDF. Matplotlib makes the options of FontTools."""
+    from fontTools import subset
 
-    usual = Options._drop_tables_default  # type: ignore[attr-defined]
-    Options._drop_tables_default = [*usual, "GDEF", "GPOS", "GSUB"]  # type: ignore[attr-defined]
+    usual = subset.Options
+
+    class LettersAlone(usual):
+        def __init__(self, **options: object) -> None:
+            super().__init__(**options)
+            self.drop_tables = [*self.drop_tables, "GDEF", "GPOS", "GSUB"]
+
+    subset.Options = LettersAlone
     try:
         yield
     finally:
-        Options._drop_tables_default = usual  # type: ignore[attr-defined]
+        subset.Options = usual
 
 
 def _laid_out(figure: Figure) -> _LaidOut:

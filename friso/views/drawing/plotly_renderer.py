@@ -148,8 +148,10 @@ def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
             x_domain = (x_domain[0], x_domain[1] - BAR)
             bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, links)
-        layout[f"legend{_suffix(number)}"] = heads[number].legend(x_domain[0], y_domain[1])
-        layout["annotations"].append(heads[number].title(x_domain[0], y_domain[1]))
+        if heads[number].rows:
+            layout[f"legend{_suffix(number)}"] = heads[number].over(x_domain[0], y_domain[1])
+        elif heads[number].lines:
+            layout["annotations"].append(heads[number].alone(x_domain[0], y_domain[1]))
         traces += _traces(panel, number, bar)
     return {"data": traces + key_traces(prepared, key), "layout": layout}
 
@@ -179,17 +181,22 @@ class _Head:
         """Of all of it [px]."""
         return TITLE * len(self.lines) + KEY_ROW * self.rows + SPACE
 
-    def legend(self, left: float, top: float) -> dict[str, Any]:
-        """The legend as plotly takes it, above axes that begin and end there, in shares of the figure."""
+    def over(self, left: float, top: float) -> dict[str, Any]:
+        """The legend as plotly takes it, above axes that begin and end there, in shares of the figure, with the title
+        above its entries: those take fewer rows where there is more room."""
         place = {"x": left, "xanchor": "left", "y": top, "yanchor": "bottom", "bgcolor": "rgba(0,0,0,0)"}
-        return {"orientation": "v", "maxheight": 1, **place} if self.stacked else {"orientation": "h", **place}
+        kind = {"orientation": "v", "maxheight": 1} if self.stacked else {"orientation": "h"}
+        return {**kind, **place, **({"title": {**self._text, "side": "top"}} if self.lines else {})}
 
-    def title(self, left: float, top: float) -> dict[str, Any]:
-        """The title as plotly takes it, above axes that begin and end there, in shares of the figure."""
-        text = "<br>".join(map(html.escape, self.lines))
+    def alone(self, left: float, top: float) -> dict[str, Any]:
+        """The title as plotly takes it where there is no legend, above axes that begin and end there, in shares of the
+        figure."""
         place = {"x": left, "xref": "paper", "xanchor": "left", "y": top, "yref": "paper", "yanchor": "bottom"}
-        above = {"yshift": KEY_ROW * self.rows + SPACE - 4, "align": "left"}
-        return {"text": f"<b>{text}</b>", "showarrow": False, "font": {"size": 13}, **place, **above}
+        return {**self._text, "showarrow": False, **place, "yshift": SPACE - 4, "align": "left"}
+
+    @property
+    def _text(self) -> dict[str, Any]:
+        return {"text": f"<b>{'<br>'.join(map(html.escape, self.lines))}</b>", "font": {"size": 13}}
 
 
 def _labels(panel: Panel) -> list[str]:

@@ -19,18 +19,30 @@ const plotly = (async () => {
   script.textContent = await unpacked(document.getElementById("plotly"));
   document.head.append(script);
 })();
+// A figure with the layout that its place has room for; colour bars stand elsewhere on a narrow screen.
+const drawer = (place, { data, layout, narrow, bars, config }) => {
+  const withBar = (holder, bar) => ({ ...holder, colorbar: { ...holder.colorbar, ...bar } });
+  const moved = (trace, bar) => {
+    if (!bar) return trace;
+    return trace.colorbar ? withBar(trace, bar) : { ...trace, marker: withBar(trace.marker, bar) };
+  };
+  let drawn = null;
+  return async () => {
+    const isNarrow = place.parentElement.clientWidth < 640;
+    if (drawn === isNarrow) return;
+    drawn = isNarrow;
+    const chosen = isNarrow ? narrow : layout;
+    place.style.height = `${chosen.height}px`;
+    await Plotly.react(place, isNarrow ? data.map((trace, k) => moved(trace, bars[k])) : data, chosen, config);
+  };
+};
 (async () => {
   await plotly;
   for (const packed of document.querySelectorAll("script.figure")) {
-    const { data, layout, narrow, bars, config } = JSON.parse(await unpacked(packed), (_, value) =>
-      value?.planes === undefined ? value : numbers(value),
-    );
-    const place = packed.previousElementSibling;
-    const isNarrow = place.parentElement.clientWidth < 640;
-    const chosen = isNarrow ? narrow : layout;
-    if (isNarrow) bars.forEach((bar, k) => bar && Object.assign(data[k].colorbar ?? data[k].marker.colorbar, bar));
-    place.style.height = `${chosen.height}px`;
-    await Plotly.newPlot(place, data, chosen, config);
+    const parts = JSON.parse(await unpacked(packed), (_, value) => (value?.planes === undefined ? value : numbers(value)));
+    const draw = drawer(packed.previousElementSibling, parts);
+    await draw();
+    window.addEventListener("resize", draw);
   }
 })().catch((error) => {
   document.documentElement.classList.add("still");
