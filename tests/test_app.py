@@ -9,6 +9,7 @@ import functools
 import http.client
 import io
 import json
+import logging
 import os
 import socket
 import struct
@@ -621,6 +622,19 @@ def test_warnings_go_with_the_answer_every_time(served: Served) -> None:
     assert served.ask("run", STICK_SLIP)[-1]["notes"] == []
 
 
+UNSTABLE = {"controller.alpha": 0.99, "controller.beta": 1, "controller.crossover": "40 Hz"}
+
+
+def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Served) -> None:
+    """Before that, whose sentences say it; the words of a slider do not, and have it as a note."""
+    first, *_, last = served.ask("check", RIG, UNSTABLE)
+    assert (first["kind"], first["lasts"]) == ("message", True)
+    assert "unstable while" in first["text"]
+    assert "unstable while" in last["sentences"][0]
+    assert last["notes"] == []
+    assert served.ask("verdict", RIG, UNSTABLE)[-1]["notes"] == [first["text"]]
+
+
 # ---------------------------------------------------------------- overtaken
 
 
@@ -671,6 +685,8 @@ def test_at_the_end_answers_end_before_what_computes_notices() -> None:
 
 
 def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pytest.CaptureFixture[str]) -> None:
+    """Others that use the same server in this process have their errors all the same, after it."""
+
     async def ended() -> None:
         with listening("127.0.0.1", 0) as listener:
             port, workshop = listener.getsockname()[1], Workshop()
@@ -693,6 +709,7 @@ def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pyte
 
     asyncio.run(ended())
     assert capsys.readouterr().err == ""
+    assert logging.getLogger("uvicorn.error").isEnabledFor(logging.ERROR)
 
 
 def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:

@@ -18,6 +18,8 @@ from log_files import motion, write_text
 import friso
 from friso.app.frames import frame
 from friso.escapes import escaped
+from friso.views.drawing.figure import INK, Axis, Figure, Panel, Series
+from friso.views.pages import Report
 
 pytestmark = needs_browser
 
@@ -106,6 +108,11 @@ class Browsed:
         page.click("#tab-run")
         page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
+    def check(self, crossover: str) -> None:
+        """A crossover is typed, and the whole answer is there."""
+        self.type("controller.crossover", crossover)
+        self.answered(friso.check(RIG, set={"controller.crossover": crossover}).sentences()[0])
+
     def set(self, changes: dict[str, Any]) -> None:
         """Keys are set, and the picture of their run is there."""
         self.page.evaluate("async changes => (await import('/state.js')).set(changes)", changes)
@@ -187,6 +194,36 @@ def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browse
     page.wait_for_selector("#answer .case.stale")
     held[0].continue_()
     page.wait_for_selector("#answer .case:not(.stale)")
+
+
+def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) -> None:
+    """Progress does not take its place; the whole answer says itself what is true of the machine."""
+    page = browsed.page
+    browsed.check("9.5 Hz")
+    said = page.inner_text("#answer")
+    show = "async parts => { const { progress } = await import('/answer.js'); parts.forEach(progress); }"
+    early = {"kind": "message", "text": "The loop is unstable", "lasts": True}
+    page.evaluate(show, [early])
+    assert page.inner_text("#answer") == said
+    page.route("**/ask/check", lambda _: None)
+    page.route("**/ask/verdict", lambda _: None)
+    browsed.type("controller.crossover", "11 Hz")
+    page.wait_for_selector("#answer .case.stale")
+    page.evaluate(show, [early, early, {"kind": "progress", "done": 1, "total": 2, "label": "cells"}, None])
+    assert page.inner_text("#answer").count("The loop is unstable") == 1
+    page.unroute_all(behavior="ignoreErrors")
+    browsed.type("controller.crossover", "12 Hz")
+    page.wait_for_function("() => !document.getElementById('answer').innerText.includes('The loop is unstable')")
+
+
+def test_the_pictures_of_an_answer_that_is_there_are_not_asked_for_again(browsed: Browsed) -> None:
+    """How probable hunting is took minutes, which another check would take away."""
+    page, asked = browsed.page, []
+    browsed.check("9.5 Hz")
+    page.on("request", lambda request: asked.append(request.url))
+    page.click("#tab-check")
+    page.wait_for_selector("#picture .main-svg")
+    assert not [address for address in asked if "ask/check" in address]
 
 
 def test_what_is_being_typed_stays_when_an_answer_comes(browsed: Browsed) -> None:
@@ -660,6 +697,28 @@ def test_nothing_is_wider_than_the_page(browsed: Browsed, width: int) -> None:
             one.getBoundingClientRect().right <= document.getElementById('right').getBoundingClientRect().right + 1)""",
         arg=width,
     )
+
+
+def test_a_page_of_files_is_drawn_for_its_width_and_axe_finds_no_violation(browsed: Browsed, tmp_path: Path) -> None:
+    """As every command writes it: with tables and texts that scroll."""
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    lines = tuple(Series(np.arange(2.0), np.arange(2.0), f"a line with a long name, {k}", INK) for k in range(4))
+    figure = Figure("f", "Lines", "", (Panel("A title", Axis("x", ""), Axis("y", ""), lines),))
+    rows = [("Verdict", ["hunts, " * 30])]
+    report = Report("check", "Rig", [figure], "name = 'a'\n" + "# " * 200, values={"columns": ["Locked"], "rows": rows})
+    (tmp_path / "report.html").write_text(report.html(), encoding="utf-8")
+    page = browsed.page.context.browser.new_page()
+    try:
+        page.set_viewport_size({"width": 1600, "height": 900})
+        page.goto((tmp_path / "report.html").as_uri())
+        page.wait_for_selector(".main-svg")
+        height = page.evaluate("document.querySelector('.main-svg').clientHeight")
+        page.set_viewport_size({"width": 400, "height": 900})
+        page.wait_for_function("was => document.querySelector('.main-svg').clientHeight > was", arg=height)
+        violations = axe.run(page).response["violations"]
+        assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
+    finally:
+        page.close()
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

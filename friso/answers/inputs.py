@@ -100,7 +100,7 @@ def mention_unstable_loop(stage: Stage) -> None:
     from friso.views.loop_words import unstable_loop
 
     for sentence in unstable_loop(unstable(stage)):
-        LOGGER.warning(sentence.removesuffix("."))
+        LOGGER.warning(sentence.removesuffix("."), extra={"meanwhile": True})
 
 
 def correlations_of(source: StageLike, stage: Stage) -> Correlations:

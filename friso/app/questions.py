@@ -119,6 +119,7 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     key, cases = _cases(stage)
     runs = friso.sweep(stage, {key: list(cases.values())}, metric="verdict", progress=work.progress)
     words = dict(zip(cases, runs.data["verdict"].values.tolist(), strict=True))
+    work.notes += work.meanwhile
     yield {"kind": "answer", "cases": _labelled(stage, words), "verdict": words[_given(stage)]}
 
 
@@ -254,6 +255,7 @@ def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: an isolator with its leaf springs."""
     asked.chosen()
     answer = friso.design(asked.machine.stage, progress=work.progress)
+    work.notes += work.meanwhile
     ways = [{"name": "design", "toml": answer.stage.to_toml()}]
     yield parts_of(answer, ways=ways, **_lines("design", asked))
 

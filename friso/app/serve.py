@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import signal
@@ -90,8 +91,15 @@ class Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """End what is asked, and then the connections; a log that is still coming is cut off, which is no error."""
         self.workshop.overtake()
-        logging.getLogger("uvicorn.error").setLevel(logging.CRITICAL)
-        await super().shutdown(sockets)
+        errors = logging.getLogger("uvicorn.error")
+        usual = errors.level
+        errors.setLevel(logging.CRITICAL)
+        try:
+            await super().shutdown(sockets)
+            if cut_off := [*self.server_state.tasks]:
+                await asyncio.wait(cut_off, timeout=GRACE)
+        finally:
+            errors.setLevel(usual)
 
 
 def listening(host: str, port: int | None) -> socket.socket:

@@ -39,6 +39,8 @@ class Work:
     last: float = 0.0
     notes: list[str] = field(default_factory=list)
     """Warnings so far, each once; they go with the answer."""
+    meanwhile: list[str] = field(default_factory=list)
+    """What was mentioned early: most answers say it themselves."""
 
     def overtake(self) -> None:
         """End it, from another thread."""
@@ -89,11 +91,12 @@ class Messages(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Hand a message on."""
-        work = _AT_WORK.get()
-        if work is not None and not record.name.startswith("friso.engine"):
-            work.notes.append(record.getMessage())
+        work, text = _AT_WORK.get(), record.getMessage()
+        lasts = work is not None and not record.name.startswith("friso.engine")
+        if work is not None and lasts:
+            (work.meanwhile if getattr(record, "meanwhile", False) else work.notes).append(text)
         for listener in [work] if work is not None else [*self.works.lanes.values()]:
-            listener.put({"kind": "message", "text": record.getMessage()})
+            listener.put({"kind": "message", "text": text, "lasts": lasts})
 
 
 class Workshop:

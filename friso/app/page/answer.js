@@ -1,10 +1,12 @@
 // The answer: a sentence per case, with its margin as soon as that is there; progress; and the history of answers.
-import { $, el, plain } from "./dom.js";
+import { $, el } from "./dom.js";
 import { paragraphs } from "./tables.js";
+import { Working } from "./working.js";
 
 let last = {};
 const MOST = 200;
-let status = null;
+const working = new Working();
+let complete = false;
 
 /** Verdicts by run and cycle, which come while something is dragged. */
 export function quick(answer) {
@@ -13,7 +15,9 @@ export function quick(answer) {
   const rest = old ?? el("div", { class: "rest" });
   rest.querySelectorAll(".case").forEach((item) => item.remove());
   rest.querySelectorAll(".note").forEach((item) => item.classList.add("stale"));
-  $("answer").replaceChildren(...cases, rest, line());
+  complete = false;
+  working.say(answer.notes);
+  $("answer").replaceChildren(...cases, rest, working.place);
 }
 
 const DRAWS = 200;
@@ -29,14 +33,20 @@ export function whole(answer, draw) {
   }
   rest.append(...paragraphs(answer.notes));
   if (draw && !answer.asked.options.draws) rest.append(el("button", { type: "button", id: "draw", onclick: () => draw(DRAWS) }, `How probable is hunting? (${DRAWS} draws, minutes)`));
-  $("answer").replaceChildren(...cases, rest, line());
+  complete = true;
+  working.say([]);
+  $("answer").replaceChildren(...cases, rest, working.place);
 }
 
 /** What is shown is of an earlier machine. */
-export const earlier = () => $("answer").querySelectorAll(".case").forEach((item) => item.classList.add("stale"));
+export function earlier() {
+  complete = false;
+  $("answer").querySelectorAll(".case").forEach((item) => item.classList.add("stale"));
+}
 
 export function refused(text) {
-  $("answer").replaceChildren(el("p", { class: "case", role: "alert" }, text), line());
+  working.say([]);
+  $("answer").replaceChildren(el("p", { class: "case", role: "alert" }, text), working.place);
 }
 
 function sentence(text, verdict) {
@@ -44,21 +54,11 @@ function sentence(text, verdict) {
   return more.length ? el("p", { class: `case ${verdict}` }, el("b", {}, `${label}: `), more.join(": ")) : el("p", { class: `case ${verdict}` }, text);
 }
 
-function line() {
-  status ??= el("p", { class: "status" });
-  return status;
-}
-
-/** What is being computed; "" for nothing. */
+/** Show what is being computed, or said of it; null for nothing. The whole answer says itself what is true of the machine. */
 export function progress(part) {
-  const place = line();
-  if (!place.isConnected) $("answer").append(place);
-  if (!part) place.replaceChildren();
-  else if (part.kind === "message") place.replaceChildren(plain(part.text));
-  else {
-    const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
-    place.replaceChildren(bar, plain(part.label));
-  }
+  if (complete && part?.lasts) return;
+  if (!working.place.isConnected) $("answer").append(working.place);
+  working.show(part);
 }
 
 /** Note the answer for a machine with the keys that were `given`; a click on it goes back there. */

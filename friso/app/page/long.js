@@ -1,23 +1,20 @@
 // A question that takes long, with its progress, an end, its answer, and the machines that it gives.
-import { el, plain } from "./dom.js";
+import { el } from "./dom.js";
 import { draw } from "./plot.js";
 import { paragraphs, table } from "./tables.js";
 import { ask, end } from "./wire.js";
+import { Working } from "./working.js";
 
 /** Ask on a lane, and show progress and answer in a place; resolves to the answer, or null. */
 export async function shownAnswer(place, lane, question, body, tell) {
-  const status = el("p", { class: "status", role: "status" }, "…");
+  const working = new Working();
+  working.show({ kind: "message", text: "…" });
   const stop = el("button", { type: "button", onclick: () => { end(lane); place.replaceChildren(); } }, "Stop");
-  place.replaceChildren(status, stop);
+  place.replaceChildren(working.place, stop);
   const asked = body();
-  const answer = await ask(question, asked, lane, (part) => {
-    if (part.kind === "progress") {
-      const bar = el("progress", part.total ? { value: part.done, max: part.total, "aria-label": "Progress" } : { "aria-label": "Progress" });
-      status.replaceChildren(bar, plain(part.label));
-    } else if (part.kind === "message") status.replaceChildren(plain(part.text));
-  });
+  const answer = await ask(question, asked, lane, (part) => working.show(part));
   if (!answer) {
-    if (place.contains(status)) place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, "There is no answer: the server was gone. Ask again."));
+    if (place.contains(working.place)) place.replaceChildren(el("p", { class: "wrong note", role: "alert" }, "There is no answer: the server was gone. Ask again."));
     return null;
   }
   if (answer.kind !== "answer") {

@@ -32,7 +32,7 @@ const pictures = new Pictures(sent, {
   progress: answers.progress,
   shown: (part, tab) => given.set(tab, part),
   take: (name, toml) => machines.add(`${name.replaceAll(/\W+/g, "_")}.toml`, toml, true),
-  check,
+  check: () => (given.has("check") ? pictures.checked(given.get("check")) : check()),
 });
 
 const form = new Live("machine", "machine", 2000, described);
