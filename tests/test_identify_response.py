@@ -20,6 +20,7 @@ from friso.identification.response.departure import Drag, departure, friction_fr
 from friso.identification.response.limit_cases import visible
 from friso.identification.response.mass_line import mass_lines, straight_lines
 from friso.identification.response.modes import fit_modes
+from friso.identification.response.one_mass import fit_one_mass
 from friso.identification.response.period import find_periods
 from friso.identification.response.periodic import multisine
 from friso.identification.response.records import ResponseRecord, drift, from_log, relative_error
@@ -528,6 +529,26 @@ def test_masses_from_a_force_that_is_held_for_an_eighth_of_the_fastest_period(bo
         assert all(fit[name].holds(value) for name, value in truth.items())
         assert fit["total mass"].half_width < 0.01 * truth["total mass"]
         assert fit["delay"].holds(2.5e-3)
+
+
+@pytest.mark.parametrize("stiffness", [2.4e3, 3e5, 1e6])
+def test_a_force_that_is_held_moves_every_mass_that_is_rigid_at_its_images(stiffness: float) -> None:
+    """Joints with their resonance in the band, near and above half the sampling rate (14, 147, 270 Hz of 400 Hz): of
+    two outputs on one rigid mass the second had none of the images, and the mass was 0.4 % off."""
+    step, frequency = 2.5e-3, np.arange(5.0, 101.0, 5.0)
+    truth = TRUE.copy()
+    truth[2:4] = np.log([stiffness, 0.02 * np.sqrt(stiffness)])
+    truth[6:8] = step / 2, (1e3 * step) ** 2
+    right = sampled_with_hold(truth, frequency, step)
+    assert np.abs(two_masses(truth, frequency) / right - 1).max() < 1e-4
+
+
+def test_one_rigid_mass_with_two_outputs_under_a_force_that_is_held() -> None:
+    step, frequency, rng = 2.5e-3, np.arange(5.0, 101.0, 5.0), np.random.default_rng(31)
+    truth = np.array([*np.log([1.2, 0.5, 1e9, 10.0]), 0.5, 0.1])
+    outputs = [exact(lambda _, v=v: v, frequency, 1e-4, rng) for v in sampled_with_hold(truth, frequency, step)]
+    one = fit_one_mass([replace(output, sample_time=step) for output in outputs], (1.0, 1.0), (5.0, 100.0))
+    assert np.exp(one.parameters[0]) == pytest.approx(1.7, rel=1e-3)
 
 
 def test_masses_of_a_resonance_low_in_the_band_and_a_sign_that_is_told_first() -> None:

@@ -1,14 +1,17 @@
 """What the drive and all that lies above the band add to the response of masses: a delay, a hold, and compliances.
 
 A force that is held for T at each sample acts half of T late on average, and the weaker the faster it changes: by
-sin(x)/x, x = omega T/2. The samples of the position then hold the images of the force too, of which those on the driven
-mass matter: the response of a mass m alone is 1/(m s^2) times x^2 cos(x)/sin(x)^2 in all, with a delay of T/2 (the
-double integrator with a zero-order hold: Astrom, Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3).
-Nothing in a log tells whether its force was held, so that T is fitted, between none and the sample time. Modes above
-the band add a compliance that is the same at all frequencies.
+sin(x)/x, x = omega T/2. The samples of the position then hold the images of the force too, at the frequencies f + k/T
+with k = +/- 1, +/- 2 and so on: a response G(f) is sampled as the sum over all k of G(f + k/T) sin(x)/(x + k pi), with
+a delay of T/2 (of the double integrator with a zero-order hold that is x^2 cos(x)/sin(x)^2 / (m s^2): Astrom,
+Wittenmark, Computer-Controlled Systems, 3rd ed. 1997, section 2.3). The images move every mass that is rigid up there,
+not the driven one alone. Nothing in a log tells whether its force was held, so that T is fitted, between none and the
+sample time. Modes above the band add a compliance that is the same at all frequencies.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -17,6 +20,10 @@ from friso.identification.response.response import FrequencyResponse
 DELAY, HELD, COMPLIANCES = range(3)
 """Places of the parameters: the delay [s]; the square of the time for which the force is held [ms^2]; from the
 last on, the compliance for each output."""
+
+IMAGES = np.array([k for k in range(-8, 9) if k])[:, None]
+"""Numbers of the images that count, shape (images, 1): those left out are 0.00002 of the response of a mass at four
+samples per period."""
 
 LATEST = 0.4
 """Largest delay over the period of the highest frequency. A drive that computes for a sample and holds the force for
@@ -28,17 +35,17 @@ USUAL = 0.25
 MILLI = 1e-3
 
 
-def beyond(response: np.ndarray, frequency: np.ndarray, driven: float, parameters: np.ndarray) -> np.ndarray:
-    """Responses (outputs, lines) over frequencies [Hz] with delay, hold and a compliance for each output.
-
-    The first output is that of the `driven` mass, in units of input per acceleration.
-    """
+def beyond(model: Callable[[np.ndarray], np.ndarray], frequency: np.ndarray, parameters: np.ndarray) -> np.ndarray:
+    """Responses (outputs, lines) over frequencies [Hz] with delay, hold and a compliance for each output, of a `model`
+    that tells those of the masses, shape (outputs, n), at any frequencies [Hz], shape (n,), negative ones included."""
     delay, held, compliances = parameters[DELAY], MILLI * np.sqrt(parameters[HELD]), parameters[COMPLIANCES:, None]
-    omega = 2 * np.pi * frequency
-    weaker = np.sinc(frequency * held)
-    samples = response * weaker
-    samples[0] += (weaker - np.cos(omega * held / 2) / weaker**2) / (driven * omega**2)
-    return (samples + compliances) * np.exp(-1j * omega * delay)
+    masses = model(frequency) * np.sinc(frequency * held)
+    if held > 0:
+        turns = IMAGES + frequency * held
+        shares = np.sin(np.pi * frequency * held) / (np.pi * turns)
+        images = model((turns / held).ravel()).reshape(len(masses), *turns.shape)
+        masses = masses + np.sum(images * shares, axis=1)
+    return (masses + compliances) * np.exp(-2j * np.pi * frequency * delay)
 
 
 def bounds(response: FrequencyResponse, top: float, outputs: int) -> tuple[np.ndarray, np.ndarray]:

@@ -72,11 +72,13 @@ def fit_one_mass(
 
 def one_mass(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     """Responses of one mass as each output has it, shape (outputs, lines), over frequencies [Hz]."""
-    s = 2j * np.pi * frequency
-    mass = np.exp(parameters[MASS])
-    rigid = 1 / (mass * s**2 + parameters[DRAG] * s + parameters[SPRING])
-    outputs = len(parameters) - BEYOND - COMPLIANCES
-    return beyond(np.tile(rigid, (outputs, 1)), frequency, mass, parameters[BEYOND:])
+    mass, outputs = np.exp(parameters[MASS]), len(parameters) - BEYOND - COMPLIANCES
+
+    def masses(frequency: np.ndarray) -> np.ndarray:
+        s = 2j * np.pi * frequency
+        return np.tile(1 / (mass * s**2 + parameters[DRAG] * s + parameters[SPRING]), (outputs, 1))
+
+    return beyond(masses, frequency, parameters[BEYOND:])
 
 
 def _starts(values: np.ndarray, frequency: np.ndarray) -> list[np.ndarray]:

@@ -62,13 +62,16 @@ def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
     """Responses of the driven and, where there is a compliance for it, of the other mass to a force on the former,
     shape (outputs, lines), over frequencies [Hz]."""
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
-    s = 2j * np.pi * frequency
-    joint = damping * s + stiffness
-    first = driven * s**2 + parameters[DRAG] * s + joint
-    second = other * s**2 + parameters[OTHER_DRAG] * s + joint
-    determinant = first * second - joint**2
     outputs = len(parameters) - BEYOND - COMPLIANCES
-    return beyond((np.stack([second, joint]) / determinant)[:outputs], frequency, driven, parameters[BEYOND:])
+
+    def masses(frequency: np.ndarray) -> np.ndarray:
+        s = 2j * np.pi * frequency
+        joint = damping * s + stiffness
+        first = driven * s**2 + parameters[DRAG] * s + joint
+        second = other * s**2 + parameters[OTHER_DRAG] * s + joint
+        return (np.stack([second, joint]) / (first * second - joint**2))[:outputs]
+
+    return beyond(masses, frequency, parameters[BEYOND:])
 
 
 def fit_two_mass(
