@@ -63,9 +63,9 @@ class OutputErrorFit:
         """What the fit leaves [N], RMS, where it counts."""
         return float(np.sqrt(np.sum(self.residual**2) / max(float(self.problem.counted.sum()), 1.0)))
 
-    def explains(self, noise: float) -> bool:
-        """Whether it leaves little more than the `noise` [N] of the log's force."""
-        return self.left < EXPLAINED * noise * self.problem.passes
+    def explains(self, noise: float, times: float = EXPLAINED) -> bool:
+        """Whether it leaves less than so many times the `noise` [N] of the log's force."""
+        return self.left < times * noise * self.problem.passes
 
     @property
     def independent(self) -> float:

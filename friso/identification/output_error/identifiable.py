@@ -21,6 +21,11 @@ STRIBECK = (RATIO, "friction.stribeck_velocity")
 CURVE = (*STRIBECK, EXPONENT)
 BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 
+CLOSELY = 1.2
+"""A closed loop that leaves no more than so many times the noise of the record is where it belongs. One that leaves
+more may have found another optimum than the right one, in which its parameters seem to be known as sharply: it is
+fitted once more, from what the stage that follows the log says."""
+
 STEP_OUT = 1.5
 """A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
 
@@ -62,20 +67,23 @@ def fit_identifiable(
 ) -> IdentifiableFit:
     """The fit and what of it to believe; `bandwidth` [Hz] is that of the motion, `noise` [N] the force's.
 
-    A closed loop that explains the record to its noise has the first and last word. Otherwise the stage that follows
-    the log decides which parameters are shown, since a loop that hunts soon gets out of step, and the loop is fitted
-    from there, unless it cannot follow. Where the fit is clearly better with those that are not shown it keeps them:
-    their effect is there, and without it friction and mass would have to explain it."""
+    A closed loop that explains the record to its noise has the first and last word, if need be from where the stage
+    that follows the log leads. Where none does, that stage decides which parameters are shown, since a loop that hunts
+    soon gets out of step, and the loop has no more to say than their values, unless it cannot follow. Where the fit is
+    clearly better with those that are not shown it keeps them: their effect is there, and without it friction and mass
+    would have to explain it."""
     names = [parameter.name for parameter in follows.parameters]
     core = {parameter.name for parameter in follows.parameters if parameter.core}
     progress(0, STEPS, "moves: mass and sliding friction along the log")
     plain = fit(follows, _numbers(names, core), first_values(follows.parameters)[None])
+    explaining = []
     if loop is not None:
         numbers = tuple(range(len(names)))
         progress(1, STEPS, "moves: all parameters in closed loop")
         full = fit(loop, numbers, np.vstack([nearby(plain), everywhere(loop, numbers, plain.inner)]))
-        if full.explains(noise):
+        if full.explains(noise, CLOSELY):
             return believed(full, core, covered, progress, explained=True)
+        explaining = [full] if full.explains(noise) else []
     progress(3, STEPS, "moves: all parameters along the log")
     along = _identifiable_on_log(follows, plain, core, covered, noise, progress)
     if loop is None:
@@ -84,9 +92,12 @@ def fit_identifiable(
     starts = nearby(along.fit)
     if set(along.fit.free) - set(_numbers(names, core)):
         starts = np.vstack([starts, everywhere(loop, along.fit.free, plain.inner)])
-    looped = fit(loop, along.fit.free, starts)
-    followed = _in_step(looped, along.fit, bandwidth) and bounds_as_much(looped, along.fit)
-    return replace(along, fit=looped) if followed else along
+    best = min((fit(loop, along.fit.free, starts), *explaining), key=lambda one: one.cost)
+    if not (_in_step(best, along.fit, bandwidth) and bounds_as_much(best, along.fit)):
+        return along
+    if best.explains(noise, CLOSELY):
+        return believed(best, core, covered, progress, explained=True)
+    return replace(along, fit=best)
 
 
 def _identifiable_on_log(
@@ -151,8 +162,11 @@ def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -
 def bounds_as_much(looped: OutputErrorFit, direct: OutputErrorFit) -> bool:
     """Whether a closed loop bounds all that the stage that follows the log does. Of a stage that sticks and slips it
     may end where a few break-aways, a little late or early, are all that its derivatives know."""
-    ends = [np.isfinite(np.diag(fit.covariance)) for fit in (looped, direct)]
-    return bool(np.all(ends[0] | ~ends[1]))
+    bounded = [
+        {i for i, variance in zip(fit.free, np.diag(fit.covariance), strict=True) if np.isfinite(variance)}
+        for fit in (looped, direct)
+    ]
+    return bounded[0] >= bounded[1]
 
 
 def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
