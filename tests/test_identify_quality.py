@@ -17,6 +17,7 @@ from variants import VARIANTS
 from friso.identification.alternatives import alternatives, perhaps_fed_forward
 from friso.identification.causes import causes, fragment
 from friso.identification.combine import combined
+from friso.identification.doubts import little_friction
 from friso.identification.estimate import Estimate
 from friso.identification.inverse_model import inverse_model
 from friso.identification.logs.log import Log
@@ -239,6 +240,20 @@ def test_intervals_hold_only_values_that_keys_may_have() -> None:
     assert (cut.value, cut.low, cut.high) == (2.0, 0.0, 5.0)
     assert same == mass
     assert left.tolist() == [[1.0, 0.4], [0.4, 1.0]]
+
+
+def test_what_comes_out_negative_is_not_told_and_never_as_next_to_nothing(wording: Wording) -> None:
+    """A log of -7.8 N of Coulomb friction had "next to nothing", and a range from 0 down to -7.777 N."""
+    negative = Estimate("friction.coulomb", "N", -7.8, -7.823, -7.777, "")
+    (answer,), left = with_possible_values([negative], np.eye(1), VARIANTS["rigid"].flat())
+    assert (answer.determined, answer.low, answer.high) == (False, 0.0, np.inf)
+    assert left.size == 0
+    for coulomb, noise in ((-7.8, 0.05), (0.0, 1e-3), (-0.3, 20.0)):
+        wording(little_friction(inverse_model(axis(noise, coulomb=coulomb), 5.0), "N"))
+    time = np.arange(4000) * DT
+    falling = record("falling", DT, position=time + 0.1 * np.sin(5 * time), force=-7.8 - 2.5 * np.sin(5 * time))
+    wording(little_friction(inverse_model(falling, 5.0), "N"))
+    assert not little_friction(inverse_model(axis(), 5.0), "N")
 
 
 def test_model_error_reaches_the_other_model_where_noise_does_not_explain_the_rest() -> None:

@@ -71,11 +71,7 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
             f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "
             f"lacks something, for which the intervals allow{''.join(f'; {cause.sentence}' for cause in reasons)}"
         )
-    if inverse.value("coulomb") < NONE_LEFT * float(np.std(inverse.measured)):
-        doubts.append(
-            f"Coulomb friction is estimated as {inverse.value('coulomb'):.2g} {unit}, next to nothing: no friction in "
-            "this force, a wrong --scale, or friction that a drive compensates"
-        )
+    doubts += [sentence for sentence in (little_friction(inverse, unit),) if sentence]
     differing = tuple(halves(inverse)) if plain.lacks_something else ()
     for one in () if poor else differing:
         unit_of_it = next(estimate.unit for estimate in inverse.estimates if estimate.name == one.name)
@@ -93,4 +89,29 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         without=without,
         spoilt=unsettled or any(cause.spoils for cause in reasons),
         unsettled=unsettled,
+    )
+
+
+def little_friction(inverse: InverseModel, unit: str) -> str:
+    """A sentence on Coulomb friction that is none, or as that of no bearing can be; "" elsewhere."""
+    value, least = inverse.value("coulomb"), NONE_LEFT * float(np.std(inverse.measured))
+    if value >= least:
+        return ""
+    one = next(estimate for estimate in inverse.estimates if estimate.name == "coulomb")
+    if not one.determined:
+        return (
+            f"Coulomb friction and the constant force are {value:.2g} {unit} together, which helps the motion: the log "
+            "moves in one direction only, and gravity, or an offset of the channel, exceeds friction"
+        )
+    if value > -least:
+        return (
+            f"Coulomb friction is estimated as {value:.2g} {unit}, next to nothing: no friction in this force, a wrong "
+            "--scale, or friction that a drive compensates"
+        )
+    interval = f"{value:.3g} {unit} ({one.low:.3g} to {one.high:.3g})"
+    if one.high >= 0:
+        return f"The log does not tell Coulomb friction from none: it is estimated as {interval}"
+    return (
+        f"Coulomb friction is estimated as {interval}, negative, as that of no bearing is: the force leaves out what a "
+        "drive adds against friction, or more, another channel is taken for it, or the stage hardly slides"
     )

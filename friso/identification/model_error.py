@@ -130,12 +130,15 @@ def with_possible_values(
     estimates: Sequence[Estimate], correlation: np.ndarray, flat: Mapping[str, Any]
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The estimates with intervals of values that their keys may have, and the correlation of the shown ones: what
-    cannot be negative is not, and what cannot be zero, but by its interval might, is bounded from above alone."""
+    cannot be negative is not, and not told at all where its interval is, and what cannot be zero, but by its interval
+    might, is bounded from above alone."""
     bounds = {key: declared.bound for key, declared in numeric_keys(flat).items()}
     answers, kept = [], []
     for estimate in estimates:
         bound, answer = bounds.get(estimate.name), estimate
-        if estimate.determined and estimate.low < 0 and bound is non_negative:
+        if estimate.determined and estimate.high < 0 and bound in (non_negative, positive):
+            answer = Estimate.unknown(estimate.name, estimate.unit, estimate.method, NEGATIVE, 0.0)
+        elif estimate.determined and estimate.low < 0 and bound is non_negative:
             answer = replace(estimate, value=max(estimate.value, 0.0), low=0.0)
         elif estimate.determined and estimate.low <= 0 and bound is positive:
             answer = _at_most(estimate)
@@ -176,6 +179,9 @@ def of_inverse_model(
 
 NOT_ABOVE_ZERO = "its interval reaches down to zero"
 """Why there is no value of what cannot be zero."""
+
+NEGATIVE = "it comes out negative, which it cannot be"
+"""Why there is no value of what its interval says is negative."""
 
 NOT_DESCRIBED = "neither a mass with friction nor the whole model describes the record"
 """Why nothing at all is taken from a fit."""

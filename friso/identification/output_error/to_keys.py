@@ -127,7 +127,8 @@ def _range(fit: OutputErrorFit, owner: str) -> tuple[float, float]:
         level = parameters["friction.coulomb"]
         number = list(parameters).index(level.name)
         off = COVERAGE * float(np.sqrt(fit.covariance[fit.free.index(number), fit.free.index(number)]))
-        least, most = (float(level.outer(fit.inner[number] + end)) for end in (-off, off))
+        ends = level.inner(level.low), level.inner(level.high)
+        least, most = (float(level.outer(np.clip(fit.inner[number] + end, *ends))) for end in (-off, off))
         return least * parameter.low, most * parameter.high
     if owner == "friction.bristle_damping":  # believed of a share of critical damping, whatever the stiffness
         stiffness = parameters["friction.bristle_stiffness"]
