@@ -298,6 +298,37 @@ def test_apostrophes_of_a_picture_do_not_end_its_attributes() -> None:
     assert (shown.attrib, shown.text) == ({"a": "it's", "b": "2 % & #"}, "d'or")
 
 
+LINE = "M 1.04 -2 L 1.04 0.5 L 1.06 0.5 L 1.07 0.52 L -3.26 0.5 z M 10 20.25 L 0 0 "
+
+
+def test_lines_in_less_text_end_where_they_did() -> None:
+    """Each place to a tenth; rounding does not add up, what does not move is left out, a second line begins anew."""
+    shorter = re.sub(r'(?<= d=")[^"]*', pages._shortened, f'<path d="{LINE}"/>')
+    assert shorter == '<path d="M1-2l0 2.5 .1 0-4.4 0zM10 20.2l-10-20.2"/>'
+    curved = re.sub(r'(?<= d=")[^"]*', pages._shortened, '<path d="M 0 1.25 Q 0.25 3 -4 5 z"/>')
+    assert curved == '<path d="M0 1.25Q0.25 3 -4 5z"/>'
+
+
+def test_a_print_has_every_place_of_its_lines() -> None:
+    """Within half a tenth of a point, as its file has them."""
+    file = matplotlib_renderer.image(small_figure(), "svg").decode()
+    print_ = unquote(html.unescape(pages._plain(file))).replace("'", '"')
+    lines, shorter = ([*map(places, re.findall(r'<path d="([^"Q]*)"', text))] for text in (file, print_))
+    assert len(lines) == len(shorter) > 5
+    for line, short in zip(lines, shorter, strict=True):
+        assert all(np.abs(short - place).max(axis=1).min() < 0.051 for place in line)
+
+
+def places(path: str) -> np.ndarray:
+    """The ends of the pieces of a line, (n, 2)."""
+    at, ends = np.zeros(2), []
+    for command, text in re.findall(r"([MLlz])([^MLlz]*)", path):
+        for x, y in np.reshape([float(number) for number in re.findall(r"-?(?:\d+\.?\d*|\.\d+)", text)], (-1, 2)):
+            at = at * (command == "l") + np.array([x, y])
+            ends.append(at)
+    return np.array(ends)
+
+
 @pytest.mark.parametrize(
     ("limits", "readable"),
     [

@@ -179,14 +179,14 @@ class _LaidOut:
 
 
 _LINE, _LONG, _FRAME = (
-    re.compile(rb' d="[^"]+"'),
+    re.compile(rb' (?:d|x|y)="[^"]+"|translate\([^)]+\)'),
     re.compile(rb"-?\d+\.\d{3,}"),
     re.compile(rb'height="[^"]*" viewBox="[^"]*"'),
 )
 
 
 def _rounded(line: re.Match[bytes]) -> bytes:
-    """A line of an SVG, its places to a hundredth of a point."""
+    """A line of an SVG, or where a part of it stands, to a hundredth of a point."""
     return _LONG.sub(lambda place: f"{float(place[0]):.2f}".rstrip("0").rstrip(".").encode(), line[0])
 
 
