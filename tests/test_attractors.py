@@ -14,6 +14,8 @@ import friso
 import friso.hunting.attractors
 import friso.hunting.cycle.hunting
 from friso.engine.allowance import allowance
+from friso.engine.arrays import STATISTICS
+from friso.equations.roles import Role
 from friso.hunting import verdict
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
@@ -22,7 +24,7 @@ from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
-from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.rest import bent, stuck, wait
 from friso.hunting.margin import margin, search_bandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import Motions, run_motions
@@ -463,6 +465,52 @@ def test_a_small_swing_about_home_is_not_rest() -> None:
     )
     attracted = attractors(held(stage))
     assert [1e9 * motion.amplitude for motion in attracted.motions] == pytest.approx([253.5], rel=0.01)
+
+
+SOFT_ELEMENT = VARIANTS["rigid"].replace(
+    {
+        "masses": {"cart": "0.0345439 kg", "stage": "0.00245743 kg"},
+        "friction": {
+            "model": "gms",
+            "static": "0.122907 N",
+            "coulomb": "0.0585316 N",
+            "stribeck_velocity": "1.9247 mm/s",
+            "stribeck_exponent": 2.0,
+            "viscous": "0.0864808 N*s/m",
+            "element_stiffness": [f"{k} N/m" for k in (3318.79, 1825.09, 865.557, 321.493, 74.1906, 4.94604)],
+            "element_share": [0.0676583, 0.16621, 0.216162, 0.225423, 0.199207, 0.1253397],
+            "element_damping": [f"{d} N*s/m" for d in (10.3745, 5.7052, 2.70571, 1.00498, 0.231918, 0.0154612)],
+            "attraction": "12.3375 N/s",
+        },
+        "controller": {"kind": "pid", "crossover": "12 Hz", "alpha": 0.0310046, "beta": 6.13715},
+    }
+)
+"""Its softest element yields by 3.1 mm, more than the stage swings, and never slips then."""
+
+
+@pytest.mark.parametrize(("crossover", "amplitude"), [("12 Hz", 0.8907e-3), ("10 Hz", 1.2043e-3)])
+def test_of_several_bristles_some_remember_how_a_stage_came_to_stick(crossover: str, amplitude: float) -> None:
+    """No start with the bristles relaxed comes to this swing: it was told to settle, for certain. Simulated, too, drawn
+    to where it sticks from the reference, and from there on, at a tighter tolerance."""
+    stages = held(SOFT_ELEMENT.replace({"controller.crossover": crossover}))
+    surveys = [attractors(stages, thorough=thorough, cycles=False) for thorough in (False, True)]
+    assert all(survey.decided for survey in surveys)
+    (few,), (motion,) = (survey.motions for survey in surveys)
+    assert few.amplitude == pytest.approx(amplitude, rel=1e-3)
+    assert motion.seen is not None
+    run = stages.run(motion.seen[None, :], np.array([120 * motion.period]), 1e-9, window=0.9)
+    high, low = (run.statistics[0, STATISTICS.index(f"deviation_{side}")] for side in ("max", "min"))
+    assert (high - low) / 2 == pytest.approx(amplitude, rel=1e-3)
+
+
+def test_slow_travels_bend_bristles_one_after_the_other_until_they_yield() -> None:
+    stages = held(SOFT_ELEMENT)
+    bristles, most = stages.kernel.having(Role.BRISTLE), stages.scales[0, stages.kernel.having(Role.BRISTLE)]
+    there = np.array([0.4e-3])
+    drawn = bent(stages, there, there)[0, bristles]
+    assert drawn == pytest.approx([*most[:-1], 0.4e-3])
+    back = bent(stages, there, np.array([np.inf]), np.array([-0.1e-3]))[0, bristles]
+    assert back == pytest.approx(np.maximum(most - 0.1e-3, -most))
 
 
 def test_swings_that_repeat_themselves() -> None:

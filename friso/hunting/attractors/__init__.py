@@ -135,6 +135,8 @@ def attractors(
         _take_notice(starts, survey, numbers, suggested)
         for runs, owners in starts.waves(at_once):
             survey.follow(runs, owners)
+        if stages.remember:
+            _try_memories(starts, survey)
         if cycles and not at_once:
             _try_cycles(starts, survey, rtol)
         decided = survey.attracted | ~survey.unknown
@@ -155,6 +157,16 @@ def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested:
         starts.beside(cycles)
         if (attracting := np.flatnonzero(cycles.attracting)).size:
             survey.confirm(starts.on_cycles(cycles, attracting), numbers[attracting], cycles.take(attracting))
+
+
+def _try_memories(begun: Starts, survey: Survey) -> None:
+    """Follow stages that nothing attracts so far from bristles that are bent in many ways."""
+    left = np.flatnonzero(~survey.attracted)
+    if left.size:
+        starts = begun.take(left)
+        starts.remembering(survey.thorough)
+        for runs, owners in starts.waves(at_once=survey.thorough):
+            survey.follow(runs, left[owners])
 
 
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
@@ -191,6 +203,8 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         survey.slow_down(np.arange(stages.count), cycles)
     for runs, owners in starts.waves(at_once=True):
         survey.follow(runs, owners)
+    if stages.remember:
+        _try_memories(starts, survey)
     resolved = survey.attracted | ~survey.unknown
     flips = resolved & (first.attracts != survey.attracted)
     confirmed_twice = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]

@@ -7,10 +7,11 @@ from itertools import product
 
 import numpy as np
 
+from friso.equations.roles import Steady
 from friso.hunting.attractors.rounds import PERIODS, RTOL, Pending, loose_from, typical_period
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
-from friso.hunting.cycle.rest import pushed, stuck
+from friso.hunting.cycle.rest import bent, pushed, stuck
 
 THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
 """Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: from the
@@ -29,6 +30,14 @@ integrated the distance, in units of the time in which the loop moves."""
 
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
+
+REMEMBERED = np.geomspace(0.01, 30.0, 128), np.geomspace(0.01, 10.0, 32)
+"""Distances, in the same units, from which stages with several bristles begin with these bent in many ways: of a
+thorough survey, and of others."""
+
+TRAVELS, BACK = (1e-3, 10.0), 1e-3
+"""Travels drawn by which bristles are bent first, in the same units, and the least share of that by which they are bent
+back then, and forth again."""
 
 EVERY = 64, 16, 4, 1
 """One start in so many is tried first, then one in so many of the others, and so on."""
@@ -71,6 +80,29 @@ class Starts:
                     stages = self.stages.take(owners)
                     speeds = np.tile(PUSHES, which.size) * stages.length * stages.number("rate")
                     self._add(owners, pushed(stages, side * speeds))
+
+    def remembering(self, thorough: bool) -> None:
+        """With several bristles, bent in ways in which motions leave them: let go at a distance, the controller being
+        switched on before or only then, and pushed; and stuck, drawn there from the reference, after a long way out or
+        back, and after travels to and fro that are drawn at random."""
+        units = REMEMBERED[0 if thorough else 1]
+        rng = np.random.default_rng(0)
+        shares = np.exp(rng.uniform(np.log(BACK), 0.0, (2, len(units))))
+        way = np.exp(rng.uniform(np.log(TRAVELS[0]), np.log(TRAVELS[1]), len(units))) * rng.choice(
+            [-1.0, 1.0], len(units)
+        )
+        for side in (1.0, -1.0):
+            which = np.flatnonzero((side > 0) | ~self.stages.symmetric)
+            owners = np.repeat(which, len(units))
+            if owners.size:
+                stages = self.stages.take(owners)
+                distances = side * np.tile(units, which.size) * stages.length
+                to_and_fro = np.tile([way, -way * shares[0], way * shares.prod(axis=0)], which.size) * stages.length
+                self._add(owners, stages.displaced(distances))
+                self._add(owners, stages.settled(Steady(0.0, distances)))
+                self._add(owners, pushed(stages, distances * stages.number("rate")))
+                for travels in ([distances], [np.inf * distances], [-np.inf * distances], to_and_fro):
+                    self._add(owners, bent(stages, distances, *travels))
 
     def beside(self, cycles: Cycles) -> None:
         """Beside cycles that repel."""

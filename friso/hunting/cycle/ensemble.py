@@ -66,6 +66,12 @@ class Ensemble:
         """Whether the stages have a stroke limiter that may be touched and left many times in a swing."""
         return self.structure.joint == "free"
 
+    @property
+    def remember(self) -> bool:
+        """Whether the stages have several bristles, of which some may stick on while others slip: such a stage breaks
+        away without having forgotten how it came to stick."""
+        return len(self.kernel.having(Role.BRISTLE)) > 1
+
     @cached_property
     def symmetric(self) -> np.ndarray:
         """Whether the mirror image of every motion is one, shape (count,): tried on states drawn at random."""

@@ -22,6 +22,20 @@ def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float 
     return states
 
 
+def bent(stages: Ensemble, displacement: np.ndarray, *travels: np.ndarray) -> np.ndarray:
+    """The same stages, but the bristles, relaxed at first, bent by slow `travels` [m] of the masses, each of shape
+    (count,), one after the other, to where they stick: no farther than by the break-away force.
+
+    Of several bristles some stick on while others slip. What breaks away has not forgotten these then, and the distance
+    alone does not tell what follows.
+    """
+    states, bristles = stuck(stages, displacement), stages.kernel.having(Role.BRISTLE)
+    most = stages.scales[:, bristles]
+    for travel in travels:
+        states[:, bristles] = np.clip(states[:, bristles] + travel[:, None], -most, most)
+    return states
+
+
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
     """States of stages at their reference, all masses moving at a velocity [m/s], all else zero."""
     states = np.zeros((stages.count, len(stages.kernel.states)))
