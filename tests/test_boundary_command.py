@@ -152,6 +152,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(
 @pytest.mark.parametrize(
     "arguments",
     [
+        (),
         ("--y", "masses.cart=1 kg..2 kg"),
         ("--x", "controller.crossover"),
         ("--x", "controller.crossover=1 Hz..40 Hz:41"),
@@ -300,6 +301,13 @@ def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:
     ):
         assert f"joint.stroke = {stroke}, controller.kp = {gain}" in sentence
     snapshots.check("boundary", "two keys", "\n".join([answer, curve, meaning, *corners, lost]))
+
+
+def test_the_answer_tells_in_three_digits_where_a_curve_runs(crossing: Plane) -> None:
+    (curve,) = crossing.curves
+    spots = tuple(replace(spot, at=np.array([0.123456, spot.at[1]])) for spot in curve.spots)
+    said = conclusion(replace(crossing, curves=(replace(curve, spots=spots),)), (MM, ShownKey("controller.kp", "N/m")))
+    assert "from joint.stroke = 1.12 mm, controller.kp = 1 N/m to" in said
 
 
 def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: Plane) -> None:

@@ -100,6 +100,7 @@ MINUTES: dict[str, Callable[[Stage], object]] = {
     "design": lambda stage: friso.design(stage, progress=begun),
     "compare": lambda stage: friso.compare(stage, machines=20, progress=begun),
     "boundary": lambda stage: friso.boundary(stage, x="controller.crossover=1 Hz..40 Hz", progress=begun),
+    "rig": lambda stage: friso.rig("stiffness", stage, progress=begun),
     "sweep": lambda stage: friso.sweep(stage, {"joint.stroke": "0.2 mm..1 mm:3"}, progress=begun),
 }
 

@@ -129,7 +129,7 @@ def boundary(
     chosen, tolerance = read_stage(stage, set), tolerance_of(rtol)
     example = range_example(chosen.flat())
     ranges = axes_of(axes or {}, {"x": x, "y": y}, example)
-    if not ranges:
+    if not ranges or (y and not (x or axes)):
         raise wrong("x", "no key", "one key or two with their ranges", example)
     links = pairs_of(link, "link", 'masses.cart="0.7 * mass"')
     from friso.studies.boundary import boundary as traced_boundary

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.answers.answer import Answer, question
-from friso.answers.inputs import LOGGER, Changes, StageLike, stage_of, wrong
+from friso.answers.inputs import LOGGER, Changes, StageLike, mention_unstable_loop, stage_of, wrong
 from friso.axis import speak_of
 from friso.equations.as_built import whole_samples
 from friso.progress import Progress, silent
@@ -108,6 +108,7 @@ def rig(
     _announce(chosen)
     if not 0 <= seed < MOST_SEED:
         raise wrong("seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "1")
+    mention_unstable_loop(chosen)
     return RigAnswer(run(chosen, seed, progress))
 
 

@@ -89,6 +89,10 @@ class ShownKey:
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 
+ROUGHLY = 3
+"""Digits of where a curve begins and ends, in the answer."""
+
+
 SHOWN_CURVES = 3
 """Curves at most of which the answer says where they run; the figure and the details have all."""
 
@@ -144,7 +148,7 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 def _course(line: Line, keys: tuple[ShownKey, ...]) -> str:
     """From where to where a boundary runs."""
-    first, last = (_place(place, keys) for place in line.at[[0, -1]].tolist())
+    first, last = (_place(place, keys, ROUGHLY) for place in line.at[[0, -1]].tolist())
     return f"A {line.kinds[0]} of {CYCLES[line.shape]} runs from {first} to {last}."
 
 
@@ -256,8 +260,8 @@ def _untraced(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
-def _place(values: Sequence[float], keys: tuple[ShownKey, ...]) -> str:
-    return ", ".join(f"{key.key} = {key.text(value)}" for key, value in zip(keys, values, strict=True))
+def _place(values: Sequence[float], keys: tuple[ShownKey, ...], digits: int = 6) -> str:
+    return ", ".join(f"{key.key} = {key.text(value, digits)}" for key, value in zip(keys, values, strict=True))
 
 
 def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
