@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.truth.draws import FORMS, draw
+from benchmarks.truth.draws import FORMS, SERIES, draw
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from friso.stage.files import loads
 from friso.stage.tables import FRICTION
@@ -45,12 +45,13 @@ def test_small_swings_are_rest() -> None:
     assert evenly(np.full(300, 1e-4)) == RESTS
 
 
-@pytest.mark.parametrize("number", range(len(FORMS)))
-def test_stages_are_drawn_again_by_seed_and_number(number: int) -> None:
-    stage = draw(7, number)
-    assert stage == draw(7, number)
-    assert loads(stage.to_toml()) == stage
-    assert stage.flat() != draw(8, number).flat()
+@pytest.mark.parametrize("series", SERIES)
+def test_stages_are_drawn_again_by_seed_and_number(series: str) -> None:
+    for number in range(len(SERIES[series])):
+        stage = draw(7, number, series)
+        assert stage == draw(7, number, series)
+        assert loads(stage.to_toml()) == stage
+        assert stage.flat() != draw(8, number, series).flat()
 
 
 def test_stages_of_every_friction_law_are_drawn() -> None:

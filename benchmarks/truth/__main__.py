@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.attack import attack
 from benchmarks.truth.by_hand import NotWritten
-from benchmarks.truth.draws import FORMS, MACHINES, Form
+from benchmarks.truth.draws import SERIES
 from benchmarks.truth.positions import compared, summary
 
 SLOWEST = 8
@@ -35,7 +35,7 @@ def main() -> None:
     arguments = _arguments()
     numbers = arguments.number or range(arguments.first, arguments.first + arguments.stages)
     if arguments.simulate:
-        _simulate(arguments.seed, numbers, MACHINES if arguments.machines else FORMS)
+        _simulate(arguments.seed, numbers, arguments.series)
         return
     arguments.out.mkdir(parents=True, exist_ok=True)
     records: list[dict[str, Any]] = []
@@ -52,13 +52,13 @@ def main() -> None:
     _summary(records, time.perf_counter() - start)
 
 
-def _simulate(seed: int, numbers: Iterable[int], forms: tuple[Form, ...]) -> None:
+def _simulate(seed: int, numbers: Iterable[int], series: str) -> None:
     """Compare runs with SciPy, stage by stage; those whose equations are not written by hand are left out."""
     records: list[dict[str, Any]] = []
     try:
         for number in numbers:
             try:
-                records.append(compared(seed, number, forms))
+                records.append(compared(seed, number, series))
             except NotWritten as missing:
                 print(f"  {number:5d}  no equations by hand ({missing})", flush=True)
                 continue
@@ -73,7 +73,7 @@ def _simulate(seed: int, numbers: Iterable[int], forms: tuple[Form, ...]) -> Non
 
 def _attacked(arguments: argparse.Namespace, numbers: Any) -> Iterator[dict[str, Any]]:
     tasks = [
-        (arguments.seed, number, arguments.scipy_share, arguments.out, arguments.checks, arguments.machines)
+        (arguments.seed, number, arguments.scipy_share, arguments.out, arguments.checks, arguments.series)
         for number in numbers
     ]
     if arguments.workers == 1:
@@ -154,7 +154,12 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--number", type=int, action="append", help="a single stage; may be repeated")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scipy-share", type=float, default=0.1, help="share of stages that SciPy looks at too")
-    parser.add_argument("--machines", action="store_true", help="draw cascades, transmissions and deadbands instead")
+    parser.add_argument(
+        "--series",
+        choices=SERIES,
+        default="stages",
+        help="machines: cascades, transmissions, deadbands; axes: of machine tools, with settings against friction",
+    )
     parser.add_argument("--checks", action="store_true", help="check the stages alone, and refute nothing")
     parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")
     parser.add_argument("--workers", type=int, default=1)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.truth.claims import Claim, checked
-from benchmarks.truth.draws import FORMS, MACHINES, draw
+from benchmarks.truth.draws import draw
 from benchmarks.truth.refute import Refutation, refutations
 from benchmarks.truth.second_opinion import scipy_refutations
 from friso.engine.allowance import Exhausted, allowance
@@ -23,10 +23,10 @@ this order. SciPy's is not counted. Free joints whose limiter rattles would take
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities behind
-def attack(seed: int, number: int, scipy_share: float, folder: Path, checks: bool, machines: bool) -> dict[str, Any]:
-    """What friso says of the stage with this number, of the series of `machines` or of the other, and what refutes it
+def attack(seed: int, number: int, scipy_share: float, folder: Path, checks: bool, series: str) -> dict[str, Any]:
+    """What friso says of the stage with this number, of a series, and what refutes it
     (nothing is tried for `checks` alone); refuted stages are written to a folder."""
-    stage = draw(seed, number, MACHINES if machines else FORMS)
+    stage = draw(seed, number, series)
     said = checked(stage)
     start = time.process_time()
     refuted: list[dict[str, Any]] = []
@@ -60,7 +60,7 @@ def attack(seed: int, number: int, scipy_share: float, folder: Path, checks: boo
         "refuted": refuted,
     }
     if refuted:
-        _write(folder / f"seed{seed}{'-machines' if machines else ''}-{number}", stage, record)
+        _write(folder / f"{series}-{seed}-{number}", stage, record)
     return record
 
 

@@ -11,6 +11,7 @@ from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting import Case, check
 from friso.hunting.attractors import Attractors
+from friso.hunting.basin import Kick
 from friso.hunting.verdict import BANDWIDTHS
 from friso.stage import Stage
 
@@ -35,16 +36,16 @@ class Edge:
 
 @dataclass(frozen=True)
 class Claim:
-    """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named),
-    displacements [m] that are said to start hunting, what attracts, as it was surveyed (None: it was not), and why the
-    verdict and the edge are not sure, `doubts`, by "verdict" and "edge"."""
+    """The verdict on one case of a stage, whether it is sure, the edge of hunting (None: none was named), the
+    displacements that are said to start hunting (None: nothing was said), what attracts, as it was surveyed (None: it
+    was not), and why the verdict and the edge are not sure, `doubts`, by "verdict" and "edge"."""
 
     case: str
     stage: Stage
     verdict: str
     sure: bool
     edge: Edge | None
-    kicks: tuple[float, ...]
+    kick: Kick | None
     surveyed: Attractors | None = None
     doubts: Mapping[str, str] = field(default_factory=dict)
 
@@ -89,9 +90,8 @@ def _claim(name: str, case: Case) -> Claim:
     sure = said.hunting.certain and case.verdict != "failed"
     end = said.margin
     edge = end and Edge(end.factor, sure and end.certain, end.reserve, end.quiet)
-    windows = said.displacement.windows if said.displacement else ()
-    kicks = tuple((low * high) ** 0.5 for low, high in windows)
-    return Claim(name, case.stage, case.verdict, sure, edge, kicks, said.hunting.surveyed, _doubts(case, sure, edge))
+    doubts = _doubts(case, sure, edge)
+    return Claim(name, case.stage, case.verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts)
 
 
 def _doubts(case: Case, sure: bool, edge: Edge | None) -> dict[str, str]:

@@ -7,7 +7,7 @@ kernel to compile: numbers that differ by the size of the pool share one.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,8 @@ class Form:
     """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
     with their derivative "on error", or on the measurement, "filtered" or "plain"; `windup`: what the
     integrator does where the force is limited; `bias`: the mass it acts on; `deadband`: of the error; `drive`: a
-    "transmission", with a "backlash" or none, and where the encoder is; `filtered`: a notch and a low-pass filter."""
+    "transmission", with a "backlash" or none, and where the encoder is; `filtered`: a notch and a low-pass filter;
+    `setting`: one against friction; `axis`: of a size that axes of machines have."""
 
     joint: str
     friction: str = "lugre"
@@ -44,6 +45,8 @@ class Form:
     deadband: bool = False
     drive: str = ""
     filtered: bool = False
+    setting: str = ""
+    axis: bool = False
 
 
 FORMS = (
@@ -93,11 +96,37 @@ MACHINES = (
 )
 """Structures of machines: cascades with filters, screws and belts, deadbands. A series of their own."""
 
+AXES = tuple(
+    replace(form, axis=True)
+    for form in (
+        Form("rigid", control="adrc"),
+        Form("rigid", setting="leak", bias="stage"),
+        Form("rigid", control="plain", setting="integral deadband"),
+        Form("rigid", asymmetry=True, bias="stage", windup="clamp"),
+        Form("rigid", control="on error", setting="reset"),
+        Form("rigid", setting="standstill"),
+        Form("rigid", control="plain", setting="push"),
+        Form("rigid", setting="integral limit", bias="stage"),
+        Form("free", control="adrc"),
+        Form("rigid", "elasto_plastic", bias="stage", windup="back_calculation"),
+        Form("rigid", "gms", control="cascade"),
+        Form("rigid", "rolling", asymmetry=True, bias="stage"),
+        Form("rigid", "dahl", windup="none"),
+        Form("rigid", control="cascade", drive="backlash at the load", bias="stage"),
+        Form("free", setting="integral deadband"),
+        Form("rigid", control="cascade", setting="leak", windup="clamp"),
+    )
+)
+"""Axes of machines: 5 to 200 kg, 3 to 100 N of friction, crossovers of 5 to 80 Hz, with settings against friction."""
 
-def draw(seed: int, number: int, forms: tuple[Form, ...] = FORMS) -> Stage:
-    """The stage with this number of the series of some forms that begins with `seed`."""
+SERIES = {"stages": FORMS, "machines": MACHINES, "axes": AXES}
+
+
+def draw(seed: int, number: int, series: str = "stages") -> Stage:
+    """The stage with this number of a series that begins with `seed`."""
+    forms = SERIES[series]
     tables = _Draw(np.random.default_rng([seed, number]), forms[number % len(forms)]).tables()
-    kind = ", machines" if forms is MACHINES else ""
+    kind = "" if forms is FORMS else f", {series}"
     return Stage(name=f"seed {seed}{kind}, number {number}", **tables)
 
 
@@ -111,6 +140,10 @@ class _Draw:
         self.mass = self.cart + self.stage
         self.crossover = self.log(1.0, 80.0)
         self.static = self.mass * GRAVITY * self.log(3e-3, 1.0)
+        if form.axis:
+            self.mass, self.crossover, self.static = self.log(5.0, 200.0), self.log(5.0, 80.0), self.log(3.0, 100.0)
+            self.stage = self.mass * self.log(0.05, 0.8)
+            self.cart = self.mass - self.stage
         self.omega = 2 * np.pi * self.crossover
         self.alpha, self.beta = self.log(0.03, 0.4), self.log(1.3, 8.0)
 
@@ -159,7 +192,7 @@ class _Draw:
         keys: dict[str, Any] = {
             "static": _text(self.static, "N"),
             "coulomb": _text(coulomb, "N"),
-            "stribeck_velocity": _text(self.log(1e-4, 5e-2), "m/s"),
+            "stribeck_velocity": _text(self.log(1e-4, 3e-3 if self.form.axis else 5e-2), "m/s"),
             "stribeck_exponent": self.form.exponent or self.rng.uniform(0.6, 2.6),
             "bristle_stiffness": _text(bristles, "N/m"),
             "bristle_damping": _text(2 * self.log(0.03, 1.5) * np.sqrt(bristles * self.mass), "N*s/m"),
@@ -240,6 +273,12 @@ class _Draw:
         table: dict[str, Any] = {"kind": "pid"}
         if self.form.control == "cascade":
             table = self.cascade()
+        elif self.form.control == "adrc":
+            table = {
+                "kind": "adrc",
+                "bandwidth": _text(self.crossover / 3, "Hz"),
+                "observer_ratio": self.log(3.0, 10.0),
+            }
         elif self.form.control == "rules":
             table |= {"crossover": _text(self.crossover, "Hz"), "alpha": self.alpha, "beta": self.beta}
             if self.rng.random() < 0.2:
@@ -266,7 +305,24 @@ class _Draw:
             table["error_deadband"] = _text(self.deflection * self.log(1e-4, 0.3), "m")
         if self.form.windup == "back_calculation":
             table["anti_windup_time"] = _text(self.log(0.1, 10.0) / self.omega, "s")
-        return table
+        return table | self.setting()
+
+    def setting(self) -> dict[str, Any]:
+        """One of the settings of drives against friction."""
+        error, force = self.deflection * self.log(1e-3, 1.0), self.static * self.log(0.05, 3.0)
+        settings: dict[str, dict[str, Any]] = {
+            "": {},
+            "leak": {"integral_leak": _text(self.crossover * self.log(1e-3, 0.1), "Hz")},
+            "integral limit": {"integral_limit": _text(force, "N")},
+            "integral deadband": {
+                "integral_deadband": _text(error, "m"),
+                "integral_deadband_exit": _text(error * self.log(1.0, 10.0), "m"),
+            },
+            "reset": {"integral_reset": True},
+            "standstill": {"standstill_window": _text(error, "m"), "standstill_factor": self.log(0.1, 3.0)},
+            "push": {"stiction_push": _text(force, "N"), "stiction_push_window": _text(error, "m")},
+        }
+        return settings[self.form.setting]
 
     def joint(self) -> dict[str, Any]:
         stiffness = self.mass * (self.omega * self.log(0.15, 4.0)) ** 2

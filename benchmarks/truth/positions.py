@@ -10,7 +10,7 @@ import numpy as np
 import friso
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.by_hand import ByHand, by_hand
-from benchmarks.truth.draws import FORMS, Form, draw
+from benchmarks.truth.draws import draw
 from friso.engine.simulate import RTOL
 from friso.stage import Stage
 
@@ -22,10 +22,10 @@ SAMPLES = 4000
 
 
 @np.errstate(all="ignore")
-def compared(seed: int, number: int, forms: tuple[Form, ...] = FORMS) -> dict[str, Any]:
+def compared(seed: int, number: int, series: str = "stages") -> dict[str, Any]:
     """How far the default run of a drawn stage (rtol 1e-9) is from SciPy at 1e-9, in units of that deflection; of those
     that are too far, also how far the two are from themselves at finer tolerances, and from each other there."""
-    stage = draw(seed, number, forms)
+    stage = draw(seed, number, series)
     equations = by_hand(stage.flat())
     unit = equations.length
     begin = time.process_time()

@@ -13,6 +13,7 @@ from benchmarks.truth.claims import Claim
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import FINE, LINGERING, NEIGHBOURS, ROUGH, ROUNDS, Bench, Trial
 from friso.equations.bandwidth import bandwidth, faster
+from friso.hunting.basin import Kick
 
 ALL = (80, 40, 60, 20)
 """Releases, pushes, stuck and drawn starts of a whole battery."""
@@ -41,13 +42,17 @@ JUST, DENSE = 1.01, 1 + 0.06 * np.linspace(-1, 1, 24)
 """Factors up to which stages just beyond an edge are also begun from swings just below it, made larger and smaller by
 so much: beyond a flip or a fold something may attract from a narrow range there."""
 
+KICKS, BROAD = 60, np.array([1 / 1.04, 1.0, 1.04])
+"""Displacements that are tried, and factors of each that all have to show the contrary of what is said: windows
+narrower than 7 % may be missed (docs/hunting.md)."""
+
 SCIPY_PERIODS, ALIKE = 20.0, 0.03
 """Periods for which SciPy follows a swing, and the share by which its amplitude may differ."""
 
 
 @dataclass(frozen=True)
 class Refutation:
-    """Which claim is wrong ("verdict", "own motion", "edge"), and how that was established."""
+    """Which claim is wrong ("verdict", "own motion", "kicks", "edge"), and how that was established."""
 
     of: str
     sure: bool
@@ -62,6 +67,8 @@ def refutations(claim: Claim, seed: int) -> Iterator[Refutation]:
     if bench.flat["motion.kind"] != "ramp":  # whose reference never stands still
         yield from _verdict(claim, bench, seed)
         yield from _own_motion(claim, bench)
+        if claim.kick is not None and not claim.kick.unknown:
+            yield from _kicks(claim, claim.kick, bench)
     if claim.edge is not None:
         yield from _edge(claim, seed)
 
@@ -70,7 +77,8 @@ def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
     """Whether something attracts."""
     trial = bench.starts(*ALL, seed)
     if claim.attracted:
-        if not _may_hunt(bench, trial, claim.kicks):
+        windows = claim.kick.windows if claim.kick else ()
+        if not _may_hunt(bench, trial, tuple((low * high) ** 0.5 for low, high in windows)):
             yield Refutation("verdict", claim.sure, "no start swings on, at either tolerance")
         return
     if why := swinging(bench, trial):
@@ -163,6 +171,21 @@ def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
     if all(word not in (wanted, UNSURE, FAILED) for word in words.values()):
         why = f"the motion followed for long {words[FINE]} at {ROUGH:g} and {FINE:g}"
         yield Refutation("own motion", claim.sure, why)
+
+
+def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
+    """Whether displacements start hunting where they are said to, and nowhere else."""
+    tried = np.geomspace(*kick.searched, KICKS + 2)[1:-1, None] * BROAD
+    said = np.any([(low <= tried) & (tried <= high) for low, high in kick.windows], axis=0)
+    broad = (said == said[:, :1]).all(axis=1)  # no end of a window among the three
+    tried, said = tried[broad], said[broad, 0]
+    for rtol in (ROUGH, FINE):
+        words = bench.follow(bench.released(tried.ravel()), rtol, any_will_do=False).words.reshape(tried.shape)
+        contrary = np.where(said[:, None], words == RESTS, words == SWINGS).all(axis=1)
+        tried, said = tried[contrary], said[contrary]
+    for size, hunts in zip(tried[:, 1], said, strict=True):
+        word = "rests, and is said to hunt" if hunts else "hunts, and is said to rest"
+        yield Refutation("kicks", claim.sure, f"displaced by {size:.4g} m, it {word}")
 
 
 def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:

@@ -92,7 +92,7 @@ def _kicks(case: Case, kick: Kick | None, unit: str) -> str:
     searched = range_with_unit(*kick.searched, unit)
     if not kick.windows:
         return UNKNOWN if kick.unknown else f"none from {searched}"
-    lost = f" ({kick.unknown} runs were given up)" if kick.unknown else ""
+    lost = f" ({kick.unknown} run{'s were' if kick.unknown > 1 else ' was'} given up)" if kick.unknown else ""
     return f"{_windows(kick, unit, searched)}{lost}"
 
 
