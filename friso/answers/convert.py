@@ -68,7 +68,7 @@ def convert(
     set: Changes = None,
     progress: Progress = silent,
 ) -> ConvertAnswer:
-    """To another friction law that fits the same measurements, and what could not be kept.
+    """Convert friction to another law that fits the same measurements, and say what could not be kept.
 
     Parameters
     ----------

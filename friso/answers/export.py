@@ -61,7 +61,7 @@ def export(
     to: str | None = None,
     progress: Progress = silent,
 ) -> ExportAnswer:
-    """The gains in the units of drives, with a drawing of the loop that they belong to, and as a drive's parameters.
+    """The gains in the units that drives use, a drawing of the loop they belong to, and a drive's parameters.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the leaf springs of a joint are worth: stiffness, modes, stress."""
+"""How good the leaf springs of a joint are: stiffness, modes, stress."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class FlexureAnswer(Answer):
 def flexure(
     stage: StageLike, stroke: float | str | None = None, *, set: Changes = None, progress: Progress = silent
 ) -> FlexureAnswer:
-    """What are the leaf springs of a joint worth: stiffness, modes, stress, fatigue and buckling.
+    """How good are the leaf springs of a joint: stiffness, modes, stress, fatigue and buckling.
 
     Parameters
     ----------

@@ -112,7 +112,7 @@ def logs(
     partly: bool = False,
     progress: Progress = silent,
 ) -> LogsAnswer:
-    """What log files hold: channels, units, rates, ranges, and which channel would be what, and why.
+    """What log files hold: channels, units, rates, ranges, and the role that friso gives each channel, with the reason.
 
     Parameters
     ----------

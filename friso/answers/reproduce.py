@@ -100,7 +100,7 @@ def reproduce(
     folder: Path | None = None,
     progress: Progress = silent,
 ) -> ReproduceAnswer:
-    """Every figure and claim of the thesis that computation decides, judged.
+    """Every figure and claim of the thesis that computation can decide, judged.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from typer.core import TyperCommand
+from typer.core import TyperArgument, TyperCommand
 
 from friso.registry import Registry
 
@@ -20,6 +20,16 @@ HUNTS, WHERE, WHY, STOPS, MACHINE, HELP = (
 )
 QUESTIONS = (HUNTS, WHERE, WHY, STOPS, MACHINE, HELP)
 """The questions by which `friso --help` lists the commands."""
+
+
+class _Command(TyperCommand):
+    """A command whose help shows arguments as the usage does, without the type that Python has them in."""
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        for parameter in self.params:
+            if isinstance(parameter, TyperArgument):
+                parameter.display_type_rich = lambda ctx: None
+        super().format_options(ctx, formatter)
 
 
 @dataclass(frozen=True)
@@ -50,9 +60,9 @@ class Command:
         """The class of typer that shows the help, with the choices below."""
         choices = self.choices
         if choices is None:
-            return TyperCommand
+            return _Command
 
-        class ListingCommand(TyperCommand):
+        class ListingCommand(_Command):
             def format_epilog(self, ctx: Any, formatter: Any) -> None:
                 with formatter.section(choices.title):
                     formatter.write_dl([*choices.rows()])

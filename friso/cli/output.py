@@ -15,10 +15,9 @@ OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Fo
 DefaultFolder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
 Overwrite = Annotated[
     bool,
-    typer.Option(
-        "--overwrite", help="Write into the folder even if it holds other files, and replace files of the same name."
-    ),
+    typer.Option("--overwrite", help="Write even if the folder holds other files; replace files of the same name."),
 ]
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace the file if it exists.")]
 
 
 def print_document(document: Mapping[str, Any], files: Iterable[Path] = ()) -> None:

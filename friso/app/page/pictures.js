@@ -189,7 +189,7 @@ export class Pictures {
     const edge = this.tick("edge", () => false);
     for (const item of fields) item.key.addEventListener("change", log.again);
     const metrics = this.shown === "map" ? [el("label", {}, "Shown", metric), el("label", { class: "tick" }, edge.box, "Edge of hunting (about a minute)")] : [];
-    const form = el("div", { class: "form" }, ...fields.flatMap((item) => item.elements), el("label", { class: "tick" }, log.box, "Logarithmic"), ...metrics);
+    const form = el("div", { class: "form" }, ...fields.map((item) => item.row), el("label", { class: "tick" }, log.box, "Logarithmic"), ...metrics);
     form.addEventListener("change", start);
     place.append(form);
     return () => {
@@ -220,7 +220,7 @@ export class Pictures {
     key.addEventListener("change", fill);
     fill();
     const label = name === "x" ? "To the right" : "Upwards";
-    return { key, low, high, elements: [el("label", {}, label, key), el("label", {}, "from", low), el("label", {}, "to", high)] };
+    return { key, low, high, row: el("div", { class: "axis" }, el("label", {}, label, key), el("label", {}, "from", low), el("label", {}, "to", high)) };
   }
 
   /** The values of the two keys of a map [SI] in a cell, null elsewhere. */

@@ -9,10 +9,16 @@ import typer
 
 from friso.cli.command import HUNTS, Command
 
-BeginArgument = Annotated[Path | None, typer.Argument(metavar="STAGE.toml", help="The stage file to begin with.")]
-Host = Annotated[str, typer.Option("--host", metavar="NAME", help="Address to listen at; others need --insecure.")]
+BeginArgument = Annotated[Path | None, typer.Argument(metavar="STAGE.toml", help="The stage file to start with.")]
+Host = Annotated[
+    str,
+    typer.Option("--host", metavar="NAME", help="Address to listen on; any but this machine's own needs --insecure."),
+]
 Port = Annotated[
-    int | None, typer.Option("--port", metavar="N", min=0, max=65535, help="Port to listen at; default: 8741 or later.")
+    int | None,
+    typer.Option(
+        "--port", metavar="N", min=0, max=65535, help="Port to listen on; default: 8741, or the next free one."
+    ),
 ]
 Insecure = Annotated[
     bool,
@@ -30,7 +36,7 @@ def app(
     insecure: Insecure = False,
     browser: Browser = True,
 ) -> None:
-    """All of it live in the browser, on this machine alone: drag a key, and see whether it hunts.
+    """Everything live in the browser, served to this machine alone: drag a value and see whether it hunts.
 
     Example: friso app examples/thesis_rig.toml
     """

@@ -16,7 +16,9 @@ RANGE = 'KEY="FIRST..LAST"'
 
 def boundary(
     stage_file: StageFile,
-    x: Annotated[str | None, typer.Option(metavar=RANGE, help="The key over which cycles are followed.  [required]")] = None,
+    x: Annotated[
+        str | None, typer.Option(metavar=RANGE, help="The key over which cycles are followed.  [required]")
+    ] = None,
     y: Annotated[str | None, typer.Option(metavar=RANGE, help="A second key: curves in the plane of both.")] = None,
     link: Annotated[
         list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key tied to others: masses.cart="0.7 * mass".')

@@ -32,7 +32,7 @@ def convert(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """To another friction law that fits the same measurements, and what could not be kept.
+    """Convert friction to another law that fits the same measurements, and say what could not be kept.
 
     Example: friso convert examples/thesis_rig.toml --friction gms --elements 6 --out gms
     """

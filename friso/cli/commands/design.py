@@ -31,7 +31,7 @@ def design(
     as_json: AsJson = False,
     details: Details = False,
 ) -> None:
-    """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and why it is so.
+    """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and its reasons.
 
     Example: friso design examples/thesis_rig.toml examples/specs/thesis.toml --out design
     """

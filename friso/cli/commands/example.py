@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from friso.cli.command import HELP, Choices, Command
-from friso.cli.output import Overwrite
+from friso.cli.output import Replace
 
 
 def example(
@@ -18,7 +18,7 @@ def example(
     path: Annotated[
         Path | None, typer.Argument(metavar="[FILE]", help="The file to write; default: NAME.toml, here.")
     ] = None,
-    overwrite: Overwrite = False,
+    overwrite: Replace = False,
 ) -> None:
     """Copy an example that comes with friso, a stage file with its sources.
 

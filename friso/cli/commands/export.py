@@ -30,7 +30,7 @@ def export(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """The gains in the units of drives, with a drawing of the loop that they belong to, and as a drive's parameters.
+    """The gains in the units that drives use, a drawing of the loop they belong to, and a drive's parameters.
 
     travel_per_turn and motor_constant ("0.5 N*m/A") add the units of a motor.
 

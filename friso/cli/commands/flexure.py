@@ -1,4 +1,4 @@
-"""`friso flexure`: what the leaf springs of a joint are worth: stiffness, modes, stress."""
+"""`friso flexure`: how good the leaf springs of a joint are: stiffness, modes, stress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def flexure(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """What are the leaf springs of a joint worth: stiffness, modes, stress, fatigue and buckling, and a drawing.
+    """How good are the leaf springs of a joint: stiffness, modes, stress, fatigue and buckling, with a drawing.
 
     Example: friso flexure rig.toml --stroke "1 mm" --out flexure
     """

@@ -10,7 +10,7 @@ import typer
 from friso.cli.asking import named_as_options
 from friso.cli.command import MACHINE, Command
 from friso.cli.common import Overrides
-from friso.cli.output import Overwrite
+from friso.cli.output import Replace
 from friso.system import shell_word
 
 SourceArgument = Annotated[
@@ -37,7 +37,7 @@ def init(
     source: SourceArgument = None,
     axis: AxisNameOption = None,
     overrides: Overrides = None,
-    overwrite: Overwrite = False,
+    overwrite: Replace = False,
 ) -> None:
     """Write a stage file to start from: a commented one, that of an axis of a drive (--from), or a specification.
 

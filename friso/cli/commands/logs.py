@@ -21,7 +21,7 @@ def logs(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """What log files hold: channels, units, rates, ranges and small plots, and which channel would be what, and why.
+    """What log files hold: channels, units, rates, ranges and small plots, and the role that friso gives each channel.
 
     Example: friso logs log.csv --out logs
     """

@@ -31,10 +31,10 @@ def reproduce(
     as_json: AsJson = False,
     details: Details = False,
 ) -> None:
-    """Every figure and claim of the thesis that computation decides, judged: reproduction.html, claims.json.
+    """Every figure and claim of the thesis that computation can decide, judged: reproduction.html, claims.json.
 
-    Written into the folder reproduction, or of single claims into one such as reproduction-F15B.
-    What is done of an interrupted run stays, and the same command goes on from there.
+    Writes into the folder reproduction; single claims go into one such as reproduction-F15B.
+    An interrupted run keeps what it has finished; the same command resumes it.
 
     Example: friso reproduce --points 21 --draws 12 --out reproduction
 

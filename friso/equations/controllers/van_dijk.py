@@ -72,7 +72,7 @@ class VanDijk(Pid):
         values = numbers(flat)
         times = {"tau_z": "lead", "tau_i": "integral", "tau_p": "low-pass, before all terms"}
         return (
-            Gain("gain k_p of Eq. 8", "k_p", values["k_p"], "N/m"),
+            Gain("gain of the loop", "k_p", values["k_p"], "N/m"),
             *(Gain(f"time constant of the {name}", symbol, values[symbol], "s") for symbol, name in times.items()),
             *(gain for gain in super().gains(flat) if gain.symbol not in cls.needed),
         )

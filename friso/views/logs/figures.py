@@ -33,7 +33,8 @@ def _panel(channel: ChannelContent) -> Panel:
     timed = time is not None and time.size == channel.values.size and not np.isnan(_within_range(time)).all()
     x = _within_range(time) if timed and time is not None else np.arange(channel.values.size, dtype=float)
     values = _within_range(channel.values)
-    words = f"{channel.name}: {channel.role.replace('_', ' ')}" if channel.role else channel.name
+    role = channel.role.replace("_", " ")
+    words = f"{channel.name}: {role}" if role and role != channel.name else channel.name
     if np.isnan(values[np.isfinite(channel.values)]).any():
         words += f" (values beyond {LARGEST:g} not drawn)"
     across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)

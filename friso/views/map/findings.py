@@ -100,7 +100,8 @@ def _creeping(runs: xr.Dataset) -> list[str]:
     if not creeping:
         return []
     where = f"in {_percent(creeping, runs['outcome'].size)} of the map"
-    return [f"It still creeps at its end {where}: a longer run or --metric verdict shows whether it hunts there."]
+    shows = "a longer run, or the verdict of every cell (--metric verdict), shows whether it hunts there"
+    return [f"It still creeps at its end {where}: {shows}."]
 
 
 def _answer(runs: xr.Dataset, question: Question) -> str:
