@@ -32,7 +32,7 @@ class CompareAnswer(Answer):
         return f"{stopped} runs stopped early" if stopped else ""
 
     def sentences(self) -> Sequence[str]:
-        """Which options bring the machines to rest at what cost, and what to do."""
+        """Whether to buy a joint, then which options bring the machines to rest at what cost."""
         from friso.views.compare.words import answer
 
         return answer(self.result)

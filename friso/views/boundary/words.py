@@ -147,9 +147,9 @@ def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _course(line: Line, keys: tuple[ShownKey, ...]) -> str:
-    """From where to where a boundary runs."""
+    """From where to where a boundary runs, and why it ends there."""
     first, last = (_place(place, keys, ROUGHLY) for place in line.at[[0, -1]].tolist())
-    return f"A {line.kinds[0]} of {CYCLES[line.shape]} runs from {first} to {last}."
+    return f"A {line.kinds[0]} of {CYCLES[line.shape]} runs from {first} to {last}{_ends(line)}."
 
 
 def _edges(traced: Diagram, key: ShownKey) -> str:

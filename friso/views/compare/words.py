@@ -205,8 +205,8 @@ def sentences(comparison: Comparison) -> list[str]:
 
 
 def answer(comparison: Comparison) -> list[str]:
-    """Which options bring the machines to rest at what cost, and what to do."""
-    return [*_unstable(comparison), conclusion(comparison), *_recommendation(comparison)]
+    """Whether to buy a joint, then which options bring the machines to rest at what cost."""
+    return [*_unstable(comparison), *_recommendation(comparison), conclusion(comparison)]
 
 
 def _unstable(comparison: Comparison) -> list[str]:
