@@ -9,6 +9,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
+from threading import TIMEOUT_MAX
 from types import SimpleNamespace
 
 import pytest
@@ -88,6 +89,15 @@ def unprinted() -> Iterator[None]:
     from friso.views import pages  # slow
 
     with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda *_, **__: b"<svg/>")}}):
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def unhurried() -> Iterator[None]:
+    """What commands say does not depend on how long they take: no lines of progress."""
+    from friso.cli import progress
+
+    with patched({progress: {"LINES": TIMEOUT_MAX}}):
         yield
 
 

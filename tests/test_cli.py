@@ -4,6 +4,7 @@ import copy
 import json
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -35,17 +36,35 @@ def checked() -> dict[str, Any]:
     return json.loads(run("check", RIG, "--json").stdout)
 
 
-def test_the_time_to_go_of_other_work_counts_from_its_beginning(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_time_to_go_of_other_work_counts_from_its_beginning(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [0.0]
     monkeypatch.setattr("friso.cli.progress.time", SimpleNamespace(monotonic=lambda: clock[0]))
-    with ProgressBar(lines=1.0) as bar:
-        for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50), (220.0, 20), (230.0, 30)):
-            bar(done, 100, "work")
-    said = capsys.readouterr().err.splitlines()
-    times = [line.rpartition(", ")[2] for line in said]
+    bar, times = ProgressBar(), []
+    for clock[0], done in ((100.0, 10), (190.0, 95), (200.0, 0), (210.0, 50), (220.0, 20), (230.0, 30)):
+        bar(done, 100, "work")
+        times.append(bar.line().rpartition(", ")[2])
     assert times == ["15 min to go", "10 s to go", "work", "10 s to go", "work", "70 s to go"]
+
+
+def test_a_wait_is_told_where_no_terminal_shows_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also while nothing is reported."""
+    monkeypatch.setattr("friso.cli.progress.LINES", 0.01)
+    with ProgressBar("first") as bar:
+        _until_told(capsys, "friso: first")
+        bar(3, 12, "cells")
+        _until_told(capsys, "friso: 25 %, cells, 0 s to go")
+
+
+def _until_told(capsys: pytest.CaptureFixture[str], line: str) -> None:
+    told: list[str] = []
+    for _ in range(1000):
+        told += capsys.readouterr().err.splitlines()
+        if line in told:
+            return
+        time.sleep(0.01)
+    raise AssertionError(told)
 
 
 def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]) -> None:

@@ -3,7 +3,6 @@ first, small tables, what to do next, and details if they are wanted."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -34,14 +33,13 @@ def ask(
     as_json: bool = False,
     details: bool = False,
     what: str = "",
-    lines: float = math.inf,
     writes: Iterable[str] = (),
     **options: Any,
 ) -> None:
     """Ask a question `about` files, with the options of its command, write its files into `out`, and show the answer.
 
-    `what` stands beside the progress bar, `lines` are the seconds between lines of progress where there is no terminal;
-    files of the names `writes` may not be in the way. Raises InputError, typer.Exit with the status of a failure.
+    `what` stands beside the progress bar; files of the names `writes` may not be in the way. Raises InputError,
+    typer.Exit with the status of a failure.
     """
     target = None
     if out is not None:
@@ -50,7 +48,7 @@ def ask(
         target = OutputFolder(command, out, overwrite, [*_paths(about)])
         target.check(writes)
     files, unwritten = [], ""
-    with ProgressBar(what, lines) as progress:
+    with ProgressBar(what) as progress:
         with named_as_options(options):
             answer = question(*about, **options, progress=progress)
         speak_of(answer.axis_kind)

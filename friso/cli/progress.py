@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 import sys
 import time
-from contextlib import AbstractContextManager
-from typing import TYPE_CHECKING, Self
+from contextlib import AbstractContextManager, suppress
+from threading import Event, Lock, Thread
+from typing import TYPE_CHECKING, Self, TextIO
 
 from friso.cli.terminal import console
 from friso.escapes import one_line
@@ -15,51 +15,70 @@ if TYPE_CHECKING:
     from rich.progress import Progress as Display
     from rich.progress import TaskID
 
+LINES = 10.0
+"""Seconds between lines of progress where no terminal shows a bar."""
+
 
 class ProgressBar(AbstractContextManager["ProgressBar"]):
-    """A bar on standard error for as long as the `with` block lasts; where that is no terminal, a line every so many
-    seconds (`lines`), by default never.
+    """A bar on standard error for as long as the `with` block lasts; where that is no terminal, a line every `LINES`
+    seconds.
 
     It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
     Where fewer steps are done than before, other work has begun, and its time counts from there.
     """
 
-    def __init__(self, label: str = "", lines: float = math.inf) -> None:
-        self.label, self.lines = label, lines
-        self.begun = self.last = time.monotonic()
-        self.done = self.before = 0
+    def __init__(self, label: str = "") -> None:
+        self.label = label
+        self.begun = time.monotonic()
+        self.done = self.total = self.before = 0
         self.display: Display | None = None
         self.task: TaskID | None = None
+        self.ended, self._turn = Event(), Lock()
+        self.clock: Thread | None = None
 
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
             self.display = _display()
             self.task = self.display.add_task(one_line(self.label), total=None)
             self.display.start()
+        else:
+            self.clock = Thread(target=self._tell, args=(sys.stderr,), daemon=True)
+            self.clock.start()
         return self
 
     def __exit__(self, *error: object) -> None:
+        self.ended.set()
+        if self.clock is not None:
+            self.clock.join()
         if self.display is not None:
             self.display.stop()
             self.display = None
 
     def __call__(self, done: int, total: int, label: str, /) -> None:
-        if done < self.done:
-            self.begun, self.before = time.monotonic(), done
-        self.done = done
+        with self._turn:
+            if done < self.done:
+                self.begun, self.before = time.monotonic(), done
+            self.done, self.total, self.label = done, total, label
         if self.display is not None and self.task is not None:
             self.display.update(self.task, completed=done, total=total or None, description=one_line(label))
-        elif time.monotonic() - self.last > self.lines:
-            self.last = time.monotonic()
-            share = f"{100 * done // total} %, " if total else ""
-            print(f"friso: {share}{one_line(label)}{self._to_go(done, total)}", file=sys.stderr, flush=True)
 
-    def _to_go(self, done: int, total: int) -> str:
-        """The time that the rest takes, if it goes on as so far."""
-        if not total or done == self.before:
+    def line(self) -> str:
+        """What is done, of how much, and how long the rest takes if it goes on as so far."""
+        with self._turn:
+            share = f"{100 * self.done // self.total} %" if self.total else ""
+            return ", ".join(part for part in (share, one_line(self.label) or "working", self._to_go()) if part)
+
+    def _to_go(self) -> str:
+        if not self.total or self.done == self.before:
             return ""
-        seconds = (self.last - self.begun) * (total - done) / (done - self.before)
-        return f", {seconds / 60:.0f} min to go" if seconds >= 100 else f", {seconds:.0f} s to go"
+        seconds = (time.monotonic() - self.begun) * (self.total - self.done) / (self.done - self.before)
+        return f"{seconds / 60:.0f} min to go" if seconds >= 100 else f"{seconds:.0f} s to go"
+
+    def _tell(self, stream: TextIO) -> None:
+        """Write a line now and then, until the block ends, or nobody takes it any more."""
+        with suppress(OSError, ValueError):
+            while not self.ended.wait(LINES):
+                print(f"friso: {self.line()}", file=stream, flush=True)
 
 
 def _display() -> Display:

@@ -24,9 +24,6 @@ if TYPE_CHECKING:
     from friso.identification.logs.mapping import Mapping
     from friso.views.files import Content
 
-PIPED = 10.0
-"""Seconds between lines of progress where no terminal shows a bar."""
-
 
 def identify(
     logs: Logs,
@@ -86,7 +83,7 @@ def identify(
     options |= {"axis": axis, "predict": predict or [], "bandwidth": bandwidth, "band": band, "period": period}
     options |= {"laws": laws}
     kept: list[Path] = []
-    with ProgressBar(lines=PIPED) as progress, named_as_options(options):
+    with ProgressBar() as progress, named_as_options(options):
         try:
             answer = question(
                 logs,

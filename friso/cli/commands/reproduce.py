@@ -46,14 +46,10 @@ def reproduce(
 
     folder = out or Path("-".join(("reproduction", *sorted({claim.upper() for claim in only or ()}))))
     kept = Kept(folder / UNFINISHED)
-    shown = {"out": folder, "overwrite": overwrite, "as_json": as_json, "details": details, "lines": LINES}
+    shown = {"out": folder, "overwrite": overwrite, "as_json": as_json, "details": details}
     asked = {"points": points, "only": only, "draws": draws, "rtol": rtol, "laws": laws}
     with kept_until_done(kept, "piece of the work", "pieces of the work"):
         ask("reproduce", question, names, **asked, folder=kept.folder, **shown)
-
-
-LINES = 10.0
-"""Seconds between lines of progress where there is no terminal."""
 
 
 COMMAND = Command(reproduce, 130, WHY)
