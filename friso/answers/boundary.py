@@ -138,7 +138,7 @@ def boundary(
         mention_unstable_loop(chosen)
         progress(0, 0, f"following cycles over {' and '.join(ranges)}")
 
-    traced = traced_boundary(chosen, ranges, links, tolerance, log, begins)
+    traced = traced_boundary(chosen, ranges, links, tolerance, log, begins, progress)
     return BoundaryAnswer(chosen, traced, [*ranges.values()], stem_of(stage))
 
 

@@ -11,6 +11,7 @@ from friso.errors import InputError
 from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.cycle.hunting import DITHERS, cannot_hunt
+from friso.progress import Progress, silent
 from friso.stage import Stage, violations
 from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
@@ -30,14 +31,16 @@ def boundary(
     rtol: float = RTOL,
     log: bool = False,
     begins: Callable[[], None] = lambda: None,
+    progress: Progress = silent,
 ) -> Diagram | Plane:
     """Where the hunting cycle of a stage stops attracting, over one key or two.
 
     `axes` are keys with their ranges, ``{"joint.stroke": "0.1 mm..2 mm"}``, logarithmic if ":log" is behind
     or with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
     `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
-    `Plane`: the curves on which they do. The motion of the stage file plays no part. `begins` is called once nothing
-    of the input is wrong. Raises InputError for a wrong range, link, tolerance or stage (one that cannot hunt).
+    `Plane`: the curves on which they do. The motion of the stage file plays no part. `begins` is called once nothing of
+    the input is wrong, `progress` as cycles are followed. Raises InputError for a wrong range, link, tolerance or stage
+    (one that cannot hunt).
     """
     checked_rtol(rtol)
     followers, example = dict(links or {}), range_example(stage.flat())
@@ -59,7 +62,7 @@ def boundary(
     _refuse_impossible(space, example)
     kernels([KernelRequest(space.form, variational) for variational in (False, True)])
     begins()
-    return diagram(space, rtol) if len(ranges) == 1 else plane(space, rtol)
+    return (diagram if len(ranges) == 1 else plane)(space, rtol, progress=progress)
 
 
 def _refuse_impossible(space: Space, example: str) -> None:

@@ -14,6 +14,7 @@ from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.loop import unstable_among
+from friso.progress import Progress, Tally, silent
 
 SEEDS = 33
 """Stages over the range at which cycles are looked for."""
@@ -24,6 +25,9 @@ again and again there is no end of them."""
 
 SAME = 0.02
 """Difference in the logarithm of distance up to which two cycles of one stage are the same."""
+
+BRANCHES = "branches of cycles"
+"""What is reported to a progress: each cycle that was found lies on a branch."""
 
 CLOSE = 0.1
 """Hundredths of the key up to which two branches meet one special point, where their cycles are the same there."""
@@ -63,7 +67,7 @@ def _in_doubt(special: Sequence[Sequence[LocatedPoint]], places: np.ndarray) -> 
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
+def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS, progress: Progress = silent) -> Diagram:
     """Follow every cycle that is found at stages evenly over the range: those that the return map suggests, the
     symmetric one and asymmetric ones, and those that simulations end in, of any number of swings."""
     places = np.linspace(0, 1, seeds)
@@ -84,11 +88,13 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
         special.append(tuple(special_points(tracer, branches[-1])))
         return True
 
-    for cycles in sought:
-        for k in np.flatnonzero(cycles.closed).tolist():
-            follow(k, cycles.take(np.array([k])))
-    skipped = 0
+    suggested = [(k, cycles) for cycles in sought for k in np.flatnonzero(cycles.closed).tolist()]
+    tally, skipped = Tally(progress, len(suggested) + len(surveyed.motions)), 0
+    for k, cycles in suggested:
+        tally.add(1, BRANCHES)
+        follow(k, cycles.take(np.array([k])))
     for motion in surveyed.motions:
+        tally.add(1, BRANCHES)
         if motion.cycles is not None and skipped < OTHERS:
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     once = each_once(special, hundredth)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import count
@@ -18,12 +18,16 @@ from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
 from friso.hunting.loop import unstable_among
+from friso.progress import Progress, Tally, silent
 
 NODES = 13
 """Stages along either side of the grid from which curves are looked for."""
 
 PATIENCE = 60
 """Points of a branch between two neighbours at most: one that winds for longer hardly leads to a curve."""
+
+CURVES = "curves between stages that differ"
+"""What is reported to a progress."""
 
 SAME = 0.2
 """Distance of a curve from the way between two stages, as a share of it, at which their change is that of the curve."""
@@ -48,14 +52,19 @@ class Plane:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
+def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progress = silent) -> Plane:
     """All curves on which the hunting cycle stops attracting, and those on which an asymmetric cycle that bounds its
     basin appears."""
     points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     stages = space.stages(points[allowed])
     hunting, searches = _searches(stages, rtol)
-    parts = side_by_side([partial(_sought, space, points, allowed, search, rtol) for search in searches])
+    changing = [
+        (cycles, [*_changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes))])
+        for cycles, inside, outside in searches
+    ]
+    tally = Tally(progress, sum(len(pairs) for _, pairs in changing))
+    parts = side_by_side([partial(_sought, space, points, allowed, *search, rtol, tally) for search in changing])
     curves = [curve for of_one, _ in parts for curve in of_one]
     gaps = [gap for _, of_one in parts for gap in of_one]
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
@@ -77,16 +86,17 @@ def _sought(
     space: Space,
     points: np.ndarray,
     allowed: np.ndarray,
-    search: CurveSearch,
+    cycles: Cycles,
+    changing: Sequence[tuple[int, int]],
     rtol: float,
+    tally: Tally,
 ) -> tuple[list[Curve], list[np.ndarray]]:
-    """The curves between the stages on one side and on the other, and where none could be begun at; `allowed` are the
-    numbers of the stages among all points (points, 2)."""
+    """The curves between neighbours of which one has such a cycle as is looked for, `changing`, and where none could be
+    begun at; `allowed` are the numbers of the stages among all points (points, 2)."""
     curves: list[Curve] = []
     gaps: list[np.ndarray] = []
-    cycles, inside, outside = search
-    nodes = round(np.sqrt(len(points)))
-    for a, b in _changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes)):
+    for a, b in changing:
+        tally.add(1, CURVES)
         if any(_crossed(curve, points[a], points[b]) for curve in curves):
             continue
         cycle = cycles.take(np.flatnonzero(allowed == a))
