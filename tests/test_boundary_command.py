@@ -31,7 +31,7 @@ from friso.hunting.boundary import (
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
-from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines
+from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines, plane_edge
 from friso.views.boundary.figures import LOST, NODES, boundary_figure
 from friso.views.boundary.words import VERDICTS, ShownKey, conclusion, sentences
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
@@ -308,6 +308,33 @@ def test_the_answer_tells_in_three_digits_where_a_curve_runs(crossing: Plane) ->
     spots = tuple(replace(spot, at=np.array([0.123456, spot.at[1]])) for spot in curve.spots)
     said = conclusion(replace(crossing, curves=(replace(curve, spots=spots),)), (MM, ShownKey("controller.kp", "N/m")))
     assert "from joint.stroke = 1.12 mm, controller.kp = 1 N/m to" in said
+
+
+def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane, wording: Wording) -> None:
+    """On a curve, or between two stages; along the second key where it does not along the first; else corners tell."""
+    keys = (MM, ShownKey("controller.kp", "N/m"))
+    (curve,) = crossing.curves
+    slant = np.array([0.2, 0.0])
+    slanted = replace(curve, spots=tuple(replace(spot, at=spot.at + slant * spot.at[1]) for spot in curve.spots))
+    known = {"allowed": np.arange(4), "decided": np.ones(4, bool), "unstable": np.zeros(4, bool)}
+    plane = replace(crossing, curves=(slanted,), attracts=np.array([True, True, False, False]), **known)
+    edge = plane_edge(plane)
+    assert edge is not None
+    assert (edge.along, edge.below) == (0, True)
+    assert edge.low == pytest.approx([1.5e-3, 1.7e-3])
+    assert edge.low.tolist() == edge.high.tolist()
+    wording(conclusion(plane, keys))
+    without = plane_edge(replace(plane, curves=(), attracts=~plane.attracts))
+    assert without is not None
+    assert (without.below, without.low.tolist(), without.high.tolist()) == (False, [1e-3] * 2, [2e-3] * 2)
+    along_second = plane_edge(replace(plane, curves=(), attracts=np.array([True, False, True, False])))
+    assert along_second is not None
+    assert along_second.along == 1
+    for unclear in (
+        {"attracts": np.array([True, False, False, True])},
+        {"decided": np.array([True, True, True, False])},
+    ):
+        assert plane_edge(replace(plane, **unclear)) is None
 
 
 def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: Plane) -> None:

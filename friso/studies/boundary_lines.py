@@ -216,6 +216,55 @@ def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
 
+class PlaneEdge(NamedTuple):
+    """Where hunting ends along one key, number `along`, for each of the values of the other one that were tried [SI],
+    `across` (n,), ascending: whether it is possible `below`, and between which values [SI] it ends, `low` and `high`
+    (n,), both the same where a curve passes there."""
+
+    along: int
+    below: bool
+    across: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def plane_edge(result: Plane) -> PlaneEdge | None:
+    """Where hunting ends, if along one of the keys, the first if it may be, it does so once and on the same side
+    whatever the value of the other; None elsewhere, and where the verdict at a node is not known."""
+    nodes = node_verdicts(result)
+    if any(verdict not in (ATTRACTS, REPELS) for _, _, verdict in nodes):
+        return None
+    shape = result.nodes, result.nodes
+    attracts = np.reshape([verdict == ATTRACTS for _, _, verdict in nodes], shape)
+    values = [np.reshape([node[k] for node in nodes], shape) for k in (0, 1)]
+    for along in (0, 1):
+        rows = np.moveaxis(attracts, along, 1)  # of each value of the other key, along this one
+        changes = np.diff(rows.astype(int), axis=1)
+        below = bool(rows[0, 0])
+        if np.all(np.abs(changes).sum(axis=1) == 1) and np.all(rows[:, 0] == below):
+            first = np.abs(changes).argmax(axis=1)
+            places, across = (np.moveaxis(values[k], along, 1) for k in (along, 1 - along))
+            numbers = np.arange(result.nodes)
+            low, high = places[numbers, first].copy(), places[numbers, first + 1].copy()
+            for row, at in enumerate(across[:, 0].tolist()):
+                crossed = [place for place in _crossings(result, along, at) if low[row] <= place <= high[row]]
+                if crossed:
+                    low[row] = high[row] = max(crossed) if below else min(crossed)
+            return PlaneEdge(along, below, across[:, 0], low, high)
+    return None
+
+
+def _crossings(result: Plane, along: int, value: float) -> list[float]:
+    """The values [SI] of the key with a number at which curves pass the `value` [SI] of the other one."""
+    crossings = []
+    for line in lines(result):
+        at, other = line.at[:, along], line.at[:, 1 - along] - value
+        for k in np.flatnonzero(other[1:] * other[:-1] <= 0).tolist():
+            share = other[k] / (other[k] - other[k + 1]) if other[k] != other[k + 1] else 0.0
+            crossings.append(float(at[k] + share * (at[k + 1] - at[k])))
+    return crossings
+
+
 def lost_places(result: Plane) -> np.ndarray:
     """Where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
     return _values(result.space, np.reshape(result.gaps, (-1, 2)))

@@ -16,6 +16,7 @@ from friso.studies.boundary_lines import (
     UNKNOWN,
     CycleShape,
     Line,
+    PlaneEdge,
     StabilityChange,
     corner_verdicts,
     end_verdicts,
@@ -23,6 +24,7 @@ from friso.studies.boundary_lines import (
     lines,
     lost_places,
     place_verdicts,
+    plane_edge,
     stability_changes,
 )
 from friso.views.drawing.figure import Array
@@ -125,6 +127,8 @@ def _unstable(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
 def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     if isinstance(traced, Diagram):
         return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
+    if edge := plane_edge(traced):
+        return _along_one(edge, keys)
     verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
     if curves := lines(traced):
         longest = sorted(curves, key=lambda line: -len(line.at))[:SHOWN_CURVES]
@@ -133,6 +137,27 @@ def _where(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     if traced.gaps or UNKNOWN in verdicts:
         return f"{_hunting_corners(traced, keys)} No curve could be followed."
     return f"{_hunting_corners(traced, keys)} {_no_boundary(traced.space, keys)}"
+
+
+def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
+    """Below or above which values of one key hunting is possible, from one end of the other one's range to the other:
+    the first and last, and what lies farther out in between."""
+    along, across = keys[edge.along], keys[1 - edge.along]
+    side, other = ("below", "above") if edge.below else ("above", "below")
+
+    def ends(k: int) -> str:
+        low, high = (along.text(float(column[k]), ROUGHLY) for column in (edge.low, edge.high))
+        return low if edge.low[k] == edge.high[k] else f"{low} to {high}"
+
+    def at(k: int) -> str:
+        return f"{across.key} = {across.text(float(edge.across[k]), ROUGHLY)}"
+
+    answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
+    farther = [int(np.argmin(edge.low)), int(np.argmax(edge.high))]
+    last = len(edge.across) - 1
+    beyond = [f"{ends(k)} at {at(k)}" for k in farther if k not in (0, last)]
+    between = f", {side} {listed(beyond, 'and')} in between" if beyond else ""
+    return f"{answer}{between}; {other}, none was found."
 
 
 def _hunting_corners(traced: Plane, keys: tuple[ShownKey, ...]) -> str:
