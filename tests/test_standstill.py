@@ -16,8 +16,10 @@ from friso.equations.sampled import sampled_controller
 from friso.equations.structure import controller_form
 from friso.errors import InputError
 from friso.frequency.parts import compensator
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import DITHERS
 from friso.hunting.cycle.hunting import hunting as hunting_of
+from friso.hunting.cycle.rest import stuck, wait
 from friso.stage import Stage
 
 KP, KI, KD, MASS = 2000.0, 20000.0, 50.0, 1.7
@@ -179,6 +181,17 @@ def test_what_is_said_of_hunting_is_what_a_long_run_does(name: str) -> None:
         return
     sizes = [cycle.amplitude for cycle in hunting.attracting] + [swung.amplitude for swung in hunting.observed]
     assert min(abs(size / swing - 1) for size in sizes) < 5e-3
+
+
+def test_an_integral_that_leaks_is_waited_for_until_it_changes_no_more() -> None:
+    """At the rate at which it begins it would take 60 000 s to wind up to the break-away force."""
+    stages = Ensemble.held(machine(SETTINGS["leak"]).flat(), 1)
+    begun = stuck(stages, 1e-6 * stages.length)
+    waited = wait(stages, 1e-6 * stages.length)
+    after, long_after = (stages.run(begun, times * waited, 1e-9).ends[0, stages.integral] for times in (1, 4))
+    assert waited < 2.0
+    assert after != begun[0, stages.integral]
+    assert after == pytest.approx(long_after, rel=1e-3)
 
 
 def test_nothing_is_sure_beyond_a_wide_dead_zone() -> None:

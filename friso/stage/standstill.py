@@ -98,3 +98,8 @@ def settings_of(flat: Mapping[str, Any]) -> FrictionSettings:
 def dead_band(flat: Mapping[str, Any]) -> Any:
     """The error [m] up to which the controller does nothing, of stages given as flat keys; 0 without a dead zone."""
     return flat.get("controller.error_deadband", 0.0)
+
+
+def integral_leak(flat: Mapping[str, Any]) -> Any:
+    """The frequency of the leak of integrals [Hz], of stages given as flat keys; 0 without one."""
+    return flat.get("controller.integral_leak", 0.0)

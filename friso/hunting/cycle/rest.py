@@ -6,6 +6,11 @@ import numpy as np
 
 from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.stage.standstill import integral_leak
+
+LEAKED = 10.0
+"""Time constants of a leak after which the integrator of a stage that sticks changes no more: it is off its end by
+5e-5 then, and by 4e-18 after four such waits (`WOUND`)."""
 
 
 def stuck(stages: Ensemble, displacement: np.ndarray, wound: np.ndarray | float = 0.0) -> np.ndarray:
@@ -45,7 +50,8 @@ def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,); where
-    it pauses instead, a time in which the loop moves."""
+    it pauses instead, a time in which the loop moves. No longer than an integrator with a leak winds at all."""
     rate = np.abs(stages.rates(stuck(stages, displacement))[:, stages.integral] / stages.per_newton)
     with np.errstate(divide="ignore"):
-        return np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
+        winding = np.where(rate > 0, stages.number("breakaway") / rate, 2 * np.pi / stages.number("rate"))
+        return np.minimum(winding, LEAKED / np.asarray(2 * np.pi * integral_leak(stages.flat)))
