@@ -316,17 +316,17 @@ def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane,
     (curve,) = crossing.curves
     slant = np.array([0.2, 0.0])
     slanted = replace(curve, spots=tuple(replace(spot, at=spot.at + slant * spot.at[1]) for spot in curve.spots))
-    known = {"allowed": np.arange(4), "decided": np.ones(4, bool), "unstable": np.zeros(4, bool)}
-    plane = replace(crossing, curves=(slanted,), attracts=np.array([True, True, False, False]), **known)
+    every = {"allowed": np.arange(4), "decided": np.ones(4, bool), "unstable": np.zeros(4, bool)}
+    plane = replace(crossing, curves=(slanted,), attracts=np.array([True, True, False, False]), **every)
     edge = plane_edge(plane)
     assert edge is not None
     assert (edge.along, edge.below) == (0, True)
     assert edge.low == pytest.approx([1.5e-3, 1.7e-3])
     assert edge.low.tolist() == edge.high.tolist()
     wording(conclusion(plane, keys))
-    without = plane_edge(replace(plane, curves=(), attracts=~plane.attracts))
-    assert without is not None
-    assert (without.below, without.low.tolist(), without.high.tolist()) == (False, [1e-3] * 2, [2e-3] * 2)
+    uncurved = plane_edge(replace(plane, curves=(), attracts=~plane.attracts))
+    assert uncurved is not None
+    assert (uncurved.below, uncurved.low.tolist(), uncurved.high.tolist()) == (False, [1e-3] * 2, [2e-3] * 2)
     along_second = plane_edge(replace(plane, curves=(), attracts=np.array([True, False, True, False])))
     assert along_second is not None
     assert along_second.along == 1

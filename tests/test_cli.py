@@ -58,13 +58,13 @@ def test_a_wait_is_told_where_no_terminal_shows_it(
 
 
 def _until_told(capsys: pytest.CaptureFixture[str], line: str) -> None:
-    told: list[str] = []
+    printed: list[str] = []
     for _ in range(1000):
-        told += capsys.readouterr().err.splitlines()
-        if line in told:
+        printed += capsys.readouterr().err.splitlines()
+        if line in printed:
             return
         time.sleep(0.01)
-    raise AssertionError(told)
+    raise AssertionError(printed)
 
 
 def test_check_json_is_one_document_with_the_agreed_keys(checked: dict[str, Any]) -> None:
