@@ -576,6 +576,8 @@ def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tupl
     assert html == identify_html(result, files, predictions, subset)
     page = Page(html)
     assert all(address.startswith("data:") for address in page.loads)
+    levels = [int(tag[1]) for tag in page.tags if tag in ("h1", "h2", "h3", "h4")]
+    assert max(np.diff(levels)) <= 1  # no heading skips a level
     text = " ".join(page.text.split())
     for _, sentence in headline(result):
         assert sentence in text

@@ -77,7 +77,8 @@ def need(design: Design) -> str:
         return f"No isolator is needed: without one the machine {edge(without)}."
     least = factor * without.highest
     bound = f"{hertz(least)} or more" if math.isfinite(least) else "higher than the range searched"
-    above = f"{bound}, {factor:g} times the edge of hunting"
+    where = " in the worst corner of friction and masses" if without.population.count > 1 else ""
+    above = f"{bound}, {factor:g} times the edge of hunting{where}"
     if design.needed:
         return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."
     return f"No isolator is needed: without one the crossover must be {above}, and the machine allows {limit}."

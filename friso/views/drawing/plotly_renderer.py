@@ -254,6 +254,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
     if axis.words:
         positions, words = word_ticks(axis)
         settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
+        settings["automargin"] = True  # words are of any length
     if axis.log:
         settings |= _log_ticks(axis.limits)
     if axis.step:

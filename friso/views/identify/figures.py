@@ -17,7 +17,8 @@ SHORT = {
     "masses.stage": "stage",
     "friction.coulomb": "Coulomb",
     "friction.viscous_asymmetry": "asymm.",
-    "friction.stribeck_velocity": "Stribeck",
+    "friction.stribeck_velocity": "Stribeck v",
+    "friction.stribeck_exponent": "exponent",
     "friction.bristle_stiffness": "bristle k",
     "friction.bristle_damping": "bristle d",
     "bias.cart": "constant",
@@ -74,7 +75,7 @@ def _intervals(identification: Identification) -> list[Figure]:
         "",
         "",
         (-0.6, len(bounded) - 0.4),
-        words=tuple(SHORT.get(estimate.name, estimate.name.split(".")[-1]) for estimate in bounded),
+        words=tuple(SHORT.get(estimate.name, estimate.name.partition(".")[2]) for estimate in bounded),
     )
     caption = "Shorter is better known; from 100 % on not even the sign or order of magnitude is."
     panel = Panel("", x, y, tuple(stems), tuple(points))
