@@ -11,7 +11,17 @@ _LONGEST = 1200
 
 class InputError(ValueError):
     """A wrong input: which key, what was given, what was expected, a correct example, and which file; and what `also`
-    is wrong in the same file, as pairs of key and what was given."""
+    is wrong in the same file, as pairs of key and what was given.
+
+    Examples
+    --------
+    >>> import friso
+    >>> try:
+    ...     friso.simulate(friso.example("thesis_rig"), rtol=2)
+    ... except friso.InputError as error:
+    ...     print(error.key)
+    rtol
+    """
 
     def __init__(
         self,
@@ -65,16 +75,56 @@ def _dotted(table: str, key: str) -> str:
 
 
 class StageError(InputError):
-    """A wrong stage: its file, or the keys and values it was made from."""
+    """A wrong stage: its file, or the keys and values it was made from.
+
+    Examples
+    --------
+    >>> import friso
+    >>> try:
+    ...     friso.loads('[masses]\\ncart = "1.2 m"')
+    ... except friso.StageError as error:
+    ...     print(error.key, error.example, sep=": ")
+    masses.cart: cart = "1.2 kg"
+    """
 
 
 class SpecError(InputError):
-    """A wrong specification of a design."""
+    """A wrong specification of a design.
+
+    Examples
+    --------
+    >>> import friso
+    >>> try:
+    ...     friso.design(friso.example("thesis_rig"), friso.example("thesis_rig"))
+    ... except friso.SpecError as error:
+    ...     print(error.actual)
+    a stage file
+    """
 
 
 class LogError(InputError):
-    """A log, or what is said about one, that cannot be read."""
+    """A log, or what is said about one, that cannot be read.
+
+    Examples
+    --------
+    >>> import friso
+    >>> try:
+    ...     friso.logs("missing.csv")
+    ... except friso.LogError as error:
+    ...     print(error.expected)
+    a log
+    """
 
 
 class StoreError(InputError):
-    """A store that cannot be read or written."""
+    """A store that cannot be read or written.
+
+    Examples
+    --------
+    >>> import friso
+    >>> try:
+    ...     friso.read_store("missing.zarr")
+    ... except friso.StoreError as error:
+    ...     print(error.actual)
+    nothing there
+    """

@@ -61,21 +61,15 @@ def test_dir_is_the_public_list() -> None:
     assert [name for name in friso.__all__ if inspect.ismodule(getattr(friso, name))] == []
 
 
-@pytest.mark.parametrize("name", [name for name in friso.__all__ if inspect.isfunction(getattr(friso, name))])
-def test_a_function_is_documented_with_an_example_that_runs(name: str) -> None:
+@pytest.mark.parametrize("name", [name for name in friso.__all__ if callable(getattr(friso, name))])
+def test_a_public_name_is_documented_with_an_example_that_runs(name: str) -> None:
     """Examples that take long are skipped, but have to be there."""
-    function = getattr(friso, name)
-    text = inspect.getdoc(function) or ""
+    text = inspect.getdoc(getattr(friso, name)) or ""
     assert "Examples\n--------" in text
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     example = doctest.DocTestParser().get_doctest(text, {}, name, None, 0)
     assert example.examples
     assert runner.run(example).failed == 0
-
-
-@pytest.mark.parametrize("name", [name for name in friso.__all__ if inspect.isclass(getattr(friso, name))])
-def test_a_class_is_documented(name: str) -> None:
-    assert len((inspect.getdoc(getattr(friso, name)) or "").split()) > 3
 
 
 def test_importing_friso_imports_neither_arrays_nor_units() -> None:

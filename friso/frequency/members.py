@@ -27,6 +27,13 @@ class Members:
 
     `speed` [m/s] of the cart, 0 where it is stuck; `bias` [N], the friction force of a stuck cart, positive where it
     opposes the motion; `touched`, whether the limiter is; `forward`, the direction of the motion.
+
+    Examples
+    --------
+    >>> import friso
+    >>> sliding = friso.member(speed=1e-3)
+    >>> len(sliding), sliding.stuck.item(), sliding.touched.item()
+    (1, False, False)
     """
 
     speed: np.ndarray

@@ -15,7 +15,15 @@ from friso.stage.stage import numeric_keys
 @dataclass(frozen=True)
 class Tuning:
     """Gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of Eq. 8, and the margins of the loop on the bare
-    mass."""
+    mass.
+
+    Examples
+    --------
+    >>> import friso
+    >>> found = friso.tuning(8.0, 0.1, 2.0, 1.7)
+    >>> round(found.k_p), round(found.tau_z, 4)
+    (1358, 0.0629)
+    """
 
     k_p: float
     tau_z: float

@@ -106,7 +106,14 @@ class MarginDerivatives:
 @dataclass(frozen=True)
 class Sensitivities:
     """Derivatives of a stage to some keys, whose `values` are SI: of its cycle, edge of hunting, margin and settling
-    time; None where there is no such thing, none that is smooth, or, of settling, where it was not asked for."""
+    time; None where there is no such thing, none that is smooth, or, of settling, where it was not asked for.
+
+    Examples
+    --------
+    >>> import friso
+    >>> locked = friso.load(friso.example("thesis_rig")).replace({"joint.locked": True})
+    >>> friso.sensitivity(locked).ranked()[0]  # the key that moves the edge most  # doctest: +SKIP
+    """
 
     stage: Stage
     keys: tuple[str, ...]

@@ -68,7 +68,16 @@ _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = 
 
 
 class Stage(Section):
-    """A positioning stage with its controller and motion, as a stage file describes them."""
+    """A positioning stage with its controller and motion, as a stage file describes them. It does not change;
+    `replace` makes another one.
+
+    Examples
+    --------
+    >>> import friso
+    >>> stage = friso.load(friso.example("thesis_rig"))
+    >>> stage.replace({"controller.crossover": "12 Hz"}).controller.crossover
+    12.0
+    """
 
     refusal: ClassVar[type[InputError]] = StageError
 

@@ -23,7 +23,15 @@ METHODS = ("sobol", "latin")
 class Samples:
     """Samples of the ranges (name to "1 Hz..40 Hz", with ":log" behind it if the points shall be even in the
     logarithm): `count` points by a method of `METHODS`, the same for the same `seed`. Where `ranges` holds lists or
-    arrays of equal length instead, these are the points."""
+    arrays of equal length instead, these are the points.
+
+    Examples
+    --------
+    >>> import friso
+    >>> points = friso.Samples({"joint.stroke": "0.2 mm..1 mm", "controller.crossover": "4 Hz..12 Hz"}, count=8)
+    >>> friso.sweep(friso.example("thesis_rig"), samples=points).sizes["sample"]
+    8
+    """
 
     ranges: Mapping[str, AxisValues]
     count: int | None = None
