@@ -71,6 +71,36 @@ def test_one_speed_each_is_recognised_together_and_several_alone() -> None:
     assert not moves(several)
 
 
+def test_runs_that_stick_and_slip_are_of_the_same_experiment_and_moves_are_not() -> None:
+    time, random = DT * np.arange(4000), np.random.default_rng(1)
+    speeds = (0.02, 0.05, 0.1)
+
+    def course(position: np.ndarray) -> Course:
+        force = 2 + 1e-3 * random.standard_normal(time.size)
+        return Course(record("run", DT, position=position + 1e-8 * random.standard_normal(time.size), force=force))
+
+    steady = [course(speed * time) for speed in speeds]
+    together = KINDS["constant-speed"].claims_together
+    assert together is not None
+    assert together(steady)
+    assert together([*steady, course(1e-3 * np.floor(time / 0.4) + 1e-3 * np.clip(time % 0.4 / 0.05, 0, 1))])
+    assert not together([*steady, course(0.05 * np.sin(2 * np.pi * time))])
+    assert not together([course(1e-3 * np.floor(time / 0.4))])
+
+
+def test_a_body_within_its_bristles_goes_at_no_constant_speed() -> None:
+    """A force that rises and falls moves it as a spring does, at constant speeds."""
+    time = DT * np.arange(12000)
+    random = np.random.default_rng(1)
+    force = np.concatenate([size * np.abs(4 * (time[:4000] / 2 % 1) - 2) - size for size in (1.0, 2.0, 3.0)])
+    position = force / 1e6 + 1e-9 * random.standard_normal(time.size)
+    log = record("loops", DT, position=position, force=force)
+    claims = KINDS["constant-speed"].claims
+    assert claims is not None
+    assert claims(Course(log)) is None
+    assert not friction_velocity(log).both.coulomb.determined
+
+
 def test_logs_of_one_speed_each_are_one_curve_of_friction() -> None:
     friction = np.array([1.5, 1.0, 1e-3, 1e5, 316.2, 4.0])
     speeds = (0.02, 0.05, 0.1)

@@ -137,12 +137,33 @@ def test_one_bad_file_does_not_hide_the_others(
     assert ("No space left" in done.stderr) == full
 
 
-def test_a_channel_of_times_is_proposed_for_its_unit(tmp_path: Path) -> None:
+def test_the_only_channel_of_times_that_rises_is_the_clock(tmp_path: Path) -> None:
     names = ["Sekunde [ms]", "pos [mm]", "force [N]"]
     path = log_files.write_text(tmp_path / "a.csv", names, [1e3 * M["time"], M["position"] * 1e3, M["force"]])
     content = log_content(path, Mapping())
-    assert "--map time=Sekunde" in next_command(content)
-    assert log_content(path, from_options(["time=Sekunde"])).kind == "moves"
+    assert content.kind == "moves"
+    assert content.channels[0].role == "time"
+    falling = [-1e3 * M["time"], M["position"] * 1e3, M["force"]]
+    assert log_content(log_files.write_text(path, names, falling), Mapping()).kind == ""
+
+
+def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
+    """No reference for a force, no rpm for a position, no counter for a clock, and no made-up sample time."""
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(M["time"].size)
+    count = np.arange(M["time"].size)
+    plain = [M["position"], M["position"] + noise, M["force"]]
+    path = log_files.write_text(tmp_path / "a.txt", [], [count, *plain], " ")
+    command = next_command(log_content(path, Mapping()))
+    assert all(text in command for text in ('position="column 3"', 'force="column 4"', '--dt "NUMBER ms"'))
+    path = log_files.write_text(tmp_path / "b.txt", [], [M["time"], *plain], " ")
+    assert '--map time="column 1"' in next_command(log_content(path, Mapping()))
+    names = ["t [s]", "n_soll [rpm]", "n_ist [rpm]", "M [Nm]"]
+    path = log_files.write_text(tmp_path / "c.csv", names, [M["time"], *plain])
+    assert next_command(log_content(path, Mapping())) == f"friso identify {path} --axis rotary"
+    names = ["Time", "header.stamp.secs", "header.stamp.nsecs", "position_0", "effort_0"]
+    stamps = [1e9 + M["time"], 1e9 + np.floor(M["time"]), 1e9 * (M["time"] % 1)]
+    path = log_files.write_text(tmp_path / "d.csv", names, [*stamps, M["position"], M["force"]])
+    assert "header" not in next_command(log_content(path, Mapping()))
 
 
 def test_a_german_clock_is_known_by_its_name(tmp_path: Path) -> None:

@@ -85,6 +85,7 @@ def test_units_in_a_row_of_their_own(tmp_path: Path, units: tuple[str, ...]) -> 
 TIMED = "\n".join(
     f"{1e3 * t:.9g};{x:.9g};{f:.9g}" for t, x, f in zip(M["time"], M["position"], M["force"], strict=True)
 )
+SECONDS = "\n".join(f"{t:.9g},{x:.9g},{f:.9g}" for t, x, f in zip(M["time"], M["position"], M["force"], strict=True))
 ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], strict=True))
 
 
@@ -100,8 +101,20 @@ ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], s
         f"Sample interval;0.001;s;\nUnits;mm;N\npos;force\n{ROWS}",
         f"# dt = 1e-3 s\n# units: mm, N\npos;force\n{ROWS}",
         f"Sampling rate [Hz];1000\npos unit;mm\nforce unit;N\n\npos;force\n{ROWS}",
+        f"Model,MSO24,,\nHorizontal Units,s,,\nVertical Units,mm,N,\nTIME,CH1,CH2\n{SECONDS}",
     ],
-    ids=["heading;", "first;", "every;", "ctrl-z", "glued ctrl-z", "interval", "interval in cells", "comment", "rate"],
+    ids=[
+        "heading;",
+        "first;",
+        "every;",
+        "ctrl-z",
+        "glued ctrl-z",
+        "interval",
+        "interval in cells",
+        "comment",
+        "rate",
+        "scope",
+    ],
 )
 def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
     """Delimiters at the ends of some rows, DOS's end of file, and what is told above the table or within names."""
@@ -113,6 +126,47 @@ def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
     assert force.values == pytest.approx(M["force"], rel=1e-8)
     assert position.time == pytest.approx(M["time"], abs=1e-9)
     assert force.time == pytest.approx(M["time"], abs=1e-9)
+
+
+def test_numbers_of_a_scope_beside_its_names_and_units(tmp_path: Path) -> None:
+    rows = "\n".join(f"{i},{0.01 * i:.3f},{-0.02 * i:.3f},," for i in range(60))
+    (tmp_path / "a.csv").write_text(f"X,CH1,CH2,Start,Increment,\nSequence,Volt,mV,-1.0e+00,1.0e-03\n{rows}\n")
+    table = read_table(tmp_path / "a.csv")
+    assert [(channel.name, channel.unit) for channel in table.channels[1:]] == [("CH1", "Volt"), ("CH2", "mV")]
+    assert table.scalars == {"Increment": 1e-3}
+
+
+@pytest.mark.parametrize("texts", [["-1.234,5", "999,25", "1.000.000,0"], ["1.234", "2.345", "999,25"]])
+def test_thousands_are_grouped_only_where_no_number_could_be_another(tmp_path: Path, texts: list[str]) -> None:
+    rows = "\n".join(f"0,{i:03d};0,5;{text}" for i, text in enumerate(texts * 20))
+    (tmp_path / "a.csv").write_text(f"t [s];y [um];x [um]\n{rows}\n")
+    table = read_table(tmp_path / "a.csv")
+    if "-1.234,5" in texts:
+        assert channel(table, "x").values[:3] == pytest.approx([-1234.5, 999.25, 1e6])
+    else:
+        assert not any(1.234 in item.values for item in table.channels)
+
+
+def test_a_column_of_figures_that_are_no_numbers_is_left_out_with_one_of_them(tmp_path: Path) -> None:
+    rows = "\n".join(f"0.{i:03d};0.5;{i}_a" for i in range(60))
+    (tmp_path / "a.csv").write_text(f"t [s];x [um];code\n{rows}\n")
+    assert any('such as "0_a"' in line for line in read_table(tmp_path / "a.csv").read)
+
+
+def test_a_column_that_ends_early_keeps_the_only_clock(tmp_path: Path) -> None:
+    rows = "\n".join(f"{1e-3 * i:.3f},{i},{i if i < 90 else 'nan'}" for i in range(100))
+    (tmp_path / "a.csv").write_text(f"Time (s),Force (N),Displacement (mm)\n{rows}\n")
+    assert channel(read_table(tmp_path / "a.csv"), "Displacement").time == pytest.approx(1e-3 * np.arange(90))
+
+
+@pytest.mark.parametrize(
+    "mark", [b"PK\x03\x04", b"\x1f\x8b", b"\x93NUMPY", b"PAR1", b"MDF     3.00", b"SQLite format 3"]
+)
+def test_files_of_other_kinds_are_named(tmp_path: Path, mark: bytes) -> None:
+    (tmp_path / "a.csv").write_bytes(mark + bytes(range(256)) * 8)
+    with pytest.raises(LogError) as raised:
+        read_table(tmp_path / "a.csv")
+    assert "known format" not in raised.value.actual
 
 
 @pytest.mark.parametrize("line", ["dt: 1", "dt: 1 ms\nfs: 500 Hz", "dt: none", "fs: 10,000 Hz"])
@@ -201,6 +255,10 @@ def test_whole_numbers_first_and_decimal_commas_later(tmp_path: Path) -> None:
         ["2026-01-31T23:59:59.998", "2026-01-31T23:59:59.999", "2026-02-01T00:00:00.000", "2026-02-01T00:00:00.001"],
         ["2026-01-31 23:59:59.998Z", "2026-01-31 23:59:59.999Z", "2026-02-01 00:00:00Z", "2026-02-01 00:00:00.001Z"],
         ["23:59:59.998", "23:59:59.999", "00:00:00.000", "00:00:00.001"],
+        ["23:59:59:998", "23:59:59:999", "00:00:00:000", "00:00:00:001"],
+        ["31.01.2026 23:59:59.998", "31.01.2026 23:59:59.999", "01.02.2026 00:00:00.000", "01.02.2026 00:00:00.001"],
+        ["1/31/26 12:59:59.998 PM", "1/31/26 12:59:59.999 PM", "1/31/26 1:00:00.000 PM", "1/31/26 1:00:00.001 PM"],
+        ["11:59:59.998 am", "11:59:59.999 am", "12:00:00.000 pm", "12:00:00.001 pm"],
     ],
 )
 def test_time_stamps(tmp_path: Path, stamps: list[str]) -> None:
@@ -420,6 +478,8 @@ def test_without_the_library_the_message_says_how_to_get_it(tmp_path: Path, monk
 
 FREQUENCY = np.linspace(1, 100, 40)
 RESPONSE = 1 / (-2 * (2 * np.pi * FREQUENCY) ** 2 + 40j * FREQUENCY + 1e4)
+DEGREES = np.degrees(np.angle(RESPONSE))
+MOBILITY, ACCELERANCE = 2j * np.pi * FREQUENCY * RESPONSE, -((2 * np.pi * FREQUENCY) ** 2) * RESPONSE
 
 
 @pytest.mark.parametrize(
@@ -429,6 +489,10 @@ RESPONSE = 1 / (-2 * (2 * np.pi * FREQUENCY) ** 2 + 40j * FREQUENCY + 1e4)
         (["f [Hz]", "magnitude [mm/N]", "phase [rad]"], (1e3 * abs(RESPONSE), np.angle(RESPONSE)), "m/N"),
         (["Frequency (Hz)", "Re [m/N]", "Im [m/N]"], (RESPONSE.real, RESPONSE.imag), "m/N"),
         (["omega [rad/s]", "real", "imag"], (RESPONSE.real, RESPONSE.imag), ""),
+        (["freq_hz", "Mag (dB re 1 mm/N)", "phase [deg]"], (20 * np.log10(1e3 * abs(RESPONSE)), DEGREES), "m/N"),
+        (["f [Hz]", "Mag [dB re 1e-6 m/N]", "phase [deg]"], (20 * np.log10(1e6 * abs(RESPONSE)), DEGREES), "m/N"),
+        (["f [Hz]", "Re [(m/s^2)/N]", "Im [(m/s^2)/N]"], (ACCELERANCE.real, ACCELERANCE.imag), "m/N"),
+        (["f [Hz]", "Re [mm/s/N]", "Im [mm/s/N]"], (MOBILITY.real * 1e3, MOBILITY.imag * 1e3), "m/N"),
     ],
 )
 def test_frequency_responses_as_text(

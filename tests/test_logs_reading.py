@@ -22,7 +22,7 @@ from friso.identification.logs.log import ROLES, Log
 from friso.identification.logs.mapping import Mapping, from_options
 from friso.identification.logs.roles import role_of
 from friso.identification.logs.time_base import resample_tracks, track
-from friso.identification.logs.units import in_si, read_scale, spelled, split_heading
+from friso.identification.logs.units import in_si, read_scale, spelled, split_heading, unit_factor
 from friso.identification.output_error.problem import loop_problem
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
@@ -97,7 +97,9 @@ def test_roles_by_name(name: str, role: str | None) -> None:
     [
         ("v_ist", "mm/s", "velocity"), ("vIst", "m/s", "velocity"), ("F_ist", "N", "force"), ("i_act", "A", "force"),
         ("a_ist", "m/s^2", "acceleration"), ("M_ist", "N m", "force"), ("v_ist", "mm", None), ("v_ist", "", None),
-        ("A_act", "mm", None), ("v_soll", "mm/s", None),
+        ("A_act", "mm", None), ("v_soll", "mm/s", None), ("n_ist", "rpm", "velocity"), ("n_soll", "rpm", None),
+        ("ref", "N", None), ("6077h Torque actual value(0.1%)", "", "force"), ("APOS(0)", "", "position"),
+        ("Position PE", "mm", None), ("field.effort0", "", "force"), ("header.stamp.nsecs", "", None),
     ],
 )  # fmt: skip
 def test_a_symbol_is_told_by_its_unit(name: str, unit: str, role: str | None) -> None:
@@ -299,11 +301,22 @@ def test_wrong_scales(text: str, unit: str, refused: Refused) -> None:
         ("msec", "s", 1e-3),
         ("rpm", "m/s", np.pi / 30),
         ("°", "m", np.pi / 180),
+        ("Grad", "m", np.pi / 180),
+        ("U/min", "m/s", np.pi / 30),
+        ("1/min", "m/s", np.pi / 30),
+        ("mNm", "N", 1e-3),
+        ("N-m", "N", 1),
+        ("Arms", "N", 1),
     ],
 )
 def test_unit_spellings(text: str, si: str, factor: float) -> None:
     assert in_si(text, si)[0] == pytest.approx(factor)
     assert spelled(spelled(text)) == spelled(text)
+
+
+@pytest.mark.parametrize("text", ["Mm", "Ms", "Grads", "Gm"])
+def test_nothing_is_in_megametres(text: str) -> None:
+    assert unit_factor(text, "m") is unit_factor(text, "s") is unit_factor(text, "rad") is None
 
 
 def test_headings() -> None:

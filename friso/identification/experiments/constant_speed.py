@@ -60,9 +60,11 @@ def _partial(log: Log) -> bool:
 
 
 def _claims_together(courses: Sequence[Course]) -> str | None:
-    """Constant speeds, most of the way of each log, and enough of them for a curve of friction over speed."""
+    """Constant speeds, most of the way of each log, and enough of them for a curve of friction over speed. At the
+    slowest speeds a body may stick and slip: a log that goes one way is one of theirs all the same."""
     speeds = [course.speeds for course in courses]
-    count = distinct(np.concatenate(speeds)) if all(map(len, speeds)) else 0
+    fitting = all(len(of_one) or course.one_way for of_one, course in zip(speeds, courses, strict=True))
+    count = distinct(np.concatenate(speeds)) if fitting and any(map(len, speeds)) else 0
     return f"most of the way goes at one of {count} constant speeds" if count >= STRAIGHT else None
 
 

@@ -76,6 +76,12 @@ def constant(name: str, values: np.ndarray) -> bool:
     return bool(np.ptp(values) == 0)
 
 
+def rises_evenly(values: np.ndarray) -> bool:
+    """Whether values rise as those of a clock do, and no measured motion does."""
+    steps = np.diff(values)
+    return bool(values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0))
+
+
 def clipped_share(values: np.ndarray) -> float:
     """Share of the samples in flat tops at the extremes, of at least 3 equal samples, that show that the signal is
     clipped: it enters them with a kink, the step before being at least a fifth of the largest step, or it hardly ever

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -9,10 +10,19 @@ import numpy as np
 from friso.axis import FORCE, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.checks import samples_held
+from friso.identification.logs.checks import rises_evenly, samples_held
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import option
-from friso.identification.logs.roles import MEASURED, AssignedRole, Proposal, is_wanted, listing, role_of, words
+from friso.identification.logs.roles import (
+    MEASURED,
+    AssignedRole,
+    Proposal,
+    is_wanted,
+    listing,
+    of_no_signal,
+    role_of,
+    words,
+)
 from friso.identification.logs.signals import TURNS, Notes, Reading, instants, no_time, unit_gap
 from friso.identification.logs.units import OTHERS, in_si, unit_factor
 from friso.quantities import quoted
@@ -77,7 +87,7 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
         if role in needed and likely:
             chosen[role] = AssignedRole(role, likely, "", True)
     for role in [role for role in needed if role not in chosen and role not in proposal.rivals]:
-        taken = [choice.channel for choice in (*proposal.chosen.values(), *chosen.values())]
+        taken = {name: choice.channel for name, choice in (proposal.chosen | chosen).items()}
         likely, why = _likeliest(role, table, taken)
         example = option("--map", role, likely.name) if likely else ""
         gaps.append(LogError(role, f"no channel whose name suggests it{why}", listing(table), example, origin))
@@ -107,20 +117,45 @@ def _of_units(units: Mapping[str, LogError | None], chosen: Mapping[str, Assigne
     return list(gaps.values())
 
 
-def _likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> tuple[Channel | None, str]:
+def _likeliest(role: str, table: ChannelTable, taken: Mapping[str, Channel]) -> tuple[Channel | None, str]:
     """The channel that fits a role best by unit and first letter, of those that change and have no other role, and why
-    where it is one of several alike; None without any."""
-    used = {id(channel) for channel in taken}
-    free = [
-        channel
-        for channel in table.channels
-        if id(channel) not in used and (role_of(channel.name) or ("",))[0] in ("", role)
-    ]
-    fits = [(channel, _fit(role, channel)) for channel in free]
+    where it is one of several alike; None without any. No force follows the position, as a reference does."""
+    fits = _fitting(role, table, taken.values())
+    if role == "force":
+        places = [taken[name] for name in ("position", "reference") if name in taken]
+        places = places or [place for place, _ in _fitting("position", table, taken.values())[:1]]
+        fits = [(channel, fit) for channel, fit in fits if not any(_are_alike(channel, place) for place in places)]
     if not fits:
         return None, ""
-    best, fit = max(fits, key=lambda pair: pair[1])
-    return _of_alike(role, best, [channel for channel, other in fits if other[:3] == fit[:3]])
+    best, fit = fits[0]
+    return _of_alike(role, best, [channel for channel, other in fits if other[:4] == fit[:4]])
+
+
+def _fitting(role: str, table: ChannelTable, taken: Iterable[Channel]) -> list[tuple[Channel, tuple[int, ...]]]:
+    """The channels that may have a role, and how well they fit it, the best first: of as many samples as most have, and
+    by what they are."""
+    used = {id(channel) for channel in taken}
+    usual = Counter(channel.values.size for channel in table.channels).most_common(1)[0][0]
+    fits = [
+        (channel, (channel.values.size == usual, *_fit(role, channel)))
+        for channel in table.channels
+        if id(channel) not in used
+        and (role_of(channel.name, channel.unit) or ("",))[0] in ("", role)
+        and not of_no_signal(channel.name)
+        and not _is_of_another(role, channel.unit)
+    ]
+    return sorted(fits, key=lambda pair: pair[1], reverse=True)
+
+
+def _kinds(role: str) -> tuple[str, ...]:
+    """The units in which a role may stand, those of a rotary axis among them."""
+    return ROLES[role], *OTHERS.get(ROLES[role], ())
+
+
+def _is_of_another(role: str, unit: str) -> bool:
+    """Whether a unit is that of another quantity than the role's, which no scale makes one: rpm of a position."""
+    others = {"Hz", *ROLES.values(), *map(ROTARY.unit, ROLES.values())} - {*_kinds(role)}
+    return bool(unit) and any(unit_factor(unit, kind) is not None for kind in others)
 
 
 def _of_alike(role: str, best: Channel, channels: Sequence[Channel]) -> tuple[Channel | None, str]:
@@ -164,17 +199,11 @@ def _fit(role: str, channel: Channel) -> tuple[bool, int, bool, bool]:
     """How well a channel fits a role: whether it changes, and not as a clock does; its unit, whether it is what was
     wanted, its first letter."""
     finite = channel.values[np.isfinite(channel.values)]
-    changes = bool(finite.size and np.ptp(finite) > 0) and not _like_a_clock(finite)
-    kinds = (ROLES[role], *OTHERS.get(ROLES[role], ()))  # those of a rotary axis among them
-    unit = 1 if not channel.unit else 2 if any(unit_factor(channel.unit, kind) is not None for kind in kinds) else 0
+    changes = bool(finite.size and np.ptp(finite) > 0) and not rises_evenly(finite)
+    fits = bool(channel.unit) and any(unit_factor(channel.unit, kind) is not None for kind in _kinds(role))
+    unit = 2 if fits else 1 if not channel.unit else 0
     first = next(iter(words(channel.name)), " ")[0]
     return changes, unit, is_wanted(channel.name) == (role == "reference"), first in _INITIALS.get(role, "")
-
-
-def _like_a_clock(values: np.ndarray) -> bool:
-    """Whether values rise evenly, as no measured motion does."""
-    steps = np.diff(values)
-    return values.size > 2 and steps[0] > 0 and np.allclose(steps, steps[0], rtol=1e-3, atol=0)
 
 
 def _of_time(reading: Reading, proposal: Proposal, choices: Sequence[AssignedRole]) -> list[LogError]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,8 @@ import numpy as np
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.roles import words
-from friso.identification.logs.units import spelled, unit_factor
+from friso.identification.logs.sniff import NUMBER
+from friso.identification.logs.units import of_decibels, spelled, unit_factor
 from friso.quantities import Quantity, any_sign
 
 _KEYS = {
@@ -40,7 +42,7 @@ class MeasuredResponse:
 
 def column_kind(name: str) -> str | None:
     """What a heading says that its column is; None for nothing of a response."""
-    parts = set(words(name))
+    parts = set(words(re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name)))
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
     return next((kind for kind in order if parts & _KEYS[kind]), None)
 
@@ -98,10 +100,14 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
     if turn is None:
         raise LogError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
     angle = np.exp(1j * turn * phase.values)
-    unit = spelled(magnitude.unit)
-    if unit.lower().startswith("db") or "db" in words(magnitude.name):
+    unit = of_decibels(spelled(magnitude.unit))
+    if unit is not None or re.search(r"(?<![A-Za-z])dB(?![A-Za-z])", magnitude.name, re.IGNORECASE):
+        reference = re.fullmatch(rf"(?P<number>{NUMBER})?\s*(?P<unit>.*)", unit or "")
+        scale, si, _ = response_unit(reference["unit"] if reference else "")
+        scale *= float((reference and reference["number"]) or 1)
+        in_words = f"magnitude in {magnitude.unit or 'dB'}, phase in {phase.unit}"
         with np.errstate(over="ignore"):
-            return 10 ** (magnitude.values / 20) * angle, 1.0, "", f"magnitude in dB, phase in {phase.unit}"
+            return 10 ** (magnitude.values / 20) * angle, scale, si, in_words
     scale, si, unit_in_words = response_unit(magnitude.unit)
     return magnitude.values * angle, scale, si, f"magnitude {unit_in_words}, phase in {phase.unit}"
 
@@ -130,8 +136,20 @@ def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
         if values is not None and not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0]) + 1
             raise LogError(name, f"no number in row {row}", "finite numbers in every row", "", str(path))
+    measured = _of_position(measured)
     falling = np.flatnonzero(np.diff(frequency) <= 0)
     if falling.size:
         actual = f"{frequency[falling[0] + 1]:g} Hz after {frequency[falling[0]]:g} Hz"
         raise LogError("frequency", actual, "rising frequencies", "", str(path))
     return measured
+
+
+def _of_position(measured: MeasuredResponse) -> MeasuredResponse:
+    """The response of the position, where that of the velocity or of the acceleration was measured."""
+    rate = re.fullmatch(r"(?P<place>m|rad)/s(?P<twice>\^2)?/(?P<force>.+)", measured.unit)
+    if rate is None:
+        return measured
+    times, name = (2, "acceleration") if rate["twice"] else (1, "velocity")
+    response = measured.response / (2j * np.pi * measured.frequency) ** times
+    read = (*measured.read, f"the response is that of the {name}; that of the position follows by integration")
+    return replace(measured, response=response, unit=f"{rate['place']}/{rate['force']}", read=read)

@@ -14,7 +14,7 @@ RATES = frozenset(
 )  # fmt: skip
 STEPS = frozenset(
     {"dt", "ts", "tsample", "sampletime", "samplingtime", "sampleinterval", "samplinginterval", "sampleperiod",
-     "samplingperiod", "interval", "timestep", "timeincrement", "deltat", "abtastzeit", "abtastintervall"}
+     "samplingperiod", "interval", "timestep", "timeincrement", "increment", "deltat", "abtastzeit", "abtastintervall"}
 )  # fmt: skip
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
 _BEFORE, _BEHIND = ' \t\f\v#%*/"', ' \t\f\v;,"'
@@ -25,6 +25,7 @@ LONGEST = 100
 """Characters of a value at most that is looked at: an amount with its unit is shorter."""
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
+_OF_UNITS = re.compile(r"(?:vertical |y )?units?|einheit(?:en)?", re.IGNORECASE)
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
 
 
@@ -43,6 +44,7 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
     """What the lines above a table with columns of these names tell. Intervals that contradict each other are none."""
     lines = [line for line in lines if line.strip()]
     pairs = {line.strip(): pair for line in lines if (pair := _pair(line))}
+    pairs |= {f"{name} {value}": (name, value) for name, value in _below_names(lines[-2:], delimiter)}
     units = _row_of_units(lines, names, delimiter) or _units_by_name(pairs.values(), names)
     read = [f"units from the lines above the table: {', '.join(units.values())}"] if units else []
     intervals, scalars = {}, {}
@@ -64,6 +66,14 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
         line, interval = next(iter(intervals.items()))
         return Preamble(interval, scalars, units, (*read, f"sample time {interval:g} s, from the line {line!r}"))
     return Preamble(None, scalars, units, tuple(read))
+
+
+def _below_names(lines: Sequence[str], delimiter: str) -> list[tuple[str, str]]:
+    """Names and the numbers below them in the two rows above a table, which scopes write beside names and units."""
+    if len(lines) < 2:
+        return []
+    names, values = ([cell.strip() for cell in line.split(delimiter)] for line in lines)
+    return [(name, value) for name, value in zip(names, values, strict=False) if name and _AMOUNT.fullmatch(value)]
 
 
 def _pair(line: str) -> tuple[str, str] | None:
@@ -90,14 +100,22 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
     """The units of columns where a line lists them, with or without a word for units in front."""
     for line in lines:
         key, value = _pair(line) or ("", "")
-        listed = key.lower() in ("unit", "units", "einheit", "einheiten")
+        listed = _OF_UNITS.fullmatch(key) is not None
         cells = re.split(r"[;,\t]|\s+", value) if listed else line.lstrip("#% ").split(delimiter)
         cells = [cell for cell in cells if cell] if listed and len(cells) != len(names) else cells
+        if listed and len(cells) == len(names) - 1:  # those of the columns beside the first, as scopes write them
+            cells = [_horizontal(lines), *cells]
         units = [cell.strip(' []()"') for cell in cells]
         stated = [unit for unit in units if unit and unit != "-"]
         if len(units) == len(names) and stated and all(is_unit(unit) for unit in stated):
             return {name: unit for name, unit in zip(names, units, strict=True) if unit and unit != "-"}
     return {}
+
+
+def _horizontal(lines: Iterable[str]) -> str:
+    """The unit of the first column of a scope's table, where a line tells it."""
+    pairs = [pair for line in lines if (pair := _pair(line))]
+    return next((value.split(",")[0] for key, value in pairs if key.lower() in ("horizontal units", "x units")), "")
 
 
 def _units_by_name(pairs: Iterable[tuple[str, str]], names: Sequence[str]) -> dict[str, str]:

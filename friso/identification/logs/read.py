@@ -14,6 +14,19 @@ from friso.system import cause_of, once_free
 MOST_BYTES = 2 << 30
 """Largest file that is read, 2 GiB: all its channels are held in memory at once, about as large again."""
 
+_SAVED = "the same saved as one of the formats that friso reads"
+_OTHERS = {
+    b"PK\x03\x04": ("a ZIP archive, as a workbook of Excel (.xlsx) and NumPy's .npz are, too", _SAVED),
+    b"\xd0\xcf\x11\xe0": ("a workbook of an old Excel (.xls) or another compound document", _SAVED),
+    b"\x1f\x8b": ("a file packed by gzip", "the file that is unpacked from it"),
+    b"\x93NUMPY": ("an array of NumPy (.npy)", _SAVED),
+    b"PAR1": ("a table in Parquet", _SAVED),
+    b"MDF ": ("a measurement in ASAM MDF (.mf4, .dat)", _SAVED),
+    b"#ROSBAG": ("a bag of ROS", "one of its topics saved as CSV"),
+    b"SQLite format 3": ("a data base of SQLite, as a bag of ROS 2 is", "one of its topics saved as CSV"),
+}
+"""What files of other kinds begin with, what they are, and what is wanted instead."""
+
 
 def file_format(path: Path) -> str:
     """The format of a file by its content, a name of `FORMATS`.
@@ -42,6 +55,9 @@ def file_format(path: Path) -> str:
         if FORMATS[name].recognise(head):
             return name
     titles = ", ".join(FORMATS[name].title for name in FORMATS)
+    for mark, (what, remedy) in _OTHERS.items():
+        if head.start.startswith(mark):
+            raise LogError("log", what, f"{remedy} ({titles})", "", str(path))
     raise LogError("log", f"{size} bytes that are neither text nor a known format", titles, "", str(path))
 
 

@@ -8,6 +8,8 @@ from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.units import split_heading, unit_factor, without_accents
@@ -21,8 +23,9 @@ _SET = frozenset(
     ]
 )  # fmt: skip
 _NOT_MEASURED = frozenset(
-    ["err", "error", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable"]
-)
+    ["err", "error", "pe", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable",
+     "seq", "sequence", "index", "sample", "samples", "secs", "nsecs", "nanosec"]
+)  # fmt: skip
 _CART = frozenset(["cart", "carriage", "slider"])
 _RELATIVE = frozenset(["rel", "relative"])
 _KEYS = {
@@ -41,6 +44,7 @@ _KEYS = {
             "tiempo",
             "hora",
             "tijd",
+            "stamp",
         ]
     ),
     "position": frozenset(
@@ -48,6 +52,8 @@ _KEYS = {
             "pos",
             "position",
             "lage",
+            "positie",
+            "theta",
             "enc",
             "encoder",
             "displacement",
@@ -68,6 +74,9 @@ _KEYS = {
             "speed",
             "geschw",
             "geschwindigkeit",
+            "drehzahl",
+            "rpm",
+            "snelheid",
             "vitesse",
             "velocidad",
             "velocidade",
@@ -88,6 +97,10 @@ _KEYS = {
             "fuerza",
             "forca",
             "coppia",
+            "effort",
+            "thrust",
+            "kracht",
+            "koppel",
         ]
     ),
     "disturbance": frozenset(["disturbance", "injected", "injection"]),
@@ -102,7 +115,7 @@ _OTHERS_WANTED = frozenset(
 )
 """Words of something else that may be wanted than a position, where no word of a position stands beside them."""
 
-_LETTERS = frozenset("vfi")
+_LETTERS = frozenset("vfinw")
 """Symbols of what may be wanted and is no position, directly before the word of what is wanted: v_soll."""
 
 MEASURED = frozenset(
@@ -110,11 +123,16 @@ MEASURED = frozenset(
 )
 """Words of what is, and was measured."""
 
-_TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A")}
+_TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A"), "velocity": ("m/s", "rad/s")}
 """Units that tell a role where a single channel without one has them."""
+
+_NEVER_WANTED = ("m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N*m", "A")
+"""Units in which what was wanted is no position."""
 
 _SYMBOLS = {
     "v": ("velocity", ("m/s", "rad/s")),
+    "n": ("velocity", ("rad/s",)),
+    "w": ("velocity", ("rad/s",)),
     "a": ("acceleration", ("m/s^2", "rad/s^2")),
     "f": ("force", ("N",)),
     "m": ("force", ("N*m",)),
@@ -143,8 +161,9 @@ class AssignedRole:
 
 def words(name: str) -> list[str]:
     """Lower-case words of the last part of a dotted name, without accents: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
-    last = without_accents(name).rstrip(". ").rsplit(".", 1)[-1]
-    last = re.sub(r"([a-z])([A-Z])", r"\1 \2", last)
+    plain = re.sub(r"\([^()]*\d\.\d[^()]*\)$", "", without_accents(name))  # (0.1 %) is a resolution
+    last = plain.rstrip(". ").rsplit(".", 1)[-1]
+    last = re.sub(r"([a-z])([A-Z])|\b([ACFR])(POS|VEL)\b", r"\1\3 \2\4", last)
     parts = [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
     return [word for part in parts for word in _compound(part)]
 
@@ -169,6 +188,7 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
     wanted = next((part for part in parts if part in _SET), "d" if key["position"] and parts[-1] == "d" else "")
     if wanted:
         others = key["velocity"] or key["acceleration"] or key["force"] or key["disturbance"]
+        others = others or _has_unit_of(unit, _NEVER_WANTED)
         others = others or (not key["position"] and (name_words & _OTHERS_WANTED or _is_symbol(parts, unit)))
         return None if others else ("reference", wanted)
     if key["position"] or "actpos" in name_words:
@@ -184,12 +204,17 @@ def _of_symbol(parts: Sequence[str], unit: str) -> tuple[str, str] | None:
     if len(parts) != 2 or parts[0] not in _SYMBOLS or parts[1] not in MEASURED or not unit:
         return None
     role, units = _SYMBOLS[parts[0]]
-    return (role, parts[0]) if any(unit_factor(unit, own) is not None for own in units) else None
+    return (role, parts[0]) if _has_unit_of(unit, units) else None
+
+
+def _has_unit_of(unit: str, kinds: Sequence[str]) -> bool:
+    """Whether a unit is one of these kinds."""
+    return bool(unit) and any(unit_factor(unit, kind) is not None for kind in kinds)
 
 
 def _is_symbol(parts: Sequence[str], unit: str) -> bool:
     """Whether a name is the symbol of what is no position and the word of what is wanted: v_soll."""
-    of_position = bool(unit) and any(unit_factor(unit, own) is not None for own in _TOLD_BY_UNIT["position"])
+    of_position = _has_unit_of(unit, _TOLD_BY_UNIT["position"])
     return len(parts) > 1 and parts[0] in _LETTERS and parts[1] in _SET and not of_position
 
 
@@ -260,6 +285,10 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
         else:
             channel, word = matches[0]
             chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
+    if not ({"time"} & {*chosen, *rivals} or _own_times(table)):
+        clocks = [channel for channel in table.channels if is_clock(channel) and id(channel) not in by_user]
+        if len(clocks) == 1:
+            chosen["time"] = AssignedRole("time", clocks[0], f"the only channel in {clocks[0].unit} that rises", False)
     integrated = {"position"} if "velocity" in assigned else set()
     for role in _TOLD_BY_UNIT.keys() - {*chosen, *rivals, *integrated}:
         channel = _only_one(role, table, [choice.channel for choice in chosen.values()])
@@ -275,12 +304,21 @@ def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Chann
         channel
         for channel in table.channels
         if id(channel) not in used
-        and channel.unit
         and role_of(channel.name) is None
         and not {*words(channel.name)} & (_SET | _NOT_MEASURED)
-        and any(unit_factor(channel.unit, unit) is not None for unit in _TOLD_BY_UNIT[role])
+        and _has_unit_of(channel.unit, _TOLD_BY_UNIT[role])
     ]
     return fits[0] if len(fits) == 1 else None
+
+
+def is_clock(channel: Channel) -> bool:
+    """Whether a channel is in a unit of time and always rises."""
+    return _has_unit_of(channel.unit, ("s",)) and channel.values.size > 1 and bool((np.diff(channel.values) > 0).all())
+
+
+def of_no_signal(name: str) -> bool:
+    """Whether a name says that a channel is an error, a limit, a counter or the like."""
+    return bool({*words(name)} & _NOT_MEASURED)
 
 
 def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:

@@ -11,11 +11,11 @@ import numpy as np
 from friso.axis import LENGTH, ROTARY
 from friso.errors import InputError, LogError
 from friso.identification.logs.channel import Channel, ChannelTable
-from friso.identification.logs.checks import unwrapped
+from friso.identification.logs.checks import rises_evenly, unwrapped
 from friso.identification.logs.log import ROLES
 from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.preamble import RATES, STEPS
-from friso.identification.logs.roles import AssignedRole, find, words
+from friso.identification.logs.roles import AssignedRole, find, is_clock, words
 from friso.identification.logs.text import with_times
 from friso.identification.logs.units import FOREIGN, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
@@ -157,7 +157,7 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
             example = f'--scale {role}="NUMBER {scale}"' if electric else example
         return LogError(role, actual, expected, example, reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "5e-7" if si == "count" else "1.5"
-    scale = f"{wanted}/{si}"
+    scale = f"{wanted}/({si})" if "/" in si else f"{wanted}/{si}"
     expected = f'a scale to {wanted}, such as --scale {role}="{number} {scale}"'
     example = f'--scale {role}="NUMBER {scale}"'  # nobody should copy one that is made up
     if si == ROTARY.unit(wanted) and LENGTH in ROLES[role]:
@@ -212,7 +212,7 @@ def _likely_unit(clock: Channel) -> str:
     """The unit in which the steps of a time are like those of a log, between 0.1 ms and 100 ms."""
     steps = np.diff(clock.values)
     step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
-    return "s" if step <= 0.1 else "ms" if step <= 100 else "us"
+    return "s" if step <= 0.1 else "ms" if step <= 100 else "us" if step <= 1e5 else "ns"
 
 
 def no_time(channel: Channel, reading: Reading) -> LogError:
@@ -220,15 +220,17 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
     offers = _offers(reading.table)
     expected = "; or ".join(text for text in ("a time channel or a sample time", offers) if text)
     offer = re.match(r'--dt "[^"]*"', offers)
-    clock = next((other for other in reading.table.channels if other is not channel and _is_clock(other)), None)
-    example = offer[0] if offer else '--dt "1 ms"' if clock is None else option("--map", "time", clock.name)
+    clocks = [other for other in reading.table.channels if other is not channel and _may_be_a_clock(other)]
+    example = offer[0] if offer else option("--map", "time", clocks[0].name) if clocks else '--dt "NUMBER ms"'
     return LogError("time", f"no time stamps for {quoted(channel.name)}", expected, example, reading.origin)
 
 
-def _is_clock(channel: Channel) -> bool:
-    """Whether a channel is in a unit of time and always rises."""
-    of_time = bool(channel.unit) and unit_factor(channel.unit, "s") is not None
-    return of_time and channel.values.size > 1 and bool((np.diff(channel.values) > 0).all())
+def _may_be_a_clock(channel: Channel) -> bool:
+    """Whether a channel is in a unit of time and rises, or in none and rises evenly, and not as a counter by 1."""
+    if is_clock(channel):
+        return True
+    steps = np.diff(channel.values)
+    return not channel.unit and rises_evenly(channel.values) and not np.isclose(steps[0], 1, rtol=1e-6, atol=0)
 
 
 def _offers(table: ChannelTable) -> str:

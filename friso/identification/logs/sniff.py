@@ -22,13 +22,16 @@ MOST_COLUMNS = 10_000
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
 """Delimiter and decimal sign; of two that fit equally well the first is taken."""
-_DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
-_NUMBER = re.compile(rf"[+-]?{_DIGITS}|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
-_CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
+_NUMBER = re.compile(rf"[+-]?{NUMBER}|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
+CLOCK = r"(\d{1,2}):(\d{2})(?::(\d{2})(?:[.,:](\d+))?)?(?: ?([AaPp])\.?[Mm]\.?)?"
+"""A time of day: hours, minutes, seconds, their fraction, and the half of the day."""
+_DATE = r"(?:\d{4}[-/.]\d{1,2}[-/.]\d{1,2}|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d{2}))"
 DOS_END = "\x1a"
 """Ctrl-Z, with which programs of DOS end a text."""
-STAMP = re.compile(rf"(?:\d{{4}}-\d{{2}}-\d{{2}}(?:[T ]{_CLOCK}(?:Z|[+-]\d{{2}}:?\d{{2}})?)?|{_CLOCK})")
-"""A date and time as in ISO 8601, or a time of day."""
+ISO = re.compile(r"\d{4}-\d{2}-\d{2}(?:[T ]\d{2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?)?")
+STAMP = re.compile(rf"(?:{ISO.pattern}|(?:{_DATE}[T ]+)?{CLOCK})")
+"""A date and time as in ISO 8601, or a time of day, behind a date or not."""
 
 
 @dataclass(frozen=True)
@@ -118,25 +121,30 @@ def _is_row(cells: list[str], decimal: str, words: bool) -> bool:
     """Whether cells are a row of values: numbers, gaps and time stamps, with `words` also a few words (a state)."""
     numbers = sum(is_number(cell, decimal) for cell in cells)
     rest = [cell for cell in cells if cell and not is_number(cell, decimal)]
-    if words:
-        return numbers >= 2 and len(rest) <= numbers
+    if words:  # none of which is a number with the other sign: 1.234 may be a thousand of something
+        other = "." if decimal == "," else ","
+        return numbers >= 2 and len(rest) <= numbers and not any(is_number(cell, other) for cell in rest)
     return numbers > 0 and len(rest) <= 0.5 * numbers + 1 and all(STAMP.fullmatch(cell) for cell in rest)
 
 
 def layout(path: Path) -> TextLayout:
-    """How a text with one table of numbers is written. Raises LogError where there is none."""
+    """How a text with one table of numbers is written: words stand in its rows only where hardly any row goes without.
+    Raises LogError where there is none."""
     encoding, lines = decoded_head(path)
     lines = lines[:HEAD_LINES]
+    fits = []
     for words in (False, True):
         layouts = [_fit(lines, encoding, *candidate, words) for candidate in _CANDIDATES]
-        fits = [fit for fit in layouts if fit is not None]
-        if fits:
-            best = max(fits, key=lambda fit: fit[0])[1]
-            if best.columns > MOST_COLUMNS:
-                expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
-                raise LogError("log", f"{best.columns} columns", expected, "", str(path))
-            _no_open_quote(lines[: best.first], best.delimiter, path)
-            return best
+        fits += [max((fit for fit in layouts if fit is not None), key=lambda fit: fit[0], default=None)]
+    plain, worded = fits
+    chosen = worded if plain is None or (worded is not None and worded[0][0] > 2 * plain[0][0]) else plain
+    if chosen is not None:
+        best = chosen[1]
+        if best.columns > MOST_COLUMNS:
+            expected = f"at most {MOST_COLUMNS}: one a channel, one row a sample"
+            raise LogError("log", f"{best.columns} columns", expected, "", str(path))
+        _no_open_quote(lines[: best.first], best.delimiter, path)
+        return best
     actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
     expected = "a heading and rows of numbers" + ("; a stage file is for friso check" if path.suffix == ".toml" else "")
     raise LogError("log", actual, expected, "time [s];position [mm];force [N]", str(path))
@@ -186,7 +194,7 @@ def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tup
     if not heads:
         return (), ()
     last = heads[-1]
-    bare = [cell.strip("[]()") for cell in last]
+    bare = ["" if is_number(cell, ".") else cell.strip("[]()") for cell in last]  # single values stand beside a scope's
     cells = [cell for cell in bare if cell and cell != "-"]
     if len(heads) == 2 and cells and sum(is_unit(cell) for cell in cells) >= 0.5 * len(cells):
         return tuple(heads[0]), tuple(bare)

@@ -17,7 +17,7 @@ from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable, unique
 from friso.identification.logs.preamble import preamble
 from friso.identification.logs.roles import role_of
-from friso.identification.logs.sniff import DOS_END, STAMP, TextLayout, layout, split_line
+from friso.identification.logs.sniff import CLOCK, DOS_END, ISO, STAMP, TextLayout, layout, split_line
 from friso.identification.logs.units import unit_factor
 from friso.quantities import quoted
 
@@ -43,7 +43,7 @@ def read_text(path: Path) -> ChannelTable:
         if values is None and not name and cells.isna().all():
             continue  # each row ends with a delimiter
         if values is None:
-            notes += [f"left out: column {i + 1} ({name or 'no name'}), which holds no numbers"]
+            notes += [f"left out: column {i + 1} ({name or 'no name'}), which holds no numbers{_such_as(cells)}"]
         else:
             columns.append(Channel(name or f"column {i + 1}", unit or values[1], values[0], None, f"column {i + 1}"))
     if blanks:
@@ -56,6 +56,13 @@ def read_text(path: Path) -> ChannelTable:
         heading.scalars,
         (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes),
     )
+
+
+def _such_as(cells: Any) -> str:
+    """The first of the texts in a column, where it has digits and may be a number to its reader."""
+    texts = cells.dropna().astype(str).str.strip()
+    first = next(iter(texts[texts != ""]), "")
+    return f", but texts such as {quoted(first[:40])}" if re.search(r"\d", first) else ""
 
 
 def read_frame(path: Path, form: TextLayout) -> Any:
@@ -146,6 +153,7 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
     if texts[present].str.fullmatch(STAMP.pattern).all() and present.any():
         return _stamped(path, texts, present, form), "s"
     texts = texts.where(~texts.str.lower().isin(("true", "false")), texts.str.lower().map({"true": "1", "false": "0"}))
+    texts = _ungrouped(texts, present, form.decimal)
     points = texts.str.replace(",", ".", regex=False) if form.decimal == "," else texts
     values = as_numbers(points.where(present))
     wrong = present.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
@@ -159,6 +167,18 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
     return values, ""
 
 
+def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
+    """Texts without the signs that group thousands, where all are numbers written so and one has a decimal sign too:
+    12.345,67."""
+    group = "." if decimal == "," else ","
+    digits = rf"[+-]?(?:\d{{1,3}}(?:\{group}\d{{3}})*|\d+)"
+    with_both = rf"[+-]?\d{{1,3}}(?:\{group}\d{{3}})+\{decimal}\d+"
+    given = texts[present]
+    if not (given.str.fullmatch(with_both).any() and given.str.fullmatch(rf"{digits}(?:\{decimal}\d*)?").all()):
+        return texts
+    return texts.str.replace(group, "", regex=False)
+
+
 def as_numbers(texts: Any) -> np.ndarray:
     """Texts as floats, NaN for what is no number."""
     numbers: Any = pd.to_numeric(texts, errors="coerce")
@@ -166,22 +186,30 @@ def as_numbers(texts: Any) -> np.ndarray:
 
 
 def _stamped(path: Path, texts: Any, present: Any, form: TextLayout) -> np.ndarray:
-    """Seconds since the first of these time stamps; a time of day that steps back goes on the next day."""
+    """Seconds since the first of these time stamps. Of dates that are not as in ISO 8601, which may be of the day or of
+    the month first, only the time of day counts; one that steps back goes on the next day."""
     texts = texts.str.replace(",", ".", regex=False)
     try:
-        stamps: Any
-        if texts[present].str.match(r"\d{4}-").all():
-            stamps = pd.to_datetime(texts.where(present), format="ISO8601", utc=True)
+        if texts[present].str.fullmatch(ISO.pattern).all():
+            stamps: Any = pd.to_datetime(texts.where(present), format="ISO8601", utc=True)
             seconds = (stamps - stamps[present].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
         else:
-            durations = texts.where(texts.str.count(":") == 2, texts + ":00").where(present)
-            stamps = pd.to_timedelta(durations)
-            seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
+            seconds = _time_of_day(texts.where(present))
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
     except ValueError as error:
         why = re.split(r"\.? You might|\n", str(error))[0]  # then follows what a programmer may do
         raise LogError("log", why, "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)) from None
     return seconds - seconds[int(np.flatnonzero(present)[0])]
+
+
+def _time_of_day(texts: Any) -> np.ndarray:
+    """Seconds since midnight of texts that end with a time of day, NaN where there is none."""
+    parts = texts.str.extract(rf"{CLOCK}$")
+    hours, minutes, seconds = (as_numbers(parts[i].fillna("0").where(parts[0].notna())) for i in range(3))
+    fractions = as_numbers("0." + parts[3].fillna("0"))
+    halves = parts[4].str.lower().to_numpy()
+    hours = np.where(parts[4].notna(), hours % 12, hours) + 12.0 * (halves == "p")
+    return 3600 * hours + 60 * minutes + seconds + fractions
 
 
 def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
@@ -203,17 +231,20 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
 
 def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
     """Each column with the instants of the time column to its left that is as long (a file may have one per channel);
-    where none stands to its left, of the only one there is. A time column is one that says so and has its unit."""
+    where none stands to its left, of the only one there is, which may go on where the column has ended. A time column
+    is one that says so and has its unit."""
     clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name) or ("",))[0] == "time"]
     clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]
     out = []
     for i, column in enumerate(columns):
-        fitting = [clock for clock in clocks if clock[2] is not None and len(clock[1].values) == len(column.values)]
+        size = len(column.values)
+        ended = len(clocks) == 1 and size < len(clocks[0][1].values)
+        fitting = [clock for clock in clocks if clock[2] is not None and (ended or len(clock[1].values) == size)]
         left = [clock for clock in fitting if clock[0] < i] or (fitting if len(fitting) == 1 else [])
         is_clock = any(i == clock[0] for clock in clocks)
         if left and not is_clock:
             _, clock, seconds = left[-1]
-            out.append(replace(column, time=clock.values * (seconds or 1.0)))
+            out.append(replace(column, time=clock.values[:size] * (seconds or 1.0)))
         else:
             out.append(column)
     return tuple(out)

@@ -39,7 +39,6 @@ _SPELLINGS = {
     "usec": "us",
     "usecs": "us",
     "nsec": "ns",
-    "Sec": "s",
     "Nm": "N*m",
     "°": "deg",
     "degs": "deg",
@@ -52,17 +51,36 @@ _SPELLINGS = {
     "Ampere": "A",
     "Newton": "N",
     "hz": "Hz",
+    "khz": "kHz",
     "rev": "turn",
     "revs": "turn",
+    **dict.fromkeys(("Sec", "SEC", "Seconds", "sec.", "S"), "s"),
+    **dict.fromkeys(("MS", "Msec", "Milliseconds"), "ms"),
+    **dict.fromkeys(("MM", "Millimeter"), "mm"),
+    **dict.fromkeys(("Inch", "Inches"), "in"),
+    **dict.fromkeys(("Grad", "grad", "Deg", "DEG", "Degree", "Degrees"), "deg"),
+    **dict.fromkeys(("RPM", "Rpm", "U/min", "r/min", "1/min", "min-1", "min^-1", "min⁻¹"), "rpm"),
+    **dict.fromkeys(("N-m", "N⋅m"), "N*m"),
+    "Nmm": "N*mm",
+    "Ncm": "N*cm",
+    "mNm": "mN*m",
+    "kNm": "kN*m",
+    "oz-in": "ozf*in",
+    "KN": "kN",
+    **dict.fromkeys(("Arms", "Aeff", "A_rms", "A(rms)"), "A"),
 }
+"""How people write units. Grad is the German degree, and neither a gon nor 1e9 rad."""
+_MEGA = 1e5
+"""No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
-    r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
+    r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
 )
 _OVER = re.compile(r"(?P<name>[^/\[(]*?[^/\[(\s])(?:\s*/\s*|\s+in\s+)(?P<unit>\([^()]+\)|[^\s()\[\]]+)")
 """Headings of ISO 80000, a quantity over its unit, and their like in words."""
-_QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\s*/\s*(?P<under>[^\s_/\[(]+)")
+_QUOTIENT = re.compile(r"(?P<name>.*[^\s_](?<!\sin))[\s_]+(?P<over>[^\s_/\[(]+)\s*/\s*(?P<under>[^\s_/\[(\])]+)")
 """Headings whose last part is, or may be, a unit over a unit: "Speed m/s"."""
+_DECIBELS = re.compile(r"dB(?![A-Za-z])(?:\s*(?:rel?\b\.?|ref\b\.?))?\s*[(\[]?([^()\[\]]*)[)\]]?", re.IGNORECASE)
 _RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
 """Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
 _MEASURED_IN = {
@@ -93,7 +111,7 @@ def spelled(text: str) -> str:
         return text
     text = re.sub(r"(?:(?<!\s)\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
-    text = "" if text.lower() in ("none", "-", "n/a") else text
+    text = "" if text.lower() in ("none", "-", "n/a") else _SPELLINGS.get(text, text)
     parts = re.split(r"([*/· ])", text)
     parts = [_SPELLINGS.get(part, part) for part in parts]
     return "".join(re.sub(r"^([A-Za-z]+)([2-4])$", r"\1^\2", part) for part in parts)
@@ -103,15 +121,23 @@ def spelled(text: str) -> str:
 def unit_factor(unit: str, si_unit: str) -> float | None:
     """SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
     try:
-        return Quantity(si_unit, any_sign, "").factor(spelled(unit))
+        factor = Quantity(si_unit, any_sign, "").factor(spelled(unit))
     except InputError:
         return None
+    return None if si_unit in ("m", "s", "rad") and factor > _MEGA else factor
 
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit that a log could have."""
     text = spelled(text)
-    return text.lower() in COUNTS or text in ("dB", "%") or any(unit_factor(text, unit) is not None for unit in _KINDS)
+    is_special = text.lower() in COUNTS or text == "%" or of_decibels(text) is not None
+    return is_special or any(unit_factor(text, unit) is not None for unit in _KINDS)
+
+
+def of_decibels(text: str) -> str | None:
+    """What decibels are of, "" for nothing told: of "dB re 1 m/N" it is "1 m/N"; None for no decibels."""
+    match = _DECIBELS.fullmatch(text)
+    return None if match is None else match[1].strip()
 
 
 _KINDS = (
@@ -181,7 +207,7 @@ def read_scale(role: str, text: str, channel_unit: str, axis: AxisKind = LINEAR)
     """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role on that axis; and
     what was taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises
     LogError."""
-    match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*([^/]+)\s*", text)
+    match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*(\([^()]+\)|[^/]+)\s*", text)
     role_unit = axis.unit(ROLES[role])
     example = f'--scale {role}="35.1507 {role_unit}/V"'
     if match is None:

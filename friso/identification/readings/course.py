@@ -11,7 +11,7 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import runs
-from friso.identification.readings.passes import passes
+from friso.identification.readings.passes import Pass, passes
 from friso.identification.response.period import find_periods
 
 BACK = 0.1
@@ -83,12 +83,26 @@ class Course:
         where the position has no SI unit."""
         part, position = self.log.longest, self.log["position"]
         try:
-            steady = [] if self.reference_moves else [one for one in passes(self.log.per_unit_of_force()) if one.steady]
+            stretches = [] if self.reference_moves else passes(self.log.per_unit_of_force())
         except InputError:
             return np.zeros(0)
+        steady = [stretch for stretch in stretches if stretch.steady and self._slides(stretch)]
         way = float(np.abs(np.diff(uniform_filter1d(position[part], BLUR))).sum())
         gone = sum(float(np.ptp(position[stretch.span])) for stretch in steady)
         return np.array([abs(stretch.velocity) for stretch in steady if gone > MOSTLY * way])
+
+    @property
+    def one_way(self) -> bool:
+        """Whether most of the way goes in one direction, with stops or not."""
+        position = uniform_filter1d(self.log["position"][self.log.longest], BLUR)
+        return bool(np.ptp(position) > MOSTLY * np.abs(np.diff(position)).sum())
+
+    def _slides(self, stretch: Pass) -> bool:
+        """Whether the force changes less over a stretch than it holds the body back: else a spring, as bristles are
+        before they slide, sets the speed at which a force that rises moves it."""
+        force = self.log["force"][stretch.span]
+        half = len(force) // 2
+        return bool(abs(force[half:].mean() - force[:half].mean()) < abs(force.mean()))
 
     @cached_property
     def against_a_spring(self) -> bool:

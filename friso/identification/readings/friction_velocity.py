@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -165,6 +165,11 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
     names = (("friction.coulomb", "N"), ("friction.viscous", "N s/m"))
     coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
+    if coulomb.determined and coulomb.low <= 0:
+        reason = f"a straight line from {low:.3g} to {high:.3g} mm/s ends at rest with none, within its error"
+        nothing, most = _nothing(reason), max(coulomb.high, 0.0)
+        coulomb = Estimate.unknown(coulomb.name, "N", method, reason, 0.0, most)
+        return replace(nothing, coulomb=coulomb, viscous=viscous if most else nothing.viscous)
     if distinct(speeds) < STRAIGHT:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)

@@ -126,8 +126,9 @@ def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel
             _text(curve.get("label")) or _text(curve.get("blockName")).rpartition("/")[2] or source
         )
         columns = values.reshape(time.size, -1).T
+        named = [part.strip() for part in heading.split(",")]  # of signals that come through one line
         for k, column in enumerate(columns):
-            label = heading if len(columns) == 1 else f"{heading}({k + 1})"
+            label = heading if len(columns) == 1 else named[k] if len(named) == len(columns) else f"{heading}({k + 1})"
             out.append(Channel(f"{name}/{label}", unit, column, time, source))
     return out
 
