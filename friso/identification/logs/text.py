@@ -173,8 +173,8 @@ def _ungrouped(texts: Any, present: Any, decimal: str) -> Any:
     group = "." if decimal == "," else ","
     digits = rf"[+-]?(?:\d{{1,3}}(?:\{group}\d{{3}})*|\d+)"
     with_both = rf"[+-]?\d{{1,3}}(?:\{group}\d{{3}})+\{decimal}\d+"
-    given = texts[present]
-    if not (given.str.fullmatch(with_both).any() and given.str.fullmatch(rf"{digits}(?:\{decimal}\d*)?").all()):
+    stated = texts[present]
+    if not (stated.str.fullmatch(with_both).any() and stated.str.fullmatch(rf"{digits}(?:\{decimal}\d*)?").all()):
         return texts
     return texts.str.replace(group, "", regex=False)
 
