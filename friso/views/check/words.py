@@ -52,7 +52,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     if case.verdict not in says and case.solver.done:
         return " ".join([*loop, f"{case.verdict}: {_UNFINISHED}."])
     if case.verdict not in says:
-        return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
+        return " ".join([*loop, f"could not be simulated to the end of its motion ({case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []
     feeds += [f"{_too_much('What feeds it')}."] if FEEDING in case.judgement.given_up else []
     after = _remedy(item, cases) if case.verdict in ATTRACTED else _outlook(case)
