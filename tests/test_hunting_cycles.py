@@ -22,6 +22,7 @@ from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
 from friso.hunting.cycle.return_map import return_map
 from friso.hunting.cycle.shooting import close
 from friso.hunting.margin import margin
+from friso.hunting.verdict import judge_many
 from friso.stage import Stage
 
 RIGID = pytest.mark.xdist_group("rigid")
@@ -470,6 +471,15 @@ def test_stages_that_cannot_hunt(name: str, reason: str) -> None:
     assert reason in result.reason
     assert result.certain
     assert result.returns is None
+
+
+@pytest.mark.parametrize(("integral", "stable"), [(25_000, True), (35_000, False)])
+def test_without_friction_only_a_stable_loop_surely_settles(integral: float, stable: bool) -> None:
+    """A mass m under kp, ki, kd is stable where kd kp > m ki, up to 29 400 here; with the filter to a little less."""
+    stage = VARIANTS["rigid, no friction, PID"].replace({"controller.ki": f"{integral} N/(m*s)"})
+    result = hunting(stage)
+    assert (result.certain, "no friction to stick to" in result.reason) == (stable, stable)
+    assert (judge_many(stage.flat(), 1, 1e-6)[0] == "failed") == (not stable)
 
 
 @RIGID

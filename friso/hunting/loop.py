@@ -70,6 +70,21 @@ def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
     return {state: growth > limit for state, growth in _growths(stages, np.mean).items()}
 
 
+def surely_calm(stages: Ensemble) -> np.ndarray:
+    """Of stages that friction cannot make hunt, which surely keep up no other swing, shape (count,): their loops are
+    stable, nothing opens them or keeps them moving and, where there is no friction, nothing makes them act otherwise
+    near the reference than far from it."""
+    form = stages.structure
+    drive, controller = form.transmission, form.controller
+    settings = controller.settings if controller else NO_SETTINGS
+    rubs = form.friction != "none" or (drive is not None and drive.friction != "none")
+    winds = controller is not None and controller.integral and (settings.reset or settings.deadband)
+    bent = not rubs and (settings.gains or settings.push or settings.dead_zone or winds)
+    if form.plays or settings.dither or bent:
+        return np.zeros(stages.count, bool)
+    return ~np.any(list(unstable_among(stages).values()), axis=0)
+
+
 def _growths(stages: Ensemble, of_directions: Callable[..., np.ndarray]) -> dict[LoopState, np.ndarray]:
     """The fastest growth rates [1/s] in each of these states, shape (count,); NaN where equations are not finite.
     `of_directions` makes one viscous friction out of those of both directions."""

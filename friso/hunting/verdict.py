@@ -29,7 +29,6 @@ from friso.hunting.basin import (
 from friso.hunting.criteria import Verdict, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import (
-    DITHERS,
     REACHED,
     Cycle,
     Hunting,
@@ -39,6 +38,7 @@ from friso.hunting.cycle.hunting import (
     hunting,
     why_not,
 )
+from friso.hunting.loop import surely_calm
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import Motions, followed_motions, resting, run_motions, some_of
@@ -365,8 +365,8 @@ def judge_runs(
     `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
     decided, attracts = motions.completed.copy(), np.zeros(count, bool)
-    if survey is None and why_not(shared_structure(flat)) == DITHERS:
-        decided[:] = False
+    if survey is None and why_not(shared_structure(flat)):
+        decided &= surely_calm(Ensemble.held(flat, count, form=shared_structure(flat)))
     if survey is not None:
         decided &= survey.decided
         attracts = survey.attracts.copy()

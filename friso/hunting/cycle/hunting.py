@@ -20,7 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.loop import LowerGains, at_lower_gains
+from friso.hunting.loop import LowerGains, at_lower_gains, surely_calm
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
 
@@ -61,6 +61,9 @@ REACHED = "a cycle that attracts at another bandwidth could be followed to this 
 
 DITHERS = "dither keeps the stage moving, so no cycle is searched for: only runs show whether it hunts"
 """Why cycles of a stage are not searched that may hunt all the same."""
+
+BY_ITSELF = "its loop is unstable, or not linear even without friction"
+"""The same of a stage that friction cannot make hunt."""
 
 GROWS = "with this force limit and no anti-windup swings may grow without bound: a size is where a run was stopped"
 """The same where what was observed may be such a swing, as the loop is unstable at lower gains."""
@@ -194,8 +197,9 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
-        searched = reason != DITHERS and not structure(stage.flat()).plays  # a backlash may do without an integrator
-        return Hunting((), reason, searched, None)
+        held = Ensemble.held(stage.flat(), 1)
+        calm = bool(surely_calm(held)[0]) and far_beyond_a_limit(held) in (None, "stable")
+        return Hunting((), reason if calm or reason == DITHERS else BY_ITSELF, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)

@@ -133,7 +133,8 @@ def _kick(name: str, kick: Kick, unit: str) -> str:
 def _transient(case: Case) -> str:
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
-        says = f"cannot hunt, because {judgement.hunting.reason}; but this motion has not settled at its end ({end})."
+        cannot = f"cannot hunt, because {judgement.hunting.reason}; but this motion "
+        says = f"{cannot if judgement.hunting.certain else ''}has not settled at its end ({end})."
         return " ".join([says, *_held(case)])
     attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
@@ -168,7 +169,7 @@ def _forces(*forces: float) -> list[str]:
 def _settling(case: Case) -> str:
     hunting = case.judgement.hunting
     says = _settling_sentence(case)
-    return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
+    return says if hunting.possible or not hunting.certain else f"{says} It cannot hunt, because {hunting.reason}."
 
 
 def _stuck(case: Case) -> str:
