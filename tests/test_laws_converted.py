@@ -26,7 +26,6 @@ from friso.stage.lists import element_keys
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import convert, convertible, measure_friction
 from friso.studies.laws.virgin import with_virgin_curve
-from friso.views.convert.figures import conversion_figure
 from friso.views.drawing import matplotlib_renderer
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
@@ -275,7 +274,7 @@ def test_the_command(tmp_path: Path, undrawn: None) -> None:
 
 
 def test_its_figure_can_be_drawn() -> None:
-    figure = conversion_figure(convert(LUGRE, "gms"))
+    (figure,) = friso.convert(LUGRE, friction="gms").figures()
     assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
 
 

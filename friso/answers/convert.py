@@ -12,6 +12,7 @@ from friso.progress import Progress, silent
 
 if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion
+    from friso.views.drawing.figure import Figure
     from friso.views.files import Files
 
 MOST = 12
@@ -44,6 +45,12 @@ class ConvertAnswer(Answer):
         from friso.views.convert.words import COLUMNS, conversion_rows
 
         return [AnswerTable(self.title, COLUMNS, conversion_rows(self.result))]
+
+    def figures(self) -> Sequence[Figure]:
+        """Virgin curves and steady friction, before and after."""
+        from friso.views.convert.figures import conversion_figure
+
+        return [conversion_figure(self.result)]
 
     def document(self) -> dict[str, Any]:
         """The keys, and what is kept."""

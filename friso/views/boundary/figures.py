@@ -87,7 +87,7 @@ def _diagram(traced: Diagram, key: ShownKey) -> Figure:
     panels = (*panels[:2], replace(panels[2], title="A cycle attracts between −1 and 1", limits=(bounds,)))
     styles = "Solid: the cycle attracts, nearby motions end in it. Dashed: it repels."
     note = f"{styles if branches else 'No cycle was found.'} {end_sentence(traced, key)}"
-    return Figure("boundary", "Hunting cycles", note, panels, note=note)
+    return Figure("boundary", "Hunting cycles", "", panels, note=note)
 
 
 def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
@@ -142,7 +142,7 @@ def _plane(traced: Plane) -> Figure:
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
     gaps = lost_places(traced)
     markers = (Markers(gaps[:, 0], gaps[:, 1], LOST, GREY, "cross"),) if len(gaps) else ()
-    return Figure("boundary", "Edge of hunting", note, (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
+    return Figure("boundary", "Edge of hunting", "", (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
