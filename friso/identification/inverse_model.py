@@ -166,7 +166,8 @@ def inverse_model(
     time, columns, force, position, velocity = (rows[slides] for rows in (time, columns, force, position, velocity))
     if len(force) < LEAST:
         actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
-        raise InputError("position", actual, f"at least {LEAST} in motion after decimation", "a longer log")
+        expected = f"at least {LEAST} in motion after decimation: a longer log, or the experiment that it is"
+        raise InputError("position", actual, expected, "--as break-away, for force that rises from rest")
     both = all(directions(log["position"]))
     if not both and not by_direction:
         columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
