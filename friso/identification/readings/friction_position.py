@@ -6,6 +6,7 @@ of the rail, and not the loop's own swinging, shows in that passes over the same
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -215,12 +216,25 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
     return Estimate("repeatability", "1", float(value), float(low), float(high), method)
 
 
+def _spreads(maps: Iterable[PassMap]) -> dict[str, list[float]]:
+    """By how much the force varies [N] in passes at each speed [mm/s], the slowest first."""
+    spreads: dict[str, list[float]] = {}
+    for m in sorted(maps, key=lambda m: abs(m.velocity)):
+        spreads.setdefault(f"{abs(m.velocity) * 1e3:.3g}", []).append(m.spread)
+    return spreads
+
+
+def _from_to(values: list[float]) -> str:
+    """The least and the largest of some values, or one number where they are as good as equal."""
+    return " to ".join(dict.fromkeys((f"{min(values):.2g}", f"{max(values):.2g}")))
+
+
 def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: float | None) -> tuple[bool, str]:
     """Whether the force is the friction of the rail, and why not."""
     reasons = []
     rough = [m for m in maps if not m.steady]
     if rough:
-        speeds = ", ".join(sorted({f"{abs(m.velocity) * 1e3:.3g}" for m in rough}))
+        speeds = ", ".join(_spreads(rough))
         reasons.append(f"the motion at {speeds} mm/s is not steady (it sticks and slips, or oscillates)")
     if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
@@ -233,7 +247,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     if quick:
         fastest = max(m.harmonics[0].frequency for m in quick)
         reasons.append(f"the force oscillates at {fastest:.3g} Hz, too fast for a loop of {crossover:g} Hz to follow")
-    varies = ", ".join(f"{m.spread:.2g} N at {abs(m.velocity) * 1e3:.3g} mm/s" for m in maps)
+    varies = ", ".join(f"{_from_to(spreads)} N at {speed} mm/s" for speed, spreads in _spreads(maps).items())
     if reasons:
         return False, f"Dynamic friction cannot be determined: {'; '.join(reasons)}. The force varies by {varies}."
     return True, (
