@@ -335,6 +335,7 @@ def places(path: str) -> np.ndarray:
         ((0.6, 2.8), ["0.7", "1", "1.5", "2"]),
         ((2.0, 90.0), ["2", "5", "10", "20", "50"]),
         ((4.1, 4.9), ["4.2", "4.8"]),
+        ((7.0, 13.0), ["8", "10", "12"]),
     ],
 )
 def test_a_log_axis_of_less_than_two_decades_has_whole_numbers(

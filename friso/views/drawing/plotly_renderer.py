@@ -274,7 +274,7 @@ def _log_ticks(limits: tuple[float, float] | None) -> dict[str, Any]:
     exponents = range(math.floor(math.log10(limits[0])), math.ceil(math.log10(limits[1])) + 1)
     values = [step * 10.0**exponent for exponent in exponents for step in steps]
     low, high = limits
-    if low < high and sum(low <= value <= high for value in values) < 2:
+    if low < high and sum(low <= value <= high for value in values) < 3:
         unit = 10.0 ** math.floor(math.log10((high - low) / 4))
         step = unit * next((size for size in (5, 2) if size * unit <= (high - low) / 4), 1)
         values = [number * step for number in range(math.ceil(low / step), math.floor(high / step) + 1)]
