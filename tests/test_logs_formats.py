@@ -153,6 +153,14 @@ def test_a_column_of_figures_that_are_no_numbers_is_left_out_with_one_of_them(tm
     assert any('such as "0_a"' in line for line in read_table(tmp_path / "a.csv").read)
 
 
+def test_a_row_of_values_with_a_word_is_no_heading(tmp_path: Path) -> None:
+    rows = "\n".join(
+        f"{'Trigger Point,1.25e+03' if i == 0 else ','},,{1e-3 * i - 1:.9f},{0.1 * i:.5f}," for i in range(80)
+    )
+    (tmp_path / "a.csv").write_text(rows + "\n")
+    assert {item.name for item in read_table(tmp_path / "a.csv").channels} == {"column 4", "column 5"}
+
+
 def test_a_column_that_ends_early_keeps_the_only_clock(tmp_path: Path) -> None:
     rows = "\n".join(f"{1e-3 * i:.3f},{i},{i if i < 90 else 'nan'}" for i in range(100))
     (tmp_path / "a.csv").write_text(f"Time (s),Force (N),Displacement (mm)\n{rows}\n")

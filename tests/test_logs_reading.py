@@ -100,6 +100,7 @@ def test_roles_by_name(name: str, role: str | None) -> None:
         ("A_act", "mm", None), ("v_soll", "mm/s", None), ("n_ist", "rpm", "velocity"), ("n_soll", "rpm", None),
         ("ref", "N", None), ("6077h Torque actual value(0.1%)", "", "force"), ("APOS(0)", "", "position"),
         ("Position PE", "mm", None), ("field.effort0", "", "force"), ("header.stamp.nsecs", "", None),
+        ("T", "N m", None), ("T", "ms", "time"), ("tau", "", "force"), ("dq", "", "velocity"),
     ],
 )  # fmt: skip
 def test_a_symbol_is_told_by_its_unit(name: str, unit: str, role: str | None) -> None:
@@ -215,6 +216,12 @@ def test_a_unit_tells_the_role_of_the_only_channel_that_has_it(tmp_path: Path) -
     with pytest.raises(GapsError) as caught:
         log_of(tmp_path, two, [columns()[0], *2 * [columns()[1]], columns()[3]])
     assert [gap.key for gap in caught.value.gaps] == ["position"]
+
+
+def test_a_torque_is_no_time_whatever_its_letter(tmp_path: Path) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["t [s]", "phi [deg]", "T [Nm]"], [*columns()[:2], columns()[3]])
+    log = read_log(path, from_options(axis="rotary"), needed=("position", "force"))
+    assert log["force"] == pytest.approx(M["force"])
 
 
 def test_no_candidate_lists_the_channels(tmp_path: Path, wording: Wording) -> None:

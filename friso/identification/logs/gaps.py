@@ -69,7 +69,7 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
     """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
     table, origin = reading.table, reading.origin
     named = {id(choice.channel) for role, choice in proposal.chosen.items() if choice.by_user and role != "time"}
-    signals = [c for c in table.channels if id(c) in named or (role_of(c.name) or ("",))[0] != "time"]
+    signals = [c for c in table.channels if id(c) in named or (role_of(c.name, c.unit) or ("",))[0] != "time"]
     if len(signals) < len(needed):
         names = ", ".join(channel.name for channel in signals) or "none"
         missing = [role for role in needed if role not in {*proposal.chosen, *proposal.rivals}] or needed

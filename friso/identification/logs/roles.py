@@ -77,6 +77,8 @@ _KEYS = {
             "drehzahl",
             "rpm",
             "snelheid",
+            "dq",
+            "qdot",
             "vitesse",
             "velocidad",
             "velocidade",
@@ -98,6 +100,7 @@ _KEYS = {
             "forca",
             "coppia",
             "effort",
+            "tau",
             "thrust",
             "kracht",
             "koppel",
@@ -183,7 +186,8 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
         return None
     key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
     key["force"] = key["force"] or next((part for part in parts[:1] if part in _CURRENTS), "")
-    if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
+    of_time = not unit or _has_unit_of(unit, ("s",)) or not _has_unit_of(unit, (*_NEVER_WANTED, "m", "rad"))
+    if key["time"] and of_time and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
         return "time", key["time"]
     wanted = next((part for part in parts if part in _SET), "d" if key["position"] and parts[-1] == "d" else "")
     if wanted:
@@ -304,7 +308,7 @@ def _only_one(role: str, table: ChannelTable, taken: Sequence[Channel]) -> Chann
         channel
         for channel in table.channels
         if id(channel) not in used
-        and role_of(channel.name) is None
+        and role_of(channel.name, channel.unit) is None
         and not {*words(channel.name)} & (_SET | _NOT_MEASURED)
         and _has_unit_of(channel.unit, _TOLD_BY_UNIT[role])
     ]

@@ -198,6 +198,8 @@ def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tup
     cells = [cell for cell in bare if cell and cell != "-"]
     if len(heads) == 2 and cells and sum(is_unit(cell) for cell in cells) >= 0.5 * len(cells):
         return tuple(heads[0]), tuple(bare)
+    if 2 * sum(is_number(cell, ".") for cell in last) >= sum(map(bool, last)):
+        return (), ()  # a row of values with a word among them
     names, units = zip(*(split_heading(cell) for cell in last), strict=True)
     return tuple(names), tuple(units)
 

@@ -233,7 +233,7 @@ def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
     """Each column with the instants of the time column to its left that is as long (a file may have one per channel);
     where none stands to its left, of the only one there is, which may go on where the column has ended. A time column
     is one that says so and has its unit."""
-    clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name) or ("",))[0] == "time"]
+    clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name, c.unit) or ("",))[0] == "time"]
     clocks = [(i, c, unit_factor(c.unit, "s")) for i, c in clocks if c.unit]
     out = []
     for i, column in enumerate(columns):
