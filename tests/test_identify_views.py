@@ -545,7 +545,7 @@ def test_experiments_in_time_are_drawn_with_what_was_found(case: tuple, figures:
 
 def test_the_intervals_are_those_of_the_estimates(case: tuple, figures: list[Figure]) -> None:
     (panel,) = named(figures, "identify_intervals").panels
-    assert panel.y.words == ("Stribeck", "static", "Coulomb", "cart")
+    assert panel.y.words == ("Stribeck v", "static", "Coulomb", "cart")
     shown, lost = panel.markers
     assert shown.x == pytest.approx([100 * 1.96 * 0.05 / COULOMB, 100 * 1.96 * 0.02 / MASS], rel=1e-3)
     assert lost.x[1] == pytest.approx(60)
