@@ -147,6 +147,12 @@ def test_the_only_channel_of_times_that_rises_is_the_clock(tmp_path: Path) -> No
     assert log_content(log_files.write_text(path, names, falling), Mapping()).kind == ""
 
 
+def test_the_command_says_what_was_said(tmp_path: Path) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["q", "x [mm]", "f"], [M["time"], M["position"], M["force"]])
+    content = log_content(path, from_options(["force=f"], ["f=N"], dt="1 ms"))
+    assert next_command(content) == f'friso identify {path} --map force=f --unit f=N --dt "0.001 s"'
+
+
 def test_examples_are_channels_that_may_have_the_role(tmp_path: Path) -> None:
     """No reference for a force, no rpm for a position, no counter for a clock, and no made-up sample time."""
     noise = 1e-6 * np.random.default_rng(1).standard_normal(M["time"].size)

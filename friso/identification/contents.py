@@ -65,8 +65,8 @@ class ChannelContent:
 @dataclass(frozen=True)
 class LogContent:
     """What a file holds: the title of its format, its channels or its frequency response, the kind of experiment with
-    the reason ("" where it is open), lines that tell of the reading, warnings, and the `gaps` that have to be closed
-    before it can be identified."""
+    the reason ("" where it is open), lines that tell of the reading, warnings, the `gaps` that have to be closed
+    before it can be identified, and the `options` with which it was read."""
 
     path: Path
     title: str
@@ -77,6 +77,7 @@ class LogContent:
     read: tuple[str, ...]
     warnings: tuple[str, ...] = ()
     gaps: tuple[LogError, ...] = ()
+    options: tuple[str, ...] = ()
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -104,8 +105,9 @@ def log_content(path: Path, options: Mapping, folder: Path | None = None) -> Log
         source, kind, reason = _recognised(path, mapping)
     except LogError as error:
         gaps = error.gaps if isinstance(error, GapsError) else (error,)
-        return LogContent(path, title, channels, None, "", "", table.read, gaps=gaps)
-    return LogContent(path, title, channels, None, kind, reason, source.read, getattr(source, "warnings", ()))
+        return LogContent(path, title, channels, None, "", "", table.read, gaps=gaps, options=options.options)
+    warnings = getattr(source, "warnings", ())
+    return LogContent(path, title, channels, None, kind, reason, source.read, warnings, options=options.options)
 
 
 def _recognised(path: Path, mapping: Mapping) -> tuple[Source, str, str]:

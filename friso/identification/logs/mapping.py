@@ -88,6 +88,15 @@ class Mapping:
         setup = [f"{key} = {text}" for key, text in self.setup.items()]
         return ", ".join([*time, *roles, *units, *scales, *kinds, *setup])
 
+    @property
+    def options(self) -> tuple[str, ...]:
+        """The options that say it, as a shell takes them, but for the set-up, of which there are none."""
+        pairs = (("--map", self.roles), ("--unit", self.units), ("--scale", self.scales))
+        several = [option(name, left, right) for name, values in pairs for left, right in values.items()]
+        time = None if self.sample_time is None else f"{self.sample_time!r} s"
+        single = (("--dt", time), ("--as", self.experiment), ("--axis", self.axis))
+        return (*several, *(f"{name} {shell_word(text)}" for name, text in single if text is not None))
+
 
 def from_options(
     maps: Iterable[str] = (),

@@ -41,9 +41,9 @@ def open_questions(content: LogContent) -> list[str]:
 
 
 def next_command(content: LogContent) -> str | None:
-    """The command that identifies the file, with the options that are still needed; None where no option tells what the
-    file lacks."""
-    options = dict.fromkeys(gap.example for gap in content.gaps)
+    """The command that identifies the file, with the options given and those still needed; None where no option tells
+    what the file lacks."""
+    options = dict.fromkeys([*content.options, *(gap.example for gap in content.gaps)])
     if "" in options:
         return None
     return " ".join(["friso identify", shell_word(str(content.path)), *options])
