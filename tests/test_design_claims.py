@@ -55,6 +55,13 @@ def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> Non
     assert judged(DIFFER).judgement == "differs"
 
 
+@pytest.mark.parametrize(("below", "holds"), [(14.0, True), (16.0, False)])
+def test_the_parameter_study_against_the_experiment(below: float, holds: bool) -> None:
+    """F25P: 14.3 Hz of the experiment, beside the limit of Fig. 11B at 1.7 kg."""
+    system = made("system", lambda f, m: f < below)
+    assert registered()["F25P"].judge(Evidence({"system": system}, {})).pattern == (holds,)
+
+
 def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
     """At a ratio just below the one found, the margin is too small; from it on, never."""
     from friso.frequency.crossover import settled_margin

@@ -104,8 +104,8 @@ IDENTIFIED = {"F17", "F18", "F19", "F20", "F21"}
 """Claims on the identification of the rig: tried in test_identify_experiments.py."""
 
 
-FURTHER = {"S323", "S341", "S342", "S352", "S41", "F25O", "S5"}
-"""Claims that were found by reading on: tried in test_thesis_arguments.py."""
+FURTHER = {"S323", "S341", "S342", "S352", "S41", "F25O", "F25P", "S5"}
+"""Claims that were found by reading on: tried in test_thesis_arguments.py and test_design_claims.py."""
 
 BUILT = {"F24", "F25", "F26", "F27", "F28"}
 """Claims on the rig as built: tried in test_rig_hunting.py."""
@@ -198,6 +198,20 @@ def test_every_claim_is_in_the_table() -> None:
     for claim, (name, _, text) in zip(listed, printed, strict=True):
         assert (claim.text == text) == (name not in own_words)
     assert all(claim.where and claim.place for claim in claims())
+
+
+def test_the_thesis_is_quoted_word_for_word() -> None:
+    source = ROOT.parent / "shared" / "thesis.txt"
+    if not source.exists():
+        pytest.skip("the text of the thesis is not at hand")
+    text = source.read_text(encoding="utf-8")
+    for formula, plain in (("$", ""), (r"\mu\text{m}", "μm"), (r" \cdot ", "·"), ("^{-4}", "^-4"), (" ,", ",")):
+        text = text.replace(formula, plain)
+    text = " ".join(text.split())
+    for claim in claims():
+        assert claim.quotes
+        for quote in claim.quotes:
+            assert quote in text, claim.id
 
 
 def test_what_simulation_alone_decides_has_a_judge() -> None:

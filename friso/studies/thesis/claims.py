@@ -24,12 +24,14 @@ ClaimJudgement = Literal["holds", "holds in part", "differs", "not yet covered"]
 
 @dataclass(frozen=True)
 class Claim:
-    """One row of the table of claims."""
+    """One row of the table of claims: `text` is the claim in short, as it is judged."""
 
     id: str
     where: str
     text: str
     section: str
+    quotes: tuple[str, ...]
+    """What the thesis says, in its own words."""
     listed: bool = True
     """Whether it is in the list of claims that the project began with; others were found by reading on."""
 
@@ -43,7 +45,7 @@ class Claim:
 def claims() -> tuple[Claim, ...]:
     """All claims of the thesis, in its order."""
     text = files("friso.studies.thesis").joinpath("claims.toml").read_text(encoding="utf-8")
-    return tuple(Claim(**row) for row in tomllib.loads(text)["claim"])
+    return tuple(Claim(**{**row, "quotes": tuple(row["quotes"])}) for row in tomllib.loads(text)["claim"])
 
 
 @dataclass(frozen=True)

@@ -50,9 +50,11 @@ TIGHT = 1e-8
 SHOWN = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
-SURVEY_WORK, PART_WORK = 20_000, 4000
-"""Steps of the progress, of which a run counts one: what attracts the stages of a map; a part of the linear analysis or
-an experiment."""
+PART_WORK = 4000
+"""Steps of the progress, of which a run counts one, for a part of the linear analysis or an experiment."""
+
+LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 2000, 32_000
+"""The same for what attracts the stages of a map: with the joint free each takes some 16 times as long."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def reproduce(
     judged_points = max(points, JUDGED)
     half = -(-judged_points // 2)
     total = len(studies) * (judged_points**2 + half**2) + PART_WORK * len(parts) + work_of(entries, draws)
-    total += with_cycles * SURVEY_WORK * len(studies) + 2 * points**2 * ("isolator-damping" in studies)
+    total += with_cycles * sum(map(_survey_work, studies.values())) + 2 * points**2 * ("isolator-damping" in studies)
     tally = Tally(progress, total)
     tally.add(0, "responses")
     base = evidence(needs - STUDIES.keys(), judged_points, rtol, kept=kept)
@@ -139,9 +141,9 @@ def reproduce(
 
     def behind(study: ThesisStudy) -> tuple[Surveyed, CyclesOnMap]:
         surveyed = survey(maps[study.name], kept)
-        tally.add(SURVEY_WORK // 2, f"what attracts, map {study.panel}")
+        tally.add(_survey_work(study) // 2, f"what attracts, map {study.panel}")
         cycles = map_cycles(study, maps[study.name], surveyed, kept)
-        tally.add(SURVEY_WORK // 2, f"edges of hunting, map {study.panel}")
+        tally.add(_survey_work(study) // 2, f"edges of hunting, map {study.panel}")
         return surveyed, cycles
 
     studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
@@ -162,6 +164,11 @@ def reproduce(
         frozenset(parts) & EXPERIMENTS.keys(), tolerances,
         _changed(tolerances), verdicts, space, cycles, points, judged_points, rtol,
     )  # fmt: skip
+
+
+def _survey_work(study: ThesisStudy) -> int:
+    """Steps of the progress that the survey of a map counts."""
+    return LOCKED_SURVEY_WORK if study.changes.get("joint.locked") else FREE_SURVEY_WORK
 
 
 def _verdict(

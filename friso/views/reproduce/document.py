@@ -76,6 +76,7 @@ def _entry(verdict: ClaimVerdict) -> dict[str, Any]:
         "id": verdict.claim.id,
         "where": verdict.claim.where,
         "claim": verdict.claim.text,
+        "quotes": verdict.claim.quotes,
         "judgement": verdict.judgement,
         "figure": verdict.figure or None,
         "number": numbers(verdict) or None,
