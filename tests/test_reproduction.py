@@ -60,7 +60,7 @@ from friso.studies.thesis.laws import conclusions_by_law
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, sizes, trend, verdict_table
 from friso.studies.thesis.plausible import PARTS, plausible
-from friso.studies.thesis.reading import OTHERWISE, OWN, read_as, reading
+from friso.studies.thesis.reading import OTHERWISE, OWN, others_of, read_as, reading, words_read
 from friso.studies.thesis.reproduce import _changed
 from friso.studies.thesis.space import OPEN, OpenValue, baseline, draw, enters
 from friso.studies.thesis.studies import rig_gains
@@ -476,6 +476,19 @@ def test_every_word_is_read_otherwise() -> None:
         assert (min(values) < own) is (word.name != "none")
         assert max(values) > own
         assert all(replace(other, **{word.name: own}) == OWN for other in others)
+
+
+@pytest.mark.parametrize("claim", ["F5", "F14B", "F16A"])
+def test_only_words_that_a_judge_reads_are_read_otherwise(claim: str) -> None:
+    """Other readings of those that it does not read change nothing of what it finds."""
+    judge, evidence = registered()[claim].judge, Evidence(*HOLDS[claim])
+    with words_read() as words:
+        own = judge(evidence)
+    others = others_of(words)
+    assert (not words) == (not others)
+    for name in OTHERWISE.keys() - others.keys():
+        with read_as(OTHERWISE[name]):
+            assert judge(evidence) == own, name
 
 
 def test_the_long_strokes_are_those_of_the_reading() -> None:

@@ -32,7 +32,7 @@ POINTS = 21
 DRAW_RTOL = 1e-5
 """Relative tolerance of the maps of a draw: ten times tighter than the thesis's own."""
 
-MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 4 * POINTS**2 * len(STUDIES)
+MAP_WORK, COSTLY_WORK = POINTS**2 * len(STUDIES), 6 * POINTS**2 * len(STUDIES)
 """Steps of the progress that the maps of a draw count, and its linear analysis and experiments."""
 
 DOUBT = 0.05

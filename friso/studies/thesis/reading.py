@@ -3,11 +3,12 @@ might be read as well."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from types import MappingProxyType
+from typing import cast
 
 from friso.quantities import percent
 from friso.studies.rig.experiments.measured_cycles import AS_SLOW, SIMILAR
@@ -62,6 +63,25 @@ def read_as(other: WordReading) -> Iterator[None]:
         _READ.reset(before)
 
 
+@contextmanager
+def words_read() -> Iterator[set[str]]:
+    """The words that are read within: what is judged there is the same by any other reading of all others."""
+    noted = _NotedReading(reading())
+    with read_as(cast("WordReading", noted)):
+        yield noted.words
+
+
+class _NotedReading:
+    """A reading that notes which of its words are asked for."""
+
+    def __init__(self, own: WordReading) -> None:
+        self._own, self.words = own, set[str]()
+
+    def __getattr__(self, word: str) -> float:
+        self.words.add(word)
+        return getattr(self._own, word)
+
+
 def _otherwise() -> dict[str, WordReading]:
     factors = {
         "about": ("about", (1.25, 2.0)),
@@ -103,6 +123,15 @@ def _otherwise() -> dict[str, WordReading]:
 
 OTHERWISE: Mapping[str, WordReading] = MappingProxyType(_otherwise())
 """Other readings, as reasonable, by what is read otherwise: each in one word, to either side."""
+
+
+def others_of(words: Set[str]) -> dict[str, WordReading]:
+    """Those that read one of these words otherwise."""
+    return {
+        name: other
+        for name, other in OTHERWISE.items()
+        if any(getattr(other, item.name) != getattr(OWN, item.name) for item in fields(OWN) if item.name in words)
+    }
 
 
 def about(value: float, expected: float, factor: float | None = None) -> bool:

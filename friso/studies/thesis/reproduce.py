@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING
@@ -21,7 +21,7 @@ from friso.studies.thesis.experiments import EXPERIMENTS, Experiments
 from friso.studies.thesis.kept import NOT_KEPT, Kept
 from friso.studies.thesis.linear import NEEDS, Linear
 from friso.studies.thesis.plausible import DRAWS, PARTS, Plausible, plausible, ways_of, work_of
-from friso.studies.thesis.reading import OTHERWISE, read_as
+from friso.studies.thesis.reading import others_of, read_as, words_read
 from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import ClaimVerdict, not_covered, verdict
 from friso.studies.thesis.ways import CYCLE, by_peak_count, by_way, weakest
@@ -50,11 +50,9 @@ TIGHT = 1e-8
 SHOWN = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
 
-PART_WORK = 4000
-"""Steps of the progress, of which a run counts one, for a part of the linear analysis or an experiment."""
-
-LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 2000, 32_000
-"""The same for what attracts the stages of a map: with the joint free each takes some 16 times as long."""
+PART_WORK, LOCKED_SURVEY_WORK, FREE_SURVEY_WORK = 6000, 5000, 65_000
+"""Steps of the progress, of which a run counts one, by the processor time that they take: a part of the linear analysis
+or an experiment; what attracts the stages of a map, with the joint locked and free."""
 
 
 @dataclass(frozen=True)
@@ -149,8 +147,11 @@ def reproduce(
     studied = side_by_side([partial(behind, study) for study in studies.values()] if with_cycles else [])
     surveyed = {name: of_map for name, (of_map, _) in zip(studies, studied, strict=with_cycles)}
     cycles = {name: of_map for name, (_, of_map) in zip(studies, studied, strict=with_cycles)}
-    ways = {name: _ways(entry, base, surveyed) for name, entry in entries.items()}
-    readings = {name: _read_otherwise(entry, base, surveyed) for name, entry in entries.items()}
+    ways, readings = {}, {}
+    for name, entry in entries.items():
+        with words_read() as words:
+            ways[name] = _ways(entry, base, surveyed)
+        readings[name] = _read_otherwise(entry, base, surveyed, words)
     space = plausible(entries, draws, kept, tally)
     others = _others(entries, base, loose)
     verdicts = tuple(_verdict(claim, entries, ways, space, others, readings, chosen) for claim in claims())
@@ -209,10 +210,13 @@ def _ways(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -
     return findings
 
 
-def _read_otherwise(entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed]) -> dict[str, Finding]:
-    """The findings by other readings of the thesis's words, by what is read otherwise."""
+def _read_otherwise(
+    entry: Registered, base: Evidence, surveyed: Mapping[str, Surveyed], words: Set[str]
+) -> dict[str, Finding]:
+    """The findings by other readings of the `words` of the thesis by which the claim is judged, by what is read
+    otherwise."""
     findings = {}
-    for name, other in OTHERWISE.items():
+    for name, other in others_of(words).items():
         with read_as(other):
             findings[name] = weakest(_ways(entry, base, surveyed))
     return findings
