@@ -72,7 +72,7 @@ from friso.views.reproduce.figures import reproduction_figures
 from friso.views.reproduce.page import COLOURS, reproduce_files, reproduce_html
 from friso.views.reproduce.questions import QUESTIONS
 from friso.views.reproduce.summary import summary_sheet
-from friso.views.reproduce.words import SHORT, details, in_order, short
+from friso.views.reproduce.words import SHORT, details, in_order, reasons, short
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
@@ -536,6 +536,25 @@ def test_the_weakest_way_decides() -> None:
     assert together.parts[1].number.startswith(f"by {SWING} not met")  # what fails stands first
     assert all(f"by {way} not met" in together.parts[2].number for way in (COUNT, SWING))
     assert together.parts[2].why.endswith(f"met by {CYCLE}, not by {COUNT} or {SWING}.")
+
+
+def test_reasons_say_to_which_criteria_they_belong() -> None:
+    why = "Friction hardly moves the line. Cables may."
+    parts = (
+        Part("a", False, "1", why),
+        Part("b", True, "2"),
+        Part("c", False, "3", why),
+        Part("d", False, "4", "Other."),
+    )
+    finding = Finding(parts)
+    assert reasons(verdict(claims()[0], "1", {COUNT: finding}, finding)) == [
+        "Criteria 1 and 3: Friction hardly moves the line.",
+        "Criterion 4: Other.",
+    ]
+    alone = Finding(parts[:1])
+    item = verdict(claims()[0], "1", {COUNT: alone}, alone)
+    assert reasons(item) == ["Friction hardly moves the line."]
+    assert ("Reason", why) in details(item)
 
 
 def test_a_self_test_counts_for_nothing() -> None:

@@ -259,6 +259,41 @@ def test_the_least_change_leaves_keys_as_they_are(rigid: Stage) -> None:
     assert least_remedy(rigid, isolated(rigid), Remedy.settled_on("isolator", rigid)) is None
 
 
+@pytest.mark.parametrize(
+    ("less", "sought"),
+    [
+        ({"controller.crossover": "30 Hz", "controller.beta": 1.8}, ["gains", "bandwidth"]),
+        ({"controller.crossover": "30 Hz"}, ["gains"]),
+    ],
+)
+def test_the_least_change_is_sought_among_the_fewest_keys(
+    rigid: Stage, goal: Goal, monkeypatch: pytest.MonkeyPatch, less: dict[str, Any], sought: list[str]
+) -> None:
+    """A bandwidth tuned for speed, ten times the present one, is no least change before a smaller one was sought."""
+    unused: Any = None
+    session = method._Session(rigid, rigid, goal, unused, unused, unused, TINY, unused)
+    faster = {"controller.crossover": "80 Hz"}
+    for name, settings in (("bandwidth", faster), ("gains", {**faster, "controller.beta": 1.5})):
+        session.outcomes.append(working(Remedy.settled_on(name, rigid), rigid.replace(settings)))
+    asked = []
+
+    def tried(of_session: method._Session, outcome: RemedyOutcome) -> bool:
+        asked.append(outcome.remedy.name)
+        tuned = rigid.replace(less)
+        of_session.outcomes.append(working(Remedy.settled_on("less", tuned), tuned))
+        return True
+
+    monkeypatch.setattr(method._Session, "_tries_less_than", tried)
+    session.tries_less()
+    session.tries_less()
+    assert asked == sought
+
+
+def working(remedy: Remedy, tuned: Stage) -> RemedyOutcome:
+    """What became of a remedy that works, without what was measured."""
+    return RemedyOutcome(remedy, tuned, None, None, ())
+
+
 def changed(before: Stage, after: Stage) -> list[str]:
     old, new = before.flat(), after.flat()
     return [key for key in new if key in old and new[key] != old[key]]

@@ -255,19 +255,30 @@ class _Session:
             self.tries(made)
 
     def tries_less(self) -> None:
-        """The least change of the controller as it is, from the remedy of that which works and changes most; where none
-        works, from what changes least of the others. Once."""
+        """The least change of the controller as it is, from the remedy of that which works and changes most, and then,
+        where that which changes least, however far, changes fewer keys still, from that; where none works, from what
+        changes least of the others. Once."""
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
-        ordered = sorted(own or working, key=self._size, reverse=bool(own))
-        for outcome in ordered[: not self.tried_less]:
-            assert outcome.stage is not None
-            less = least_remedy(self.stage, outcome.stage, outcome.remedy)
-            if less is not None:
-                self.tried_less = True
-                search = self._begun(less, MORE * self.budget.machines)
-                seek_least(search)
-                self._ended(search, candidates(search))
+        if not working or self.tried_less:
+            return
+        least, *others = sorted(own or working, key=self._size)
+        most = others[-1] if own and others else least
+        self.tried_less = self._tries_less_than(most)
+        works = [outcome for outcome in self.outcomes if outcome.certainty == "works"]
+        if least is not most and min(works, key=self._size, default=None) is least:
+            self.tried_less |= self._tries_less_than(least)
+
+    def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
+        """The least change of the keys that a remedy which works changes; whether it has such keys."""
+        assert outcome.stage is not None
+        less = least_remedy(self.stage, outcome.stage, outcome.remedy)
+        if less is None:
+            return False
+        search = self._begun(less, MORE * self.budget.machines)
+        seek_least(search)
+        self._ended(search, candidates(search))
+        return True
 
     def interrupted(self) -> None:
         """What is known of the remedy under way: its best point so far, not verified."""

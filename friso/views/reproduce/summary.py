@@ -39,8 +39,8 @@ def summary_sheet(verdicts: Sequence[ClaimVerdict], conclusion: str, colours: Ma
     FigureCanvasPdf(sheet)
     sheet.text(0.05, 0.965, "Reproduction of the thesis of J. A. Fix (Univ. of Twente)", size=12, weight="bold")
     sheet.text(0.05, 0.948, conclusion, size=8)
-    heads = {"id": "claim", "where": "where", "text": "what the thesis says", "word": "agreement", "met": "criteria",
-             "share": "holds in draws"}  # fmt: skip
+    heads = {"id": "claim", "where": "where", "text": "what the thesis claims, in short", "word": "agreement",
+             "met": "criteria", "share": "holds in draws"}  # fmt: skip
     for name, head in heads.items():
         sheet.text(_COLUMNS[name], 0.925, head, size=6.5, weight="bold")
     rows = [(verdict, textwrap.wrap(verdict.claim.text, _LETTERS)) for verdict in words.in_order(verdicts)]

@@ -11,6 +11,7 @@ from friso.quantities import percent
 from friso.studies.thesis.plausible import POINTS
 from friso.studies.thesis.space import OPEN, draw_name
 from friso.studies.thesis.verdicts import ClaimVerdict
+from friso.views.drawing.prefixes import listed
 
 if TYPE_CHECKING:
     from friso.studies.thesis.claims import Part
@@ -72,9 +73,23 @@ def ways(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     return [(way, AGREEMENT[finding.judgement]) for way, finding in verdict.ways.items()]
 
 
-def reason(verdict: ClaimVerdict) -> str:
-    """Why it does not hold, the first sentence; the rest is among the details."""
-    return re.split(r"(?<=\.) (?=[A-Z])", verdict.reason, maxsplit=1)[0]
+def reasons(verdict: ClaimVerdict) -> list[str]:
+    """Why it does not hold, the first sentence of each reason, of several criteria with those to which it belongs; the
+    rest is among the details."""
+    if not verdict.reason:
+        return []
+    parts = verdict.finding.judged if verdict.finding else ()
+    places: dict[str, list[str]] = {}
+    for place, part in enumerate(parts, 1):
+        if not part.holds and part.why:
+            places.setdefault(_first_sentence(part.why), []).append(str(place))
+    if not places or len(parts) == 1:
+        return [_first_sentence(verdict.reason)]
+    return [f"Criteri{'a' if len(of) > 1 else 'on'} {listed(of, 'and')}: {why}" for why, of in places.items()]
+
+
+def _first_sentence(text: str) -> str:
+    return re.split(r"(?<=\.) (?=[A-Z])", text, maxsplit=1)[0]
 
 
 def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
@@ -84,7 +99,8 @@ def details(verdict: ClaimVerdict) -> list[tuple[str, str]]:
     rows = [
         (f"Criterion {place}", part.number) for place, part in enumerate(parts, 1) if short(part.number) != part.number
     ]
-    rows += [("Reason", verdict.reason)] if reason(verdict) != verdict.reason else []
+    longer = any(not part.holds and _first_sentence(part.why) != part.why for part in parts)
+    rows += [("Reason", verdict.reason)] if longer else []
     failures = verdict.space.failures if verdict.space else {}
     rows += [(f"{draw_name(number).capitalize()}, undecided", text) for number, text in failures.items()]
     return rows + [("Method", text) for text in verdict.turned.values()]

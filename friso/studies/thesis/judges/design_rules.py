@@ -56,8 +56,7 @@ def _soft(evidence: Evidence) -> Part:
         f"and at most of these strokes, more than {percent(reading().half)}, the stage keeps moving with a stiffer one",
         bool(softest.all() and np.mean(limit < stiffness[-1]) > reading().half),
         f"softest comes to rest at {softest.sum()} of {softest.size} strokes; the stage keeps moving from "
-        f"{limit.min():.3g} to "
-        f"{limit.max():.0f} N/m on",
+        f"{limit.min():.0f} to {limit.max():.0f} N/m on",
     )
 
 
@@ -133,8 +132,8 @@ def _softer_needs_less_stroke(evidence: Evidence) -> Part:
     return Part(
         f"at 8 Hz a softer joint needs less stroke (rank correlation with the stiffness at least {words.trend:g})",
         rises >= words.trend,
-        f"rank correlation {trend_text(rises)}: {needed[0] * 1e3:.2g} mm needed with {stiffness[0]:g} N/m, "
-        f"{needed[-1] * 1e3:.2g} mm with {stiffness[-1]:g} N/m",
+        f"rank correlation {trend_text(rises)}: {needed[0] * 1e3:.2g} mm needed with {stiffness[0]:.0f} N/m, "
+        f"{needed[-1] * 1e3:.2g} mm with {stiffness[-1]:.0f} N/m",
     )
 
 
