@@ -131,14 +131,19 @@ def force_swings(runs: ConstantSpeed) -> list[float]:
     return [float(np.std(late) / abs(np.mean(late))) for late in (force[len(force) // 10 :] for force in forces)]
 
 
+def _swing_text(share: float) -> str:
+    """Such a share, to a hundredth of a percent: below that the force is steady."""
+    return percent(round(share, 4))
+
+
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     """The finding from the simulated runs."""
     words = reading()
     named = {"free": free.result, "locked": locked.result}
     swings = {"free": force_swings(free), "locked": force_swings(locked)}
-    listed = "; ".join(f"{name} {', '.join(map(percent, shares))}" for name, shares in swings.items())
+    listed = "; ".join(f"{name} {', '.join(map(_swing_text, shares))}" for name, shares in swings.items())
     rows = tuple(
-        (name, f"{1e3 * speed:g} mm/s", f"{passage.mean.value:.3g} N", percent(swing))
+        (name, f"{1e3 * speed:g} mm/s", f"{passage.mean.value:.3g} N", _swing_text(swing))
         for name, friction in named.items()
         for speed, passage, swing in zip(free.speeds, friction.passes, swings[name], strict=False)
     )
