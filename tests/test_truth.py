@@ -54,6 +54,12 @@ def test_stages_are_drawn_again_by_seed_and_number(series: str) -> None:
         assert stage.flat() != draw(8, number, series).flat()
 
 
+def test_stages_are_those_that_the_documentation_counts() -> None:
+    """Whatever other series draw besides."""
+    assert draw(1, 18).flat()["motion.displacement"] == pytest.approx(0.679328, rel=1e-5)
+    assert draw(2, 5).flat()["motion.displacement"] == pytest.approx(0.0217155, rel=1e-5)
+
+
 def test_stages_of_every_friction_law_are_drawn() -> None:
     laws = {name for name, law in FRICTION.classes.items() if law.__module__.startswith("friso.")}
     assert {form.friction for form in FORMS} == laws

@@ -305,7 +305,7 @@ class _Draw:
             table["error_deadband"] = _text(self.deflection * self.log(1e-4, 0.3), "m")
         if self.form.windup == "back_calculation":
             table["anti_windup_time"] = _text(self.log(0.1, 10.0) / self.omega, "s")
-        return table | self.setting()
+        return table | self.setting() if self.form.axis else table  # others are drawn as before there were any
 
     def setting(self) -> dict[str, Any]:
         """One of the settings of drives against friction."""
