@@ -62,6 +62,7 @@ from friso.views.tune.words import (
     answer,
     changes,
     failing,
+    price,
     rows,
     size_words,
     slowest_time,
@@ -316,6 +317,11 @@ def test_the_answer_does_not_hunt(tuning: Advice) -> None:
 def test_the_stage_as_it_is_does_not_meet_the_goal(tuning: Advice) -> None:
     assert tuning.needed
     assert tuning.case.verdict == "hunts"
+
+
+def test_a_margin_that_does_not_change_is_as_before(tuning: Advice) -> None:
+    margin = tuning.present.least_margin(tuning.goal)
+    assert f"a modulus margin of {margin:.2f} as before" in price(tuning.present, tuning, buys_joint=False)
 
 
 def test_the_answer_names_what_to_change(tuning: Advice) -> None:

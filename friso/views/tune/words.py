@@ -255,6 +255,8 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
     goal, before = tuning.goal, tuning.present
     force = _ratio(measured.force(goal), before.force(goal))
     stiffness = _ratio(measured.stiffness, before.stiffness)
+    margin, margin_before = (f"{performance.least_margin(goal):.2f}" for performance in (measured, before))
+    before_it = " as before" if margin == margin_before else f" instead of {margin_before}"
     still = (
         " Standstill was not computed: on a floor that shakes, a stage on a joint moves more (friso rig in-position)."
         if buys_joint
@@ -262,7 +264,7 @@ def price(measured: Performance, tuning: Advice, buys_joint: bool) -> str:
     )
     return (
         f"Its price: {force} times the force ({with_unit(measured.force(goal), 'N')}), a modulus margin of "
-        f"{measured.least_margin(goal):.2f} instead of {before.least_margin(goal):.2f}, {stiffness} times the "
+        f"{margin}{before_it}, {stiffness} times the "
         f"stiffness against a load before the integral acts ({with_unit(measured.stiffness, 'N/m')}).{still}"
     )
 
