@@ -509,6 +509,7 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
 
         def __init__(self, stage: friso.Stage) -> None:
             asked.append(self)
+            logging.getLogger("friso").warning("static friction of %g N", stage.flat()["friction.static"])
             curve = Series(np.array([0.9, 1.1]), np.full(2, stage.flat()["friction.static"]), "flip", "#222222")
             cloud = Cloud(np.ones(1), np.ones(1), np.ones(1), "", "")
             self.panel = Panel("", Axis("Stage mass", "kg"), Axis("Static friction", "N"), (curve,), clouds=(cloud,))
@@ -522,6 +523,7 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
         parts = served.ask("boundary", STICK_SLIP, {"friction.static": "9 N"}, pinned=True, **axes)
         first, last = (part["figures"][0]["data"] for part in parts if "figures" in part)
         assert {trace.get("name") for trace in last} >= {"flip", "pinned", "this machine"}
+        assert parts[-1]["notes"] == ["static friction of 9 N"]
         assert len(last) > len(first)
     assert len(asked) == 3  # the pinned one's is kept
 

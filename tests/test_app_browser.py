@@ -298,6 +298,21 @@ def test_tabs_keep_the_focus_and_a_click_on_one_counts_while_a_value_is_handed_o
     page.wait_for_selector("#tab-logs[aria-selected=true]")
 
 
+def test_arrows_home_and_end_lead_along_the_tabs_of_which_tab_reaches_one(browsed: Browsed) -> None:
+    page, tabs = browsed.page, "#pictures-bar [role=tab]"
+    names = page.eval_on_selector_all(tabs, "all => all.map(tab => tab.id)")
+    page.focus(f"#{names[0]}")
+    reached = []
+    for key in ("ArrowLeft", "ArrowRight", "End", "Home", "ArrowRight"):
+        page.keyboard.press(key)
+        reached.append(page.evaluate("document.activeElement.id"))
+    assert reached == [names[-1], names[0], names[-1], names[0], names[1]]
+    page.keyboard.press("Enter")
+    page.wait_for_selector(f"#{names[1]}[aria-selected=true]")
+    stops = page.eval_on_selector_all(tabs, "all => all.filter(tab => tab.tabIndex === 0).map(tab => tab.id)")
+    assert stops == [names[1]]
+
+
 def test_an_earlier_answer_leads_back_to_its_machine(browsed: Browsed) -> None:
     """With the keys of that time and no others, and in its tab."""
     page = browsed.page

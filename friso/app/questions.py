@@ -235,12 +235,15 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         yield part(ghosts_of(None))
         return
     yield {**part(ghosts_of(None)), "kind": "partly"}
+    notes = [*work.notes]
     try:
         ghost = _boundary(asked.pinned, tuple(options.items()), _Reporting(work.progress))
-        yield part(ghosts_of(ghost))
+        whole = part(ghosts_of(ghost))
     except InputError as error:  # such as a stage that cannot hunt
         whole = part(ghosts_of(None))
-        yield {**whole, "sentences": [*whole["sentences"], f"The pinned machine: {error}"]}
+        whole["sentences"] = [*whole["sentences"], f"The pinned machine: {error}"]
+    work.notes[:] = notes  # without those on the pinned machine
+    yield whole
 
 
 def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:

@@ -46,14 +46,32 @@ export function anew(place, drawn, instead = () => null) {
   if (item?.type === "text" && before.type === "text") item.setSelectionRange(before.selectionStart, before.selectionEnd);
 }
 
-/** Show tabs. While they are the same, those that are there stay, under the pointer that is pressed on them; else the one that is
- * selected has the focus of one that is gone. */
+/** Where a key leads among tabs, from one of them; they are chosen by Enter, as what they show may take long to compute. */
+const LEADS = {
+  ArrowRight: (k, count) => (k + 1) % count,
+  ArrowLeft: (k, count) => (k + count - 1) % count,
+  Home: () => 0,
+  End: (k, count) => count - 1,
+};
+
+function along(event) {
+  const there = [...event.currentTarget.children];
+  const from = there.indexOf(document.activeElement);
+  if (from < 0 || !(event.key in LEADS) || event.ctrlKey || event.altKey || event.metaKey) return;
+  event.preventDefault();
+  there[LEADS[event.key](from, there.length)].focus();
+}
+
+/** Show tabs, of which Tab reaches the selected one, and arrows, Home and End the others. While they are the same, those that are
+ * there stay, under the pointer that is pressed on them; else the one that is selected has the focus of one that is gone. */
 export function tabs(place, buttons) {
+  place.onkeydown = along;
   const there = [...place.children];
   const same = (button, k) => button.id === there[k]?.id && button.textContent === there[k].textContent;
   if (there.length === buttons.length && buttons.every(same)) {
     buttons.forEach((button, k) => there[k].setAttribute("aria-selected", button.getAttribute("aria-selected")));
   } else anew(place, () => place.replaceChildren(...buttons), () => place.querySelector("[aria-selected=true]"));
+  for (const tab of place.children) tab.tabIndex = tab.getAttribute("aria-selected") === "true" ? 0 : -1;
 }
 
 /** "limiter_stiffness" as words. */

@@ -5,7 +5,7 @@ import { paragraphs } from "./tables.js";
 import { end, hand } from "./wire.js";
 
 const LARGEST = 64e6;
-const SCALE = /^[-+.\d]/;
+const SCALE = /^[-+]?[.\d]+(e[-+]?\d+)?\s*[^\s.\d/]/i; // and no "1/min"
 
 export class Logs {
   constructor(sent, tell) {
