@@ -253,6 +253,9 @@ def test_what_comes_out_negative_is_not_told_and_never_as_next_to_nothing(wordin
     time = np.arange(4000) * DT
     falling = record("falling", DT, position=time + 0.1 * np.sin(5 * time), force=-7.8 - 2.5 * np.sin(5 * time))
     wording(little_friction(inverse_model(falling, 5.0), "N"))
+    force = falling["force"] - inverse_model(falling, 5.0).value("coulomb")
+    balanced = record("balanced", DT, position=falling["position"], force=force)
+    assert "next to nothing: the log moves in one direction only" in little_friction(inverse_model(balanced, 5.0), "N")
     assert not little_friction(inverse_model(axis(), 5.0), "N")
 
 

@@ -99,9 +99,10 @@ def little_friction(inverse: InverseModel, unit: str) -> str:
         return ""
     one = next(estimate for estimate in inverse.estimates if estimate.name == "coulomb")
     if not one.determined:
+        says, does = ("which helps the motion", "exceeds") if value <= -least else ("next to nothing", "may hide")
         return (
-            f"Coulomb friction and the constant force are {value:.2g} {unit} together, which helps the motion: the log "
-            "moves in one direction only, and gravity, or an offset of the channel, exceeds friction"
+            f"Coulomb friction and the constant force are {value:.2g} {unit} together, {says}: the log moves in one "
+            f"direction only, and gravity, or an offset of the channel, {does} friction"
         )
     if value > -least:
         return (

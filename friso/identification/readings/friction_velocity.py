@@ -166,7 +166,8 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
     coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
     if coulomb.determined and coulomb.low <= 0:
-        reason = f"a straight line from {low:.3g} to {high:.3g} mm/s ends at rest with none, within its error"
+        ends = "with none, within its error" if coulomb.high > 0 else "below zero, as that of no bearing does"
+        reason = f"a straight line from {low:.3g} to {high:.3g} mm/s ends at rest {ends}"
         nothing, most = _nothing(reason), max(coulomb.high, 0.0)
         coulomb = Estimate.unknown(coulomb.name, "N", method, reason, 0.0, most)
         return replace(nothing, coulomb=coulomb, viscous=viscous if most else nothing.viscous)
