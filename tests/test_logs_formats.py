@@ -264,6 +264,7 @@ def test_whole_numbers_first_and_decimal_commas_later(tmp_path: Path) -> None:
         ["2026-01-31 23:59:59.998Z", "2026-01-31 23:59:59.999Z", "2026-02-01 00:00:00Z", "2026-02-01 00:00:00.001Z"],
         ["23:59:59.998", "23:59:59.999", "00:00:00.000", "00:00:00.001"],
         ["23:59:59:998", "23:59:59:999", "00:00:00:000", "00:00:00:001"],
+        ["9:05:00:8", "9:05:00:9", "9:05:00:10", "9:05:00:011"],
         ["31.01.2026 23:59:59.998", "31.01.2026 23:59:59.999", "01.02.2026 00:00:00.000", "01.02.2026 00:00:00.001"],
         ["1/31/26 12:59:59.998 PM", "1/31/26 12:59:59.999 PM", "1/31/26 1:00:00.000 PM", "1/31/26 1:00:00.001 PM"],
         ["11:59:59.998 am", "11:59:59.999 am", "12:00:00.000 pm", "12:00:00.001 pm"],
@@ -501,6 +502,12 @@ MOBILITY, ACCELERANCE = 2j * np.pi * FREQUENCY * RESPONSE, -((2 * np.pi * FREQUE
         (["f [Hz]", "Mag [dB re 1e-6 m/N]", "phase [deg]"], (20 * np.log10(1e6 * abs(RESPONSE)), DEGREES), "m/N"),
         (["f [Hz]", "Re [(m/s^2)/N]", "Im [(m/s^2)/N]"], (ACCELERANCE.real, ACCELERANCE.imag), "m/N"),
         (["f [Hz]", "Re [mm/s/N]", "Im [mm/s/N]"], (MOBILITY.real * 1e3, MOBILITY.imag * 1e3), "m/N"),
+        (["f [Hz]", "Mag (mm/s/A)", "phase (deg)"], (1e3 * abs(MOBILITY), DEGREES + 90), "m/A"),
+        (["f [Hz]", "Mag [deg/s/Nm]", "phase [deg]"], (np.degrees(abs(MOBILITY)), DEGREES + 90), "rad/(N*m)"),
+        (["f [Hz]", "Mag [g/N]", "phase [deg]"], (abs(ACCELERANCE) / 9.80665, DEGREES + 180), "m/N"),
+        (["f [Hz]", "Mag dB [mm/N]", "phase [deg]"], (20 * np.log10(1e3 * abs(RESPONSE)), DEGREES), "m/N"),
+        (["f [Hz]", "FRF (Real)", "FRF (Imag)"], (RESPONSE.real, RESPONSE.imag), ""),
+        (["f [Hz]", "Mag (re 1 N)", "Phase (re 1 N) [deg]"], (abs(RESPONSE), DEGREES), ""),
     ],
 )
 def test_frequency_responses_as_text(

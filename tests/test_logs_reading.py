@@ -98,9 +98,11 @@ def test_roles_by_name(name: str, role: str | None) -> None:
         ("v_ist", "mm/s", "velocity"), ("vIst", "m/s", "velocity"), ("F_ist", "N", "force"), ("i_act", "A", "force"),
         ("a_ist", "m/s^2", "acceleration"), ("M_ist", "N m", "force"), ("v_ist", "mm", None), ("v_ist", "", None),
         ("A_act", "mm", None), ("v_soll", "mm/s", None), ("n_ist", "rpm", "velocity"), ("n_soll", "rpm", None),
-        ("ref", "N", None), ("6077h Torque actual value(0.1%)", "", "force"), ("APOS(0)", "", "position"),
+        ("ref", "N", None), ("6077h Torque actual value(0.1%)", "", "force"), ("APOS(0)", "", None),
         ("Position PE", "mm", None), ("field.effort0", "", "force"), ("header.stamp.nsecs", "", None),
-        ("T", "N m", None), ("T", "ms", "time"), ("tau", "", "force"), ("dq", "", "velocity"),
+        ("FPOS(0)", "", "position"), ("RPOS(0)", "", "reference"), ("RVEL(0)", "", None), ("theta_dot", "", "velocity"),
+        ("theta_ddot", "", "acceleration"), ("encoder velocity", "mm/s", "velocity"), ("lage", "mm/s", None),
+        ("T", "V", None), ("T", "N m", None), ("T", "ms", "time"), ("tau", "", "force"), ("dq", "", "velocity"),
     ],
 )  # fmt: skip
 def test_a_symbol_is_told_by_its_unit(name: str, unit: str, role: str | None) -> None:
@@ -314,6 +316,7 @@ def test_wrong_scales(text: str, unit: str, refused: Refused) -> None:
         ("mNm", "N", 1e-3),
         ("N-m", "N", 1),
         ("Arms", "N", 1),
+        ("deg/Nm", "rad/(N*m)", np.pi / 180),
     ],
 )
 def test_unit_spellings(text: str, si: str, factor: float) -> None:

@@ -13,7 +13,7 @@ from friso.errors import LogError
 from friso.identification.logs.channel import Channel, ChannelTable
 from friso.identification.logs.roles import words
 from friso.identification.logs.sniff import NUMBER
-from friso.identification.logs.units import of_decibels, spelled, unit_factor
+from friso.identification.logs.units import RESPONSES, of_decibels, spelled, unit_factor
 from friso.quantities import Quantity, any_sign
 
 _KEYS = {
@@ -41,10 +41,11 @@ class MeasuredResponse:
 
 
 def column_kind(name: str) -> str | None:
-    """What a heading says that its column is; None for nothing of a response."""
-    parts = set(words(re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name)))
+    """What a heading says that its column is, first of all in front of what stands in brackets behind it ("FRF (real)",
+    "Magnitude (re 1 N)"); None for nothing of a response."""
     order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
-    return next((kind for kind in order if parts & _KEYS[kind]), None)
+    shown = (set(words(text)) for text in (re.sub(r"[(\[][^()\[\]]*[)\]]$", "", name), name))
+    return next((kind for parts in shown for kind in order if parts & _KEYS[kind]), None)
 
 
 def is_response(names: Iterable[str]) -> bool:
@@ -100,12 +101,13 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
     if turn is None:
         raise LogError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
     angle = np.exp(1j * turn * phase.values)
-    unit = of_decibels(spelled(magnitude.unit))
+    text = spelled(magnitude.unit)
+    unit = of_decibels(text)
     if unit is not None or re.search(r"(?<![A-Za-z])dB(?![A-Za-z])", magnitude.name, re.IGNORECASE):
-        reference = re.fullmatch(rf"(?P<number>{NUMBER})?\s*(?P<unit>.*)", unit or "")
+        reference = re.fullmatch(rf"(?P<number>{NUMBER})?\s*(?P<unit>.*)", text if unit is None else unit)
         scale, si, _ = response_unit(reference["unit"] if reference else "")
         scale *= float((reference and reference["number"]) or 1)
-        in_words = f"magnitude in {magnitude.unit or 'dB'}, phase in {phase.unit}"
+        in_words = f"magnitude in {'dB' if unit is None else magnitude.unit}, phase in {phase.unit}"
         with np.errstate(over="ignore"):
             return 10 ** (magnitude.values / 20) * angle, scale, si, in_words
     scale, si, unit_in_words = response_unit(magnitude.unit)
@@ -115,8 +117,7 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
 def response_unit(text: str) -> tuple[float, str, str]:
     """Factor to SI, the SI unit, and both in words; a unit of a kind not known here stays as it is."""
     text = spelled(text)
-    for si in ("m/N", "m/s/N", "m/s^2/N", "m/V", "m/A", "m/s^2/A", "m/s^2/V", "rad/s^2/A", "rad/A", "rad/s/A", "rad/V",
-               "rad/(N*m)", "m"):  # fmt: skip
+    for si in (*RESPONSES, "m"):
         if text and unit_factor(text, si) is not None:
             return Quantity(si, any_sign, "").factor(text), si, f"in {text}"
     return 1.0, text, f"in {text}" if text else "without a unit"

@@ -79,13 +79,14 @@ _KEYS = {
             "snelheid",
             "dq",
             "qdot",
+            "dot",
             "vitesse",
             "velocidad",
             "velocidade",
             "velocita",
         ]
     ),
-    "acceleration": frozenset(["acc", "accel", "acceleration"]),
+    "acceleration": frozenset(["acc", "accel", "acceleration", "ddot"]),
     "force": frozenset(
         [
             "force",
@@ -129,7 +130,10 @@ MEASURED = frozenset(
 _TOLD_BY_UNIT = {"position": ("m", "rad"), "force": ("N", "N*m", "A"), "velocity": ("m/s", "rad/s")}
 """Units that tell a role where a single channel without one has them."""
 
-_NEVER_WANTED = ("m/s", "rad/s", "m/s^2", "rad/s^2", "N", "N*m", "A")
+_RATES = ("m/s", "rad/s", "m/s^2", "rad/s^2")
+"""Units in which nothing is a position, whatever its name."""
+
+_NEVER_WANTED = (*_RATES, "N", "N*m", "A")
 """Units in which what was wanted is no position."""
 
 _SYMBOLS = {
@@ -143,6 +147,10 @@ _SYMBOLS = {
 }
 """Symbols whose unit tells that they are no names of axes, with their role, directly before the word of what is:
 v_ist in mm/s."""
+
+_FIRST_LETTERS = {"F": "fbk", "R": "ref", "C": "cmd"}
+"""What the first letters of FPOS, RPOS, CPOS and their like mean to motion controllers. APOS is a reference in those of
+ACS and measured in others: it says nothing."""
 
 _GERMAN = re.compile(
     r"(?P<before>soll|ist)(?P<what>[a-z]{3,})|(?P<what_too>[a-z]{3,})(?P<behind>soll|ist)(?:wert)?"
@@ -166,7 +174,8 @@ def words(name: str) -> list[str]:
     """Lower-case words of the last part of a dotted name, without accents: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
     plain = re.sub(r"\([^()]*\d\.\d[^()]*\)$", "", without_accents(name))  # (0.1 %) is a resolution
     last = plain.rstrip(". ").rsplit(".", 1)[-1]
-    last = re.sub(r"([a-z])([A-Z])|\b([ACFR])(POS|VEL)\b", r"\1\3 \2\4", last)
+    last = re.sub(r"\b([FRC])(POS|VEL)\b", lambda match: f"{_FIRST_LETTERS[match[1]]} {match[2]}", last)
+    last = re.sub(r"([a-z])([A-Z])", r"\1 \2", last)
     parts = [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
     return [word for part in parts for word in _compound(part)]
 
@@ -186,7 +195,7 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
         return None
     key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
     key["force"] = key["force"] or next((part for part in parts[:1] if part in _CURRENTS), "")
-    of_time = not unit or _has_unit_of(unit, ("s",)) or not _has_unit_of(unit, (*_NEVER_WANTED, "m", "rad"))
+    of_time = not unit or _has_unit_of(unit, ("s",)) or not _has_unit_of(unit, (*_NEVER_WANTED, "m", "rad", "V"))
     if key["time"] and of_time and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
         return "time", key["time"]
     wanted = next((part for part in parts if part in _SET), "d" if key["position"] and parts[-1] == "d" else "")
@@ -195,7 +204,8 @@ def role_of(name: str, unit: str = "") -> tuple[str, str] | None:
         others = others or _has_unit_of(unit, _NEVER_WANTED)
         others = others or (not key["position"] and (name_words & _OTHERS_WANTED or _is_symbol(parts, unit)))
         return None if others else ("reference", wanted)
-    if key["position"] or "actpos" in name_words:
+    is_rate = key["velocity"] or key["acceleration"] or _has_unit_of(unit, _RATES)  # encoder velocity, theta_dot
+    if (key["position"] or "actpos" in name_words) and not is_rate:
         word = key["position"] or "actpos"
         kind = "relative_position" if name_words & _RELATIVE else "cart_position" if name_words & _CART else "position"
         return kind, word

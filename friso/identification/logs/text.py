@@ -206,7 +206,9 @@ def _time_of_day(texts: Any) -> np.ndarray:
     """Seconds since midnight of texts that end with a time of day, NaN where there is none."""
     parts = texts.str.extract(rf"{CLOCK}$")
     hours, minutes, seconds = (as_numbers(parts[i].fillna("0").where(parts[0].notna())) for i in range(3))
-    fractions = as_numbers("0." + parts[3].fillna("0"))
+    behind_colon = texts.str.count(":") == 3  # they may go without their zeros: 9:05:00:7 is 7 ms before 9:05:00:14
+    digits = parts[3].where(~behind_colon, parts[3].str.zfill(int(parts[3].str.len().fillna(0).max())))
+    fractions = as_numbers("0." + digits.fillna("0"))
     halves = parts[4].str.lower().to_numpy()
     hours = np.where(parts[4].notna(), hours % 12, hours) + 12.0 * (halves == "p")
     return 3600 * hours + 60 * minutes + seconds + fractions

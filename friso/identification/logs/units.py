@@ -28,6 +28,13 @@ OTHERS = {
 into these units."""
 FOREIGN = (*OTHERS["N"], "count")
 """Units in which a force may stand where estimates per such a unit are an answer."""
+RESPONSES = tuple(
+    f"{place}{rate}/{force}"
+    for place, torque in (("m", "N"), ("rad", "(N*m)"))
+    for rate in ("", "/s", "/s^2")
+    for force in (torque, "A", "V")
+)
+"""Units of frequency responses: positions and their rates over forces, or what stands for these."""
 LONGEST = 100
 """Characters of a unit at most."""
 _SPELLINGS = {
@@ -67,14 +74,16 @@ _SPELLINGS = {
     "kNm": "kN*m",
     "oz-in": "ozf*in",
     "KN": "kN",
+    "g": "g_0",
     **dict.fromkeys(("Arms", "Aeff", "A_rms", "A(rms)"), "A"),
 }
-"""How people write units. Grad is the German degree, and neither a gon nor 1e9 rad."""
+"""How people write units. Grad is the German degree, and neither a gon nor 1e9 rad; g is that
+of an accelerometer, as no log is in grams."""
 _MEGA = 1e5
 """No log is in megametres, megaseconds or gigaradians: such a text is something else, or written badly."""
 _GLUED = re.compile(
     r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
-    r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
+    r"secs?|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks|hz|khz))"
 )
 _OVER = re.compile(r"(?P<name>[^/\[(]*?[^/\[(\s])(?:\s*/\s*|\s+in\s+)(?P<unit>\([^()]+\)|[^\s()\[\]]+)")
 """Headings of ISO 80000, a quantity over its unit, and their like in words."""
@@ -113,8 +122,13 @@ def spelled(text: str) -> str:
     text = text.replace("µ", "u").replace("μ", "u").replace("Ω", "ohm")
     text = "" if text.lower() in ("none", "-", "n/a") else _SPELLINGS.get(text, text)
     parts = re.split(r"([*/· ])", text)
-    parts = [_SPELLINGS.get(part, part) for part in parts]
+    parts = [_below(_SPELLINGS.get(part, part), before) for before, part in zip(["", *parts], parts, strict=False)]
     return "".join(re.sub(r"^([A-Za-z]+)([2-4])$", r"\1^\2", part) for part in parts)
+
+
+def _below(part: str, before: str) -> str:
+    """A part of a unit, in brackets where it is a product below a stroke: the Nm of rad/Nm."""
+    return f"({part})" if before == "/" and "*" in part else part
 
 
 @lru_cache(maxsize=1024)
@@ -151,7 +165,7 @@ _KINDS = (
     "V",
     "N*m",
     "N/V",
-    "m/N",
+    *RESPONSES,
     "V/m",
     "N/m",
     "K",
