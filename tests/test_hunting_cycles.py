@@ -16,6 +16,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
+from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NO_PAIR, NO_RETURN, RTOL, asymmetric_cycles, hunting_cycles, symmetric_cycles
 from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
@@ -480,6 +481,24 @@ def test_without_friction_only_a_stable_loop_surely_settles(integral: float, sta
     result = hunting(stage)
     assert (result.certain, "no friction to stick to" in result.reason) == (stable, stable)
     assert (judge_many(stage.flat(), 1, 1e-6)[0] == "failed") == (not stable)
+
+
+def test_without_friction_a_loop_that_the_limiter_makes_unstable_does_not_surely_settle() -> None:
+    """A tenth of a millimetre settles, ten times as much ends in a swing of metres, for ever: the force is limited."""
+    stage = VARIANTS["free, no friction, limit"]
+    assert hunting(stage).certain
+    gains = {"kp": "180 N/m", "ki": "5e4 N/(m*s)", "kd": "70 N*s/m"}
+    changes = {f"controller.{name}": gain for name, gain in gains.items()}
+    changes |= {"masses.cart": "6.9 kg", "joint.stiffness": "265 N/m", "joint.damping": "25 N*s/m"}
+    small, large = (
+        check_given(stage.replace({**changes, "motion.size": size, "motion.duration": "60 s"}))
+        for size in ("0.1 mm", "1 mm")
+    )
+    assert (small.verdict, small.unstable, small.judgement.hunting.certain) == ("settles", (), False)
+    assert large.peak_to_peak > 1.0
+    assert large.largest_force == pytest.approx(20.0)
+    assert large.force_limit is None  # it does not stand there
+    assert judge_many(small.stage.flat(), 1, 1e-6)[0] == "failed"
 
 
 @RIGID

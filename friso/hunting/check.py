@@ -195,9 +195,10 @@ def _fed(stage: Stage, work: float) -> Feeding | None:
 
 def _holding_limit(flat: dict[str, Any], runs: Runs, judgement: Judgement, breakaway: float) -> float | None:
     """The limit of the force [N] that keeps one stage off its reference for ever: break-away takes more [N], or its run
-    ends with the force there. None where it settles, or nothing shows that it does not."""
+    ends with the force there. None where it settles or swings, or nothing shows that it stays there."""
     limit, possible = flat.get(FORCE_LIMIT), judgement.hunting.possible
-    stays = judgement.settled_after is None and (judgement.followed is not None or not possible)
+    stands = judgement.followed is not None if possible else judgement.verdict == "settles"
+    stays = stands and judgement.settled_after is None
     if not limit or not stays or judgement.swing or judgement.observed:
         return None
     shape = kernel(structure(flat))

@@ -70,10 +70,11 @@ def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
     return {state: growth > limit for state, growth in _growths(stages, np.mean).items()}
 
 
+@np.errstate(all="ignore")
 def surely_calm(stages: Ensemble) -> np.ndarray:
     """Of stages that friction cannot make hunt, which surely keep up no other swing, shape (count,): their loops are
-    stable, nothing opens them or keeps them moving and, where there is no friction, nothing makes them act otherwise
-    near the reference than far from it."""
+    stable, those of a free joint with its limiter touched as well; nothing opens them or keeps them moving and, where
+    there is no friction, nothing makes them act otherwise near the reference than far from it."""
     form = stages.structure
     drive, controller = form.transmission, form.controller
     settings = controller.settings if controller else NO_SETTINGS
@@ -82,13 +83,17 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     bent = not rubs and (settings.gains or settings.push or settings.dead_zone or winds)
     if form.plays or settings.dither or bent:
         return np.zeros(stages.count, bool)
-    return ~np.any(list(unstable_among(stages).values()), axis=0)
+    limit = GROWTH * stages.number("rate")
+    growths = [_growths(stages, np.mean, touched).values() for touched in {False, form.joint == "free"}]
+    return np.all([growth <= limit for state in growths for growth in state], axis=0)  # and not unknown
 
 
-def _growths(stages: Ensemble, of_directions: Callable[..., np.ndarray]) -> dict[LoopState, np.ndarray]:
+def _growths(
+    stages: Ensemble, of_directions: Callable[..., np.ndarray], touched: bool = False
+) -> dict[LoopState, np.ndarray]:
     """The fastest growth rates [1/s] in each of these states, shape (count,); NaN where equations are not finite.
-    `of_directions` makes one viscous friction out of those of both directions."""
-    stuck = _rates(stages)
+    `of_directions` makes one viscous friction out of those of both directions; a limiter may be `touched`."""
+    stuck = _rates(stages, touched)
     return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, of_directions))}
 
 
@@ -114,9 +119,12 @@ def _displaced_states(stages: Ensemble) -> Iterator[np.ndarray]:
         yield moved
 
 
-def _rates(stages: Ensemble) -> np.ndarray:
-    """Derivatives of the rates at rest by the states, in units of the magnitudes of these, (count, states, states)."""
+def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
+    """Derivatives of the rates at rest by the states, in units of the magnitudes of these, (count, states, states);
+    with a limiter that is `touched`, far enough beyond the stroke."""
     flank = np.zeros((stages.count, len(stages.kernel.states)))
+    if touched:
+        flank[:, stages.kernel.cart_position] = 2 * np.asarray(stages.flat["joint.stroke"])
     if stages.structure.plays:  # the loop is open within a backlash
         flank[:, _motor_state(stages, 0)] = stages.flat[BACKLASH]
     moved = ((flank + step, flank - step) for step in _displaced_states(stages))

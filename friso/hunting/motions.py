@@ -66,8 +66,8 @@ class FollowedMotions:
     """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
     their end, within 10 um of the reference; which are still `moving`, as they have not, or swing within that; the time
     [s] after which they rest, if they are followed for long (NaN: not then either, or unknown); whether they swing on
-    `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
-    than their end, or not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
+    `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer than their end, or
+    not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
 
     rests: np.ndarray
     moving: np.ndarray
