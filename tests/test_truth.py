@@ -1,10 +1,16 @@
 """The adversary of benchmarks.truth judges swings by itself, and draws the same stages again."""
 
+import re
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from benchmarks.truth.draws import FORMS, SERIES, draw
+from benchmarks.truth.refute import _kicks
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
+from friso.hunting.basin import Kick
 from friso.stage.files import loads
 from friso.stage.tables import FRICTION
 
@@ -52,6 +58,21 @@ def test_stages_are_drawn_again_by_seed_and_number(series: str) -> None:
         assert stage == draw(7, number, series)
         assert loads(stage.to_toml()) == stage
         assert stage.flat() != draw(8, number, series).flat()
+
+
+@pytest.mark.parametrize(("windows", "refuted"), [((), [0.03, 1.0]), (((0.02, 2.0),), [])])
+def test_displacements_that_are_said_to_rest_are_tried(windows: tuple, refuted: list[float]) -> None:
+    """A stage that hunts from 0.02 to 2 m; also where no displacement is said to hunt."""
+
+    def follow(sizes: np.ndarray, rtol: float, any_will_do: bool) -> Any:
+        return SimpleNamespace(words=np.where((sizes > 0.02) & (sizes < 2.0), SWINGS, RESTS))
+
+    bench: Any = SimpleNamespace(released=lambda sizes: sizes, follow=follow)
+    claim: Any = SimpleNamespace(sure=True)
+    found = [*_kicks(claim, Kick(windows, (1e-3, 100.0)), bench)]
+    said = [float(re.findall(r"by ([\d.]+) m", item.why)[0]) for item in found]
+    assert all(any(0.8 < size / wrong < 1.25 for size in said) for wrong in refuted)
+    assert bool(said) == bool(refuted)
 
 
 def test_stages_are_those_that_the_documentation_counts() -> None:

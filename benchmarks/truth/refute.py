@@ -176,7 +176,9 @@ def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
 def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
     """Whether displacements start hunting where they are said to, and nowhere else."""
     tried = np.geomspace(*kick.searched, KICKS + 2)[1:-1, None] * BROAD
-    said = np.any([(low <= tried) & (tried <= high) for low, high in kick.windows], axis=0)
+    said = np.zeros(tried.shape, bool)
+    for low, high in kick.windows:
+        said |= (low <= tried) & (tried <= high)
     broad = (said == said[:, :1]).all(axis=1)  # no end of a window among the three
     tried, said = tried[broad], said[broad, 0]
     for rtol in (ROUGH, FINE):
