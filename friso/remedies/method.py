@@ -151,7 +151,7 @@ def tune(
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    later = (PAIRS + 1) * (budget.generations + budget.refined + 4)  # pairs and the least change, about
+    later = (PAIRS + 2) * (budget.generations + budget.refined + 4)  # pairs and the least change, about
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
@@ -385,4 +385,4 @@ class _Report:
     def after(self, steps: int) -> None:
         """A remedy of so many steps has ended."""
         self.base += steps
-        self.done = self.base
+        self.done = min(self.base, self.total)

@@ -348,7 +348,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     broken, left = points.broken(goal), np.ones(len(points.margin), bool)
     margin = f"a modulus margin of {goal.margin:g}"
     some = bool(broken["margin"].any())  # lack the margin: nothing is said of these
-    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} setting{'s' * (len(left) > 1)} tried)"
+    tried = f"No setting{f' that keeps {margin}' * some} (of {len(left)} setting{'s' * (len(left) != 1)} tried)"
     settle = f"All settings that {'keep the margin and ' * some}settle"
     sentences = {
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
