@@ -128,6 +128,11 @@ def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
     assert force.time == pytest.approx(M["time"], abs=1e-9)
 
 
+def test_units_that_are_fewer_than_the_columns_are_of_none(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("# units: mm, N\npos;force;state\n" + "0.5;1.5;2.5\n" * 60)
+    assert [item.unit for item in read_table(tmp_path / "a.csv").channels] == ["", "", ""]
+
+
 def test_numbers_of_a_scope_beside_its_names_and_units(tmp_path: Path) -> None:
     rows = "\n".join(f"{i},{0.01 * i:.3f},{-0.02 * i:.3f},," for i in range(60))
     (tmp_path / "a.csv").write_text(f"X,CH1,CH2,Start,Increment,\nSequence,Volt,mV,-1.0e+00,1.0e-03\n{rows}\n")
@@ -506,6 +511,7 @@ MOBILITY, ACCELERANCE = 2j * np.pi * FREQUENCY * RESPONSE, -((2 * np.pi * FREQUE
         (["f [Hz]", "Mag [deg/s/Nm]", "phase [deg]"], (np.degrees(abs(MOBILITY)), DEGREES + 90), "rad/(N*m)"),
         (["f [Hz]", "Mag [g/N]", "phase [deg]"], (abs(ACCELERANCE) / 9.80665, DEGREES + 180), "m/N"),
         (["f [Hz]", "Mag dB [mm/N]", "phase [deg]"], (20 * np.log10(1e3 * abs(RESPONSE)), DEGREES), "m/N"),
+        (["f [Hz]", "Re [m/N]", "Im [mm/N]"], (RESPONSE.real, 1e3 * RESPONSE.imag), "m/N"),
         (["f [Hz]", "FRF (Real)", "FRF (Imag)"], (RESPONSE.real, RESPONSE.imag), ""),
         (["f [Hz]", "Mag (re 1 N)", "Phase (re 1 N) [deg]"], (abs(RESPONSE), DEGREES), ""),
     ],
@@ -550,6 +556,8 @@ def test_a_log_is_no_frequency_response(tmp_path: Path) -> None:
         "f [Hz],mag [dB],phase [deg]\n1,2,3\n2,nan,3\n3,2,3\n",
         "f [Hz],mag [dB],phase [deg]\n1,2,3\n2,2,3\n",
         "f [Hz],mag A [dB],mag B [dB],phase [deg]\n1,2,3,4\n2,2,3,4\n3,2,3,4\n",
+        "f [Hz],mag [N/m],phase [deg]\n1,2,3\n2,2,3\n3,2,3\n",
+        "f [Hz],Re [m/N],Im [m/V]\n1,2,3\n2,2,3\n3,2,3\n",
     ],
 )
 def test_bad_frequency_responses(tmp_path: Path, text: str, refused: Refused) -> None:

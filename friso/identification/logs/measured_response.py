@@ -74,8 +74,13 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
         raise LogError("log", f"columns of different lengths: {actual}", "a value in every cell", "", str(path))
     frequency = _frequency(columns["frequency"], path)
     if {"real", "imaginary"} <= set(columns):
-        response = columns["real"].values + 1j * columns["imaginary"].values
-        scale, unit, quantities = response_unit(columns["real"].unit)
+        real, imaginary = columns["real"], columns["imaginary"]
+        scale, unit, quantities = response_unit(real.unit or imaginary.unit)
+        scale_of_other, unit_of_other, _ = response_unit(imaginary.unit or real.unit)
+        if unit_of_other != unit:
+            actual = f"{real.name} in {real.unit} and {imaginary.name} in {imaginary.unit}"
+            raise LogError("log", actual, "both in one unit", "f [Hz];Re [m/N];Im [m/N]", str(path))
+        response = real.values + 1j * imaginary.values * (scale_of_other / scale)
         quantities = f"real and imaginary part {quantities}"
     else:
         response, scale, unit, quantities = _polar(columns["magnitude"], columns["phase"], path)
@@ -131,6 +136,9 @@ def check_response(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
         read = (*measured.read, f"left out: {np.count_nonzero(~positive)} lines at 0 Hz or below")
         measured = replace(measured, frequency=arrays[0], response=arrays[1], coherence=arrays[2], read=read)
     frequency = measured.frequency
+    if measured.unit and any(unit_factor(measured.unit, si) is not None for si in ("N/m", "N*s/m", "kg")):
+        expected = "a position, a velocity or an acceleration over the force"
+        raise LogError("response", f"a force over a motion, in {measured.unit}", expected, "mag [m/N]", str(path))
     if frequency.size < 3:
         raise LogError("log", f"{frequency.size} frequencies", "at least 3", "", str(path))
     for name, values in (("frequency", frequency), ("response", measured.response), ("coherence", measured.coherence)):

@@ -101,7 +101,7 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
     for line in lines:
         key, value = _pair(line) or ("", "")
         listed = _OF_UNITS.fullmatch(key) is not None
-        cells = re.split(r"[;,\t]|\s+", value) if listed else line.lstrip("#% ").split(delimiter)
+        cells = re.split(r"\s*[;,\t]\s*|\s+", value) if listed else line.lstrip("#% ").split(delimiter)
         cells = [cell for cell in cells if cell] if listed and len(cells) != len(names) else cells
         if listed and key.lower().startswith(("vertical", "y ")) and len(cells) == len(names) - 1:  # but of the first
             cells = [_horizontal(lines), *cells]
