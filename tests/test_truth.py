@@ -69,8 +69,8 @@ def test_displacements_that_are_said_to_rest_are_tried(windows: tuple, refuted: 
 
     bench: Any = SimpleNamespace(released=lambda sizes: sizes, follow=follow)
     claim: Any = SimpleNamespace(sure=True)
-    found = [*_kicks(claim, Kick(windows, (1e-3, 100.0)), bench)]
-    said = [float(re.findall(r"by ([\d.]+) m", item.why)[0]) for item in found]
+    counterexamples = [*_kicks(claim, Kick(windows, (1e-3, 100.0)), bench)]
+    said = [float(re.findall(r"by ([\d.]+) m", item.why)[0]) for item in counterexamples]
     assert all(any(0.8 < size / wrong < 1.25 for size in said) for wrong in refuted)
     assert bool(said) == bool(refuted)
 

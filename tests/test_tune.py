@@ -291,13 +291,13 @@ def test_the_least_change_is_sought_among_the_fewest_keys(
 
 
 def test_more_work_than_was_counted_is_no_more_than_all_of_it() -> None:
-    told: list[tuple[int, int]] = []
-    report = method._Report(lambda done, total, label: told.append((done, total)), 10)
+    steps: list[tuple[int, int]] = []
+    report = method._Report(lambda done, total, label: steps.append((done, total)), 10)
     report.after(50)
     report("one more")
     report.after(50)
     report("another")
-    assert told == [(10, 10), (10, 10)]
+    assert steps == [(10, 10), (10, 10)]
 
 
 def working(remedy: Remedy, tuned: Stage) -> RemedyOutcome:
