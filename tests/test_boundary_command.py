@@ -33,7 +33,7 @@ from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
 from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines, plane_edge
 from friso.views.boundary.figures import LOST, NODES, boundary_figure
-from friso.views.boundary.words import VERDICTS, ShownKey, conclusion, sentences
+from friso.views.boundary.words import VERDICTS, ShownKey, _along_one, conclusion, sentences
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -324,6 +324,11 @@ def test_where_hunting_ends_along_one_key_whatever_the_other_is(crossing: Plane,
     assert edge.low == pytest.approx([1.5e-3, 1.7e-3])
     assert edge.low.tolist() == edge.high.tolist()
     wording(conclusion(plane, keys))
+    bulging = edge._replace(across=np.array([1.0, 10.0, 100.0]), low=np.array([1.5, 1.8, 1.7]) * 1e-3)
+    bulging = bulging._replace(high=bulging.low)
+    assert "below 1.8 mm at controller.kp = 10 N/m in between" in _along_one(bulging, keys)
+    level = bulging._replace(low=np.array([1.5, 1.50001, 1.49999]) * 1e-3)
+    assert "in between" not in _along_one(level._replace(high=level.low), keys)
     uncurved = plane_edge(replace(plane, curves=(), attracts=~plane.attracts))
     assert uncurved is not None
     assert (uncurved.below, uncurved.low.tolist(), uncurved.high.tolist()) == (False, [1e-3] * 2, [2e-3] * 2)

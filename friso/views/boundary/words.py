@@ -154,8 +154,7 @@ def _along_one(edge: PlaneEdge, keys: tuple[ShownKey, ...]) -> str:
 
     answer = f"Hunting is possible {side} {along.key} = {ends(0)} at {at(0)}, and {side} {ends(-1)} at {at(-1)}"
     farther = [int(np.argmin(edge.low)), int(np.argmax(edge.high))]
-    last = len(edge.across) - 1
-    beyond = [f"{ends(k)} at {at(k)}" for k in dict.fromkeys(farther) if k not in (0, last)]
+    beyond = [f"{ends(k)} at {at(k)}" for k in dict.fromkeys(farther) if ends(k) not in (ends(0), ends(-1))]
     between = f", {side} {listed(beyond, 'and')} in between" if beyond else ""
     return f"{answer}{between}; {other}, none was found."
 
