@@ -13,6 +13,7 @@ from variants import VARIANTS
 import friso
 import friso.hunting.attractors
 import friso.hunting.cycle.hunting
+import friso.hunting.loop
 from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS
 from friso.equations.roles import Role
@@ -597,8 +598,11 @@ def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sur
     assert case.settling_time[1e-5] is not None
     assert 1.02e-5 < case.peak_to_peak < 1.06e-5
     assert (case.judgement.hunting.certain, case.judgement.hunting.reason) == (False, STILL_SWINGS)
-    flat, blind = small.flat(), replace(attractors(held(small)), motions=())
-    assert judge_runs(flat, run_motions(flat, 1, measuring_options(1e-6)), blind, 1e-6).tolist() == ["failed"]
+    flat, survey = small.flat(), attractors(held(small))
+    larger = tuple(replace(motion, amplitude=10 * motion.amplitude) for motion in survey.motions)
+    moved = run_motions(flat, 1, measuring_options(1e-6))
+    for motions in ((), larger):
+        assert judge_runs(flat, moved, replace(survey, motions=motions), 1e-6).tolist() == ["failed"]
 
 
 def asymmetric_stage() -> Stage:
@@ -675,8 +679,9 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     result = hunting(stage)
     assert result.passing
     assert (result.certain, result.reason) == (False, GROWS)
-    hidden = {"attractors": lambda *_, **__: result.surveyed, "at_lower_gains": lambda _: "unknown"}
-    with patched({friso.hunting.cycle.hunting: hidden}):
+    surveyed = {"attractors": lambda *_, **__: result.surveyed}
+    hidden = {"at_lower_gains": lambda _: np.array(["unknown"], dtype=object)}
+    with patched({friso.hunting.cycle.hunting: surveyed, friso.hunting.loop: hidden}):
         unknown = hunting(stage)
     assert (unknown.passing, unknown.certain, unknown.reason) == (True, False, MAY_GROW)
     position = friso.simulate(stage, sample_time=0.1).position.to_numpy()
@@ -684,6 +689,16 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     assert (np.diff(swings[3:]) > 0).all()
     assert swings[-1] > 2 * swings[3]
     assert not hunting(stage.replace({"controller.anti_windup": "clamp"})).passing
+
+
+def test_many_stages_are_judged_no_more_surely_than_one() -> None:
+    """At 5 kN no motion that is tried reaches the limit for long, but farther ones do, and may grow."""
+    limit = {"controller.force_limit": "5 kN", "controller.anti_windup": "none", "controller.crossover": "20 Hz"}
+    stage = VARIANTS["rigid"].replace(limit)
+    assert not hunting(stage).certain
+    assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["failed"]
+    clamped = stage.replace({"controller.anti_windup": "clamp"})
+    assert judge_many(clamped.flat(), 1, 1e-6).tolist() == ["settles"]
 
 
 def test_a_large_swing_that_dies_out_slowly_does_not_attract() -> None:

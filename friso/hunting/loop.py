@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from typing import Any, Literal
+from collections.abc import Callable, Iterator
+from typing import Literal
 
 import numpy as np
 
 from friso.equations.roles import Role, Steady
-from friso.equations.structure import structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.stage import Stage
 from friso.stage.controllers import controller_of
@@ -32,10 +31,23 @@ LOWER = np.geomspace(1e-6, 1.0, 37)
 """Shares of its gain at which the stability of a loop is looked at."""
 
 
+def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
+    """The loops of stages as swings far beyond a force limit without anti-windup see them, words of shape (count,):
+    where they are unstable these grow, where they are stable these shrink. None: there is no such limit."""
+    controller = stages.structure.controller
+    return at_lower_gains(stages) if controller and controller.anti_windup == "none" else None
+
+
+def may_run_away(stages: Ensemble) -> np.ndarray:
+    """Which stages swings far beyond such a limit may grow of, for all that is known, shape (count,)."""
+    far = far_beyond_a_limit(stages)
+    return np.zeros(stages.count, bool) if far is None else far != "stable"
+
+
 @np.errstate(all="ignore")
-def at_lower_gains(flat: Mapping[str, Any]) -> LowerGains:
-    """Whether the loop of a sliding stage, given as flat keys, is stable at its own gain and at all lower ones, by the
-    viscous friction of the direction in which that is less, or unstable at one of them.
+def at_lower_gains(stages: Ensemble) -> np.ndarray:
+    """Whether the loops of sliding stages are stable at their own gain and at all lower ones, by the viscous friction
+    of the direction in which that is less, or unstable at one of them: a `LowerGains` each, shape (count,).
 
     That is unknown where the controller does not tell which keys its gain is, or acts otherwise about the reference
     than far from it, which the linear loop at rest does not show.
@@ -44,16 +56,17 @@ def at_lower_gains(flat: Mapping[str, Any]) -> LowerGains:
     the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
     b k_p > m k_i, which is Hurwitz's criterion for the same loop at any gain, and grow where it is less.
     """
-    controller, form = controller_of(flat), structure(dict(flat))
-    gains = {controller.key(name): flat[controller.key(name)] * LOWER for name in controller.loop_gain}
+    controller, form = controller_of(stages.flat), stages.structure
     settings = form.controller.settings if form.controller else NO_SETTINGS
-    if not gains or settings.deadband or settings.dead_zone or settings.gains or settings.push:
-        return "unknown"
-    stages = Ensemble.held({**flat, **gains}, len(LOWER), form=form)
-    growths, limit = _growths(stages, np.min)["slides"], GROWTH * stages.number("rate")
-    if np.any(growths > limit):
-        return "unstable"
-    return "stable" if np.all(growths <= limit) else "unknown"
+    if not controller.loop_gain or settings.deadband or settings.dead_zone or settings.gains or settings.push:
+        return np.full(stages.count, "unknown", dtype=object)
+    flat = stages.take(np.repeat(np.arange(stages.count), len(LOWER))).flat
+    gains = {key: flat[key] * np.tile(LOWER, stages.count) for key in map(controller.key, controller.loop_gain)}
+    slower = Ensemble.held({**flat, **gains}, stages.count * len(LOWER), form=form)
+    growths = _growth(_sliding(slower, _rates(slower), np.min)) / (GROWTH * slower.number("rate"))
+    growing, shrinking = (growths > 1).reshape(-1, len(LOWER)), (growths <= 1).reshape(-1, len(LOWER))
+    words = np.where(shrinking.all(axis=1), "stable", "unknown")
+    return np.where(growing.any(axis=1), "unstable", words).astype(object)
 
 
 def unstable(stage: Stage) -> tuple[LoopState, ...]:
@@ -67,14 +80,15 @@ def unstable_among(stages: Ensemble) -> dict[LoopState, np.ndarray]:
     """The loops of which stages are not stable in each of these states, shape (count,); a swing is damped by the mean
     of the viscous friction in both directions."""
     limit = GROWTH * stages.number("rate")
-    return {state: growth > limit for state, growth in _growths(stages, np.mean).items()}
+    return {state: growth > limit for state, growth in _growths(stages).items()}
 
 
 @np.errstate(all="ignore")
 def surely_calm(stages: Ensemble) -> np.ndarray:
     """Of stages that friction cannot make hunt, which surely keep up no other swing, shape (count,): their loops are
-    stable, those of a free joint with its limiter touched as well; nothing opens them or keeps them moving and, where
-    there is no friction, nothing makes them act otherwise near the reference than far from it."""
+    stable, those of a free joint with its limiter touched as well, and beyond a force limit without anti-windup;
+    nothing opens them or keeps them moving and, where there is no friction, nothing makes them act otherwise near the
+    reference than far from it."""
     form = stages.structure
     drive, controller = form.transmission, form.controller
     settings = controller.settings if controller else NO_SETTINGS
@@ -84,17 +98,16 @@ def surely_calm(stages: Ensemble) -> np.ndarray:
     if form.plays or settings.dither or bent:
         return np.zeros(stages.count, bool)
     limit = GROWTH * stages.number("rate")
-    growths = [_growths(stages, np.mean, touched).values() for touched in {False, form.joint == "free"}]
-    return np.all([growth <= limit for state in growths for growth in state], axis=0)  # and not unknown
+    growths = [_growths(stages, touched).values() for touched in {False, form.joint == "free"}]
+    stable = np.all([growth <= limit for state in growths for growth in state], axis=0)  # and not unknown
+    return stable & ~may_run_away(stages)
 
 
-def _growths(
-    stages: Ensemble, of_directions: Callable[..., np.ndarray], touched: bool = False
-) -> dict[LoopState, np.ndarray]:
-    """The fastest growth rates [1/s] in each of these states, shape (count,); NaN where equations are not finite.
-    `of_directions` makes one viscous friction out of those of both directions; a limiter may be `touched`."""
+def _growths(stages: Ensemble, touched: bool = False) -> dict[LoopState, np.ndarray]:
+    """The fastest growth rates [1/s] in each of these states, shape (count,); NaN where equations are not finite. A
+    limiter may be `touched`."""
     stuck = _rates(stages, touched)
-    return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, of_directions))}
+    return {"sticks": _growth(stuck), "slides": _growth(_sliding(stages, stuck, np.mean))}
 
 
 def _growth(matrices: np.ndarray) -> np.ndarray:
@@ -133,7 +146,8 @@ def _rates(stages: Ensemble, touched: bool = False) -> np.ndarray:
 
 
 def _sliding(stages: Ensemble, stuck: np.ndarray, of_directions: Callable[..., np.ndarray]) -> np.ndarray:
-    """The same without friction but for its viscous share; without the states of the friction law."""
+    """The same without friction but for its viscous share, one made `of_directions`, both; without the states of the
+    friction law."""
     kernel, flat = stages.kernel, stages.flat
     bodies = ("cart", "stage") if stages.structure.joint == "rigid" else ("cart",)
     mass = sum(np.asarray(flat.get(f"masses.{body}", 0.0)) for body in bodies)
@@ -171,8 +185,7 @@ def _slid(stages: Ensemble, speed: np.ndarray) -> np.ndarray:
         moved = states.copy()
         moved[:, k] += stages.scales[:, k]
         changes[:, :, column] = (stages.rates(moved)[:, bristles] - begun) / stages.scales[:, k, None]
-    for state, change, rate in zip(states, changes, begun, strict=True):
-        state[bristles] -= np.linalg.lstsq(change, rate, rcond=None)[0]
+    states[:, bristles] -= (np.linalg.pinv(changes) @ begun[:, :, None])[:, :, 0]
     return states
 
 

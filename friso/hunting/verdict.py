@@ -33,15 +33,15 @@ from friso.hunting.cycle.hunting import (
     Cycle,
     Hunting,
     Swing,
+    beyond_the_survey,
     cannot_hunt,
-    far_beyond_a_limit,
     hunting,
     why_not,
 )
-from friso.hunting.loop import surely_calm
+from friso.hunting.loop import far_beyond_a_limit, may_run_away, surely_calm
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
-from friso.hunting.motions import Motions, followed_motions, resting, run_motions, some_of
+from friso.hunting.motions import FollowedMotions, Motions, followed_motions, resting, run_motions, some_of
 from friso.hunting.outward import AttractionEnd
 from friso.stage import Stage
 
@@ -317,7 +317,7 @@ def _as_sure(stage: Stage, sought: SearchedBandwidths, attraction: Hunting) -> S
         if not (end.certain and attraction.certain):
             return False
         beyond = end.outside * (DISTANCE if end.outside > end.inside else 1 / DISTANCE)
-        return far_beyond_a_limit(Ensemble.held(faster(stage.flat(), np.array([beyond])), 1)) in (None, "stable")
+        return not may_run_away(Ensemble.held(faster(stage.flat(), np.array([beyond])), 1))[0]
 
     def as_sure(end: AttractionEnd | None) -> AttractionEnd | None:
         return end and replace(end, certain=sure(end))
@@ -365,10 +365,11 @@ def judge_runs(
     `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
     decided, attracts = motions.completed.copy(), np.zeros(count, bool)
-    if survey is None and why_not(shared_structure(flat)):
-        decided &= surely_calm(Ensemble.held(flat, count, form=shared_structure(flat)))
+    stages = Ensemble.held(flat, count, form=shared_structure(flat))
+    if survey is None and why_not(stages.structure):
+        decided &= surely_calm(stages)
     if survey is not None:
-        decided &= survey.decided
+        decided &= survey.decided & (beyond_the_survey(stages, survey) == "")
         attracts = survey.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
     run_options = measuring_options(rtol, threads, cancel)
@@ -379,8 +380,11 @@ def judge_runs(
             some_of(flat, attracted), attracted.size, target, threads=threads, cancel=cancel
         )
         completed &= ~swings_seldom(target, ends, swing)
+        if far_beyond_a_limit(stages) is not None:
+            completed &= ~(ends & (swing > RUNNING_AWAY * 2 * target.amplitude))
         in_cycle[attracted], decided[attracted] = ends, completed
-        restless = attracted[completed & ~ends & ~np.isfinite(motions.settling[attracted])]
+        settled = np.isfinite(motions.settling[attracted]) & (swing <= resting(flat, count)[attracted])
+        restless = attracted[completed & ~ends & ~settled]
         if restless.size:  # something may attract them that swings less than what was found
             moved = some_of(flat, restless), motions.take(restless)
             in_cycle[restless], decided[restless] = _swing_on(*moved, run_options)
@@ -391,15 +395,17 @@ def judge_runs(
         )
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
         if survey is not None:
-            swinging = rest.moving & ~rest.steady & (rest.swing > resting(some_of(flat, free), free.size))
-            decided[free] = ~(rest.unknown | swinging)
+            decided[free] = rest.steady | _stands(some_of(flat, free), rest)
     return verdicts(decided, attracts, in_cycle, rests)
 
 
 def _swing_on(flat: Mapping[str, Any], motions: Motions, run_options: RunOptions) -> tuple[np.ndarray, np.ndarray]:
     """Of motions that do not end in what was found to attract their stages, which swing on by less once they were
     followed for long, and of which that is decided: they do, or they have come to rest."""
-    count = len(motions.completed)
-    rest = followed_motions(flat, motions, count, run_options, possible=True)
-    stands = np.isfinite(rest.followed) & (rest.swing <= resting(flat, count))
-    return rest.steady, rest.steady | np.isfinite(rest.after) | stands
+    rest = followed_motions(flat, motions, len(motions.completed), run_options, possible=True)
+    return rest.steady, rest.steady | _stands(flat, rest)
+
+
+def _stands(flat: Mapping[str, Any], rest: FollowedMotions) -> np.ndarray:
+    """Which motions were followed to where they do not swing any more, as far as they had to be, shape (count,)."""
+    return ~rest.unknown & (~rest.moving | (rest.swing <= resting(flat, len(rest.moving))))

@@ -20,7 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.loop import LowerGains, at_lower_gains, surely_calm
+from friso.hunting.loop import LowerGains, far_beyond_a_limit, may_run_away, surely_calm
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
 
@@ -73,6 +73,27 @@ MAY_GROW = "without anti-windup it is not known whether large swings grow: a siz
 
 MAY_DIE_OUT = "without anti-windup large swings die out the slower the larger they are: what was observed may be one"
 """The same where the loop is stable at lower gains."""
+
+PASSING: Mapping[LowerGains, str] = {"stable": MAY_DIE_OUT, "unstable": GROWS, "unknown": MAY_GROW}
+
+FARTHER_KICKS = "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
+"""Why something may attract a stage that a survey does not reach."""
+
+MOSTLY_WITHIN = "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
+"""The same with a wide dead zone."""
+
+OUTER_INTEGRALS = (
+    "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
+)
+"""The same where starts differ in the inner one alone."""
+
+SMALL_CYCLES = (
+    "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
+)
+"""The same of small swings."""
+
+AT_ONCE = 64
+"""Stages whose friction is looked at together, at hundreds of speeds each."""
 
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
@@ -197,8 +218,7 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     """
     checked_rtol(rtol)
     if reason := cannot_hunt(stage):
-        held = Ensemble.held(stage.flat(), 1)
-        calm = bool(surely_calm(held)[0]) and far_beyond_a_limit(held) in (None, "stable")
+        calm = bool(surely_calm(Ensemble.held(stage.flat(), 1))[0])
         return Hunting((), reason if calm or reason == DITHERS else BY_ITSELF, calm, None)
     flat = stage.flat()
     kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
@@ -207,12 +227,10 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         survey = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in survey.motions if m.cycles is not None]
     repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
-    far = far_beyond_a_limit(stages)
-    unclosed = any(m.cycles is None for m in survey.motions)
-    passing = {"stable": MAY_DIE_OUT, "unstable": GROWS, "unknown": MAY_GROW}[far] if far and unclosed else ""
-    beyond = passing or ("" if survey.motions else _beyond_the_search(stages))
+    (beyond,) = beyond_the_survey(stages, survey)
     certain = bool(survey.decided[0]) and not beyond
     doubt = beyond or (FLIPS if survey.flips[0] else GIVEN_UP if search.exhausted else UNDECIDED)
+    far = far_beyond_a_limit(stages)
     reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
         cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
@@ -224,52 +242,64 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
         ),
         target=survey.target.of(0) if survey.motions else None,
         surveyed=survey,
-        lower_gains=far,
+        lower_gains=None if far is None else far[0],
     )
 
 
-def far_beyond_a_limit(stages: Ensemble) -> LowerGains | None:
-    """The loop of the first stage as swings far beyond a force limit without anti-windup see it: where it is unstable
-    they grow, where it is stable they shrink. None: there is no such limit."""
-    controller = stages.structure.controller
-    return at_lower_gains(stages.flat) if controller and controller.anti_windup == "none" else None
+def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
+    """Why it is not certain what attracts stages, whatever a survey of them decided: words of shape (count,), "" where
+    there is no such reason."""
+    why = np.full(stages.count, "", dtype=object)
+    far = far_beyond_a_limit(stages)
+    if far is not None:
+        for motion in survey.motions:
+            if motion.cycles is None:
+                why[motion.stage] = PASSING[far[motion.stage]]
+    if (free := np.flatnonzero(~survey.attracts)).size:
+        why[free] = _beyond_the_search(stages.take(free))
+    return why
 
 
-def _beyond_the_search(stages: Ensemble) -> str:
-    """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    if far_beyond_a_limit(stages) not in (None, "stable"):
-        return "with a force limit and no anti-windup, kicks larger than those tried may keep it swinging"
-    if float(np.max(dead_band(stages.flat))) >= WIDE_BAND * float(stages.length[0]) > 0:
-        return "most starts tried lie within error_deadband, few beyond it: some of those beyond may keep swinging"
+def _beyond_the_search(stages: Ensemble) -> np.ndarray:
+    """Why something may attract stages that a survey does not reach, words of shape (count,)."""
     if stages.outer_integrals:
-        return "with integrals in several loops, a stage stuck with the outer one wound up otherwise may keep swinging"
-    if small_cycles_possible(stages):
-        return (
-            "friction falls so little over the speeds of small swings that cycles may be smaller than the search covers"
-        )
-    return ""
+        why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
+    else:
+        why = np.where(small_cycles_possible(stages), SMALL_CYCLES, "").astype(object)
+    why[(dead_band(stages.flat) >= WIDE_BAND * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
+    why[may_run_away(stages)] = FARTHER_KICKS
+    return why
 
 
-def small_cycles_possible(stages: Ensemble) -> bool:
-    """Whether cycles may be smaller than is looked for, of the first stage: those that the fall of friction feeds are a
-    certain share of it (`FED`), and they attract where it falls off with less than their size."""
-    breakaway = float(stages.number("breakaway")[0])
-    if breakaway <= 0:
-        return False
+def small_cycles_possible(stages: Ensemble) -> np.ndarray:
+    """Of which stages cycles may be smaller than is looked for, shape (count,): those that the fall of friction feeds
+    are a certain share of it (`FED`), and they attract where it falls off with less than their size."""
+    possible, rub = np.zeros(stages.count, bool), np.flatnonzero(stages.number("breakaway") > 0)
+    for first in range(0, len(rub), AT_ONCE):
+        part = rub[first : first + AT_ONCE]
+        possible[part] = _small_cycles_possible(stages.take(part))
+    return possible
+
+
+def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
+    """The same of stages with friction."""
+    breakaway = stages.number("breakaway")[:, None]
     sizes = np.geomspace(1e-3 * SMALL_SWING, SMALL_SWING, 60)
-    small = sizes * float(stages.length[0] * stages.number("rate")[0])
-    speeds = np.concatenate([small, np.geomspace(small[-1], FASTEST * small[-1], SPEEDS)])
-    friction = stages.take(np.zeros(2 * speeds.size, dtype=np.int64)).steady_friction(np.concatenate([speeds, -speeds]))
+    small = np.outer(stages.length * stages.number("rate"), sizes)
+    speeds = np.hstack([small, np.geomspace(small[:, -1], FASTEST * small[:, -1], SPEEDS, axis=1)])
+    numbers = np.repeat(np.arange(stages.count), 2 * speeds.shape[1])
+    friction = stages.take(numbers).steady_friction(np.hstack([speeds, -speeds]).ravel())
     if friction is None:
-        return True
-    sticks, both = bool(stages.kernel.having(Role.BRISTLE)), np.abs(friction).reshape(2, -1)
-    for force in both:  # forward, and back
-        at_rest = breakaway * force[0] / both[:, 0].max() if sticks else 0.0  # other laws creep before they slide
-        falls = (np.maximum.accumulate(np.maximum(force, at_rest)) - force) / breakaway
-        fed = falls[: sizes.size] / sizes
-        if ROUNDING < falls.max() < SMALL_GAP or (fed[-1] < FED[1] and fed.max() > max(FED[0], 1.2 * fed[-1])):
-            return True
-    return False
+        return np.ones(stages.count, bool)
+    force = np.abs(friction).reshape(stages.count, 2, -1)  # forward, and back
+    slowest, sticks = force[:, :, :1], bool(stages.kernel.having(Role.BRISTLE))  # other laws creep before they slide
+    at_rest = breakaway[:, None] * slowest / slowest.max(axis=1, keepdims=True) if sticks else 0.0
+    falls = (np.maximum.accumulate(np.maximum(force, at_rest), axis=2) - force) / breakaway[:, None]
+    deepest, fed = falls.max(axis=2), falls[:, :, : sizes.size] / sizes
+    last, most = fed[:, :, -1], fed.max(axis=2)
+    little = (deepest > ROUNDING) & (deepest < SMALL_GAP)
+    fades = (last < FED[1]) & (most > np.maximum(FED[0], 1.2 * last))
+    return np.any(little | fades, axis=1)
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
