@@ -10,7 +10,6 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from threading import TIMEOUT_MAX
-from types import SimpleNamespace
 
 import pytest
 from hypothesis import settings
@@ -88,7 +87,17 @@ def unprinted() -> Iterator[None]:
     own. Figures that are files are drawn, but for tests that ask for `undrawn`."""
     from friso.views import pages  # slow
 
-    with patched({pages: {"matplotlib_renderer": SimpleNamespace(image=lambda *_, **__: b"<svg/>")}}):
+    with patched({pages: {"image": lambda *_, **__: b"<svg/>"}}):
+        yield
+
+
+@pytest.fixture(scope="session", autouse=True)
+def drawn_here() -> Iterator[None]:
+    """Figures are drawn in this process: others would take a second for each command. tests/test_drawing.py has those
+    of its own."""
+    from friso.views.drawing import images
+
+    with patched({images: {"usable_cores": lambda: 1}}):
         yield
 
 
@@ -104,9 +113,9 @@ def unhurried() -> Iterator[None]:
 @pytest.fixture
 def printed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages hold their prints all the same."""
-    from friso.views.drawing import matplotlib_renderer
+    from friso.views.drawing import images
 
-    monkeypatch.setattr("friso.views.pages.matplotlib_renderer", matplotlib_renderer)
+    monkeypatch.setattr("friso.views.pages.image", images.image)
 
 
 @pytest.fixture

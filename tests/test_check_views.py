@@ -48,7 +48,7 @@ from friso.views.check.figures import check_figures, response_figure
 from friso.views.check.page import check_html, conclusion, verdict_sentence
 from friso.views.check.table import rows
 from friso.views.check.words import edge_text
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing import images, matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import Figure
 from friso.views.pages import made_with
@@ -225,7 +225,7 @@ def test_response_of_one_run():
 @pytest.fixture(scope="module")
 def page() -> str:
     """With its prints."""
-    with patched({pages: {"matplotlib_renderer": matplotlib_renderer}}):
+    with patched({pages: {"image": images.image}}):
         return check_html(both_joints())
 
 

@@ -34,6 +34,7 @@ from friso.design_method.spec import Position, Spec, load_spec
 from friso.progress import Progress
 from friso.quantities import outwards
 from friso.stage import Stage
+from friso.views import files
 from friso.views.design.control import controller_step, moves_step
 from friso.views.design.document import design_document, refused_document
 from friso.views.design.figures import design_figures
@@ -108,7 +109,7 @@ def written(spec: Path, finished: list[str], tmp_path_factory: pytest.TempPathFa
     """The folder of all files, written once with figures as SVG only, and the summary."""
     out = tmp_path_factory.mktemp("written") / "design"
     with redirect_stdout(StringIO()) as said, pytest.MonkeyPatch.context() as patch:
-        patch.setattr(matplotlib_renderer, "FORMATS", ("svg",))
+        patch.setattr(files, "FORMATS", ("svg",))
         command(RIG, spec, out=out, details=True)
     return out, said.getvalue()
 

@@ -34,10 +34,11 @@ from made_up import (
 )
 from pages import packed_values
 
+from friso.axis import ROTARY, speaking_of
 from friso.quantities import percent
 from friso.views import pages
 from friso.views.check.figures import check_figures
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing import images, matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
 from friso.views.drawing.figure import GREY, Axis, Category, Figure, Map, Panel, Series
 from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
@@ -222,9 +223,29 @@ def test_figures_drawn_in_threads_are_those_drawn_alone():
         assert [*together] == 2 * alone
 
 
+def test_figures_are_drawn_beside_as_they_are_here(monkeypatch):
+    """In processes of their own; one that has waited for too long, and ended, is replaced."""
+    monkeypatch.setattr(images, "usable_cores", lambda: 2)
+    figures = [small_figure(), small_figure()]
+    with speaking_of(ROTARY), images.drawing_beside() as artists:
+        here = images.image(figures[0], *images.ON_PAGE)
+        artists.processes[0].kill()
+        images.draw_beforehand(figures, [images.ON_PAGE])
+        monkeypatch.delattr(matplotlib_renderer, "image")
+        assert [images.image(figure, *images.ON_PAGE) for figure in figures] == [here, here]
+
+
+def test_a_figure_that_no_process_draws_is_drawn_here(monkeypatch):
+    monkeypatch.setattr(images, "usable_cores", lambda: 2)
+    monkeypatch.setattr(images, "PROGRAM", "friso.views.drawing.no_such_program")
+    with images.drawing_beside():
+        images.draw_beforehand([figure := small_figure()], [images.Image("png")])
+        assert images.image(figure, "png").startswith(b"\x89PNG")
+
+
 def test_unknown_format_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"got 'gif', expected one of png, svg, pdf"):
-        matplotlib_renderer.save(small_figure(), tmp_path / "figure.gif")
+        images.save(small_figure(), tmp_path / "figure.gif")
 
 
 def test_dollars_and_markup_in_names_are_text():
@@ -251,7 +272,7 @@ def test_files_are_the_same_bytes_in_every_process(request, tmp_path, monkeypatc
 def test_a_figure_file_opens_as_an_image(tmp_path):
     import matplotlib.image
 
-    matplotlib_renderer.save(small_figure(), tmp_path / "small.PNG")
+    images.save(small_figure(), tmp_path / "small.PNG")
     assert matplotlib.image.imread(io.BytesIO((tmp_path / "small.PNG").read_bytes()), format="png").ndim == 3
 
 

@@ -4,7 +4,7 @@ first, small tables, what to do next, and details if they are wanted."""
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
@@ -41,14 +41,16 @@ def ask(
     `what` stands beside the progress bar; files of the names `writes` may not be in the way. Raises InputError,
     typer.Exit with the status of a failure.
     """
-    target = None
+    target, beside = None, nullcontext()
     if out is not None:
         from friso.answers.output_folder import OutputFolder
+        from friso.views.drawing.images import drawing_beside
 
         target = OutputFolder(command, out, overwrite, [*_paths(about)])
         target.check(writes)
+        beside = drawing_beside()
     files, unwritten = [], ""
-    with ProgressBar(what) as progress:
+    with ProgressBar(what) as progress, beside:
         with named_as_options(options):
             answer = question(*about, **options, progress=progress)
         speak_of(answer.axis_kind)

@@ -1,40 +1,29 @@
 """The program that fills the cache: ``python -m friso.engine.builder FOLDER``.
 
-It reads pickled pairs from standard input, the name of a module and a task, has the module's `build(folder, task)` keep
-what the task asks for in the cache's FOLDER, and prints the name of the entry, until there are no more, or none comes
-for a while.
+It is asked pairs, the name of a module and a task (`friso.helper_process`), has the module's `build(folder, task)` keep
+what the task asks for in the cache's FOLDER, and answers the name of the entry.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
-import signal
 import sys
 from importlib import import_module
 from pathlib import Path
-from threading import Timer
 
-PATIENCE = 60.0  # [s] it holds 150 MB
+from friso.helper_process import answer_questions
 
 
 def main(folder: Path) -> None:
-    """Build what is asked for on standard input."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it
-    answers, sys.stdout = sys.stdout, sys.stderr  # what plug-ins print is no answer
-    while True:
-        patience = Timer(PATIENCE, os._exit, (0,))
-        patience.daemon = True
-        patience.start()
+    """Build what is asked for."""
+
+    def built(asked: tuple[str, bytes]) -> str:
+        builder, task = asked
         try:
-            builder, task = pickle.load(sys.stdin.buffer)
-        except EOFError:
-            return
-        patience.cancel()
-        try:
-            print(import_module(builder).build(folder, task), file=answers, flush=True)
+            return import_module(builder).build(folder, task)
         except OSError as error:  # the disk is full: no fault of what is built, whose traceback would help
             sys.exit(f"{folder}: {error.strerror or error}")
+
+    answer_questions(built)
 
 
 if __name__ == "__main__":

@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import atexit
 import os
-import pickle
-import subprocess
 import sys
-import tempfile
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_EXCEPTION, Future, wait
 from contextlib import contextmanager, suppress
@@ -24,6 +21,7 @@ from filelock import FileLock, Timeout
 from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
 from friso.engine.overtaken import Overtaken, go_on
 from friso.engine.prune import prune
+from friso.helper_process import HelperProcess
 from friso.system import usable_cores
 
 _PATIENCE = 0.1
@@ -188,7 +186,7 @@ class _Job:
 
     def _built(self) -> str:
         """Build what is requested, by a builder that waits where there is one; the name of the entry."""
-        surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(filter(None, sys.path)), self.request.plug_ins)
+        surroundings = _Surroundings(os.getpid(), cache_folder(), tuple(sys.path), self.request.plug_ins)
         while True:
             waiting = _taken(surroundings)
             self._builder = builder = waiting or _Builder(surroundings)
@@ -216,39 +214,19 @@ class _Surroundings:
     plug_ins: str
 
 
-class _Builder:
-    """A process that builds what it is sent (`friso.engine.builder`). It waits for more when it is done, and ends by
-    itself if nothing comes for a while, or with the process that started it."""
+class _Builder(HelperProcess):
+    """A process that builds what it is sent (`friso.engine.builder`)."""
 
     def __init__(self, surroundings: _Surroundings) -> None:
         self.surroundings = surroundings
-        self._messages = tempfile.TemporaryFile()  # noqa: SIM115, open as long as the process lives
-        environ = {**os.environ, "PYTHONPATH": os.pathsep.join(surroundings.paths), "PYTHONIOENCODING": "utf-8"}
-        command = [sys.executable, "-P", "-m", "friso.engine.builder", str(surroundings.folder)]
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)
+        super().__init__("friso.engine.builder", str(surroundings.folder), paths=surroundings.paths)
 
     def build(self, request: CodeRequest) -> str:
         """Build what is requested; the name of its entry, "" where the process ended instead."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        with suppress(OSError):  # nobody reads it any more: the process ended, and says why
-            pickle.dump((request.builder, request.task), self._process.stdin)
-            self._process.stdin.flush()
-        return self._process.stdout.readline().decode("ascii").strip()
-
-    def end(self) -> str:
-        """End the process; what it has said on standard error."""
-        with suppress(OSError):
-            self._process.communicate()
-        self._messages.seek(0)
-        message = self._messages.read().decode(errors="replace")
-        self._messages.close()
-        return message
-
-    def kill(self) -> None:
-        """End the process, whatever it is at."""
-        self._process.kill()
+        try:
+            return self.ask((request.builder, request.task))
+        except EOFError:
+            return ""
 
 
 _waiting: list[_Builder] = []

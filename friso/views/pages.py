@@ -16,8 +16,9 @@ from markupsafe import Markup
 from friso.escapes import escaped
 from friso.stage.foreign import foreign
 from friso.version import VERSION
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing import plotly_renderer
 from friso.views.drawing.figure import Figure
+from friso.views.drawing.images import ON_PAGE, draw_beforehand, image
 from friso.views.drawing.prefixes import listed
 from friso.views.glossary import Glossary
 
@@ -67,6 +68,7 @@ class Report:
 
     def html(self) -> str:
         """The page: it opens offline, prints, and is the same bytes on every run."""
+        draw_beforehand(self.figures, [ON_PAGE])
         figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
         scripts = plotly_renderer.script() if figures or self.scripted else None
         values: dict[str, Any] = {"figures": figures, "plotly": scripts, "page_script": script("page")}
@@ -104,7 +106,7 @@ def _escaped_text(value: Any) -> Any:
 
 def print_image(figure: Figure, form: str = "svg", noted: bool = True) -> Markup:
     """The figure as a data address, to stand in quotation marks: what is printed, and what is seen without scripts."""
-    content = matplotlib_renderer.image(figure, form, headed=False, noted=noted)
+    content = image(figure, form, headed=False, noted=noted)
     if form == "svg":
         return Markup(f"data:image/svg+xml,{_plain(content.decode())}")
     return Markup(f"data:image/{form};base64,{base64.b64encode(content).decode('ascii')}")

@@ -15,8 +15,9 @@ function themed(value) {
 }
 
 /**
- * Draw figures into a place, keeping the plots that are there: those of the same name are updated. `tell` is called with
- * the point that is `clicked`, and with that which the pointer is over (`hovered`), null once it is gone.
+ * Draw figures into a place, keeping the plots that are there: those of the same name are updated, first those that are
+ * in sight. `tell` is called with the point that is `clicked`, and with that which the pointer is over (`hovered`), null
+ * once it is gone.
  */
 export function draw(place, figures, tell = {}) {
   const there = new Map([...place.children].filter((child) => child.dataset.name).map((child) => [child.dataset.name, child]));
@@ -31,10 +32,33 @@ export function draw(place, figures, tell = {}) {
       box.children[0].textContent = plain(figure.title);
       box.children[1].textContent = plain(figure.caption);
     }
-    box.classList.remove("stale");
     place.append(box);
-    plot(box.querySelector(".plot"), figure, tell);
+    const plotted = box.querySelector(".plot");
+    plotted.style.height = `${figure.layout.height}px`;
+    plotted.due = () => {
+      delete plotted.due;
+      box.classList.remove("stale");
+      plot(plotted, figure, tell);
+    };
   }
+  const [seen, below] = [[], []];
+  for (const plotted of place.querySelectorAll(".plot")) (inSight(plotted) ? seen : below).push(plotted);
+  for (const plotted of seen) plotted.due?.();
+  later(below);
+}
+
+const inSight = (place) => {
+  const { top, bottom } = place.getBoundingClientRect();
+  return top < innerHeight && bottom > 0;
+};
+
+/** Plots that are due, one after the other, so that the page answers in between. */
+function later([next, ...rest]) {
+  if (!next) return;
+  setTimeout(() => {
+    if (next.isConnected) next.due?.();
+    later(rest);
+  });
 }
 
 const narrow = (place) => place.parentElement.clientWidth < NARROW;

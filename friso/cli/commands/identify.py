@@ -75,6 +75,7 @@ def identify(
     from friso.answers.identify import identify as question
     from friso.answers.output_folder import OutputFolder
     from friso.identification.sources import OpenQuestions
+    from friso.views.drawing.images import drawing_beside
     from friso.views.identify.page import STAGE
 
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
@@ -96,7 +97,8 @@ def identify(
             _keep(error.mappings, target)
             raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
         speak_of(answer.axis_kind)
-        files, unwritten = tried(lambda: target.write(answer.files(), progress))
+        with drawing_beside():
+            files, unwritten = tried(lambda: target.write(answer.files(), progress))
     show(answer, [*files, *kept] if files else [], as_json, details, unwritten)
 
 

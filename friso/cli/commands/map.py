@@ -71,6 +71,7 @@ def map_cells(
     from friso.answers.output_folder import output_folder
     from friso.answers.sweep import sweep
     from friso.axis import speak_of
+    from friso.views.drawing.images import drawing_beside
 
     store, elsewhere = out or Path(f"{source.stem}_map.zarr"), None
     if source.is_dir():
@@ -85,7 +86,7 @@ def map_cells(
         "yes": yes,
         "out": store,
     }
-    with ProgressBar() as progress, named_as_options(options):
+    with ProgressBar() as progress, drawing_beside(), named_as_options(options):
         answer = sweep(source, **options, beside=elsewhere is None, progress=progress)
         speak_of(answer.axis_kind)
         place = answer.store or source

@@ -23,7 +23,8 @@ DEFINITIONS = (
 def bode_files(bode: Bode) -> dict[str, Content]:
     """The page, and every figure in all formats."""
     figures = bode_figures(bode)
-    return {"bode.html": bode_html(bode, figures), **pictures(figures)}
+    images = pictures(figures)
+    return {"bode.html": bode_html(bode, figures), **images}
 
 
 def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:

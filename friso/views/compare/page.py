@@ -26,7 +26,8 @@ from friso.views.pages import Report
 def compare_files(comparison: Comparison) -> dict[str, Content]:
     """The page, and every figure in all formats."""
     figures = compare_figures(comparison)
-    return {"compare.html": page(comparison, figures), **pictures(figures)}
+    images = pictures(figures)
+    return {"compare.html": page(comparison, figures), **images}
 
 
 def page(comparison: Comparison, figures: Sequence[Figure]) -> str:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from friso.views.convert.figures import conversion_figure
-from friso.views.drawing.matplotlib_renderer import save
+from friso.views.drawing.images import save
 from friso.views.files import Content
 
 if TYPE_CHECKING:

@@ -25,12 +25,13 @@ def design_files(design: Design) -> dict[str, Content]:
     """The stages (the design, and the worst machine tried with it), the page, the drawing, and every figure in all
     formats."""
     figures = design_figures(design)
+    images = pictures(figures)
     return {
         "design.toml": design.stage.to_toml(),
         "worst.toml": design.verification.worst.to_toml(),
         "design.html": design_html(design, figures),
         "design_drawing.svg": drawing(design),
-        **pictures(figures),
+        **images,
     }
 
 

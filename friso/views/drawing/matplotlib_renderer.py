@@ -13,7 +13,6 @@ from collections import deque
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
 from functools import cached_property
-from pathlib import Path
 from threading import RLock
 from typing import Any
 
@@ -35,9 +34,9 @@ from matplotlib.transforms import Bbox
 from friso.errors import InputError
 from friso.views.drawing.drawable import drawable, word_ticks
 from friso.views.drawing.figure import GREY, INK, Figure, Panel
+from friso.views.drawing.images import FORMATS
 from friso.views.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
 
-FORMATS = ("png", "svg", "pdf")
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
@@ -233,11 +232,6 @@ _last: deque[_LaidOut] = deque(maxlen=6)
 
 _one_at_a_time = RLock()
 """Matplotlib's parameters are those of the process, and a canvas may be kept, but friso app draws in threads."""
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write the figure to `path`, in the format of its suffix (ValueError for others than FORMATS)."""
-    path.write_bytes(image(figure, path.suffix.removeprefix(".").lower()))
 
 
 @contextmanager

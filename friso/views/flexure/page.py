@@ -36,10 +36,11 @@ BASIS = (
 def flexure_files(flexure: BothModels) -> dict[str, Content]:
     """The page, the drawing, and every figure in all formats."""
     figures = flexure_figures(flexure)
+    images = pictures(figures)
     return {
         "flexure.html": flexure_html(flexure, figures),
         "flexure_drawing.svg": drawing(flexure),
-        **pictures(figures),
+        **images,
     }
 
 

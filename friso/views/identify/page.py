@@ -36,11 +36,12 @@ def identify_files(
     if stage is not None and identification.correlations.keys:
         correlations = correlations_text(identification.correlations, stage)
     figures = identify_figures(identification, predictions)
+    images = pictures(figures)
     return {
         STAGE: None if stage is None else with_origins(stage.to_toml(), identification.origins),
         correlations_file(Path(STAGE)).name: correlations,
         "identify.html": identify_html(identification, logs, predictions, figures),
-        **pictures(figures),
+        **images,
     }
 
 

@@ -15,7 +15,8 @@ from friso.views.pages import Report
 def logs_files(contents: Sequence[LogContent]) -> dict[str, Content]:
     """The page, and every figure in all formats."""
     figures = logs_figures(contents)
-    return {"logs.html": logs_html(contents, figures), **pictures(figures)}
+    images = pictures(figures)
+    return {"logs.html": logs_html(contents, figures), **images}
 
 
 def logs_html(contents: Sequence[LogContent], figures: Sequence[Figure]) -> str:

@@ -6,7 +6,7 @@ import json
 from functools import partial
 from typing import TYPE_CHECKING
 
-from friso.views.drawing import matplotlib_renderer
+from friso.views.drawing.images import FORMATS, ON_PAGE, Image, draw_beforehand, save
 from friso.views.drawing.packing import packed_json
 from friso.views.files import Content
 from friso.views.map.cells import SAMPLE, axes_of
@@ -22,15 +22,19 @@ if TYPE_CHECKING:
     from friso.studies.traces import Traces
     from friso.views.drawing.figure import Figure
 
-FORMS = (*matplotlib_renderer.FORMATS, "html")
+FORMS = (*FORMATS, "html")
 """Suffixes of the files of a map."""
+
+PRINTED = ON_PAGE._replace(noted=False)
+"""What the page shows where it is printed."""
 
 
 def map_files(runs: xr.Dataset, metric: str, rerun: str, drawn: Traces | None) -> dict[str, Content]:
     """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` and `drawn`
     as in `map_html`."""
     figure = map_figure(runs, metric)
-    files: dict[str, Content] = {form: partial(matplotlib_renderer.save, figure) for form in FORMS[:-1]}
+    draw_beforehand([figure], [*map(Image, FORMATS), PRINTED])
+    files: dict[str, Content] = {form: partial(save, figure) for form in FORMS[:-1]}
     return {**files, FORMS[-1]: map_html(runs, metric, rerun, drawn, figure)}
 
 
@@ -63,7 +67,7 @@ def map_html(
             "undrawn": drawn is None,
             "data": packed_json(page_data(runs, metric, rerun, drawn)),
             "figure": figure,
-            "printed": print_image(figure, noted=False),
+            "printed": print_image(figure, noted=PRINTED.noted),
             "script": script("map"),
             "rtol": f"{float(runs.attrs['rtol']):g}",
         },

@@ -38,13 +38,14 @@ def figures(outcome: Outcome) -> list[Figure]:
 def rig_files(outcome: Outcome) -> dict[str, Content]:
     """The page, the logs with how they are to be read, the truth in a folder of its own, and every figure in all
     formats."""
-    images = figures(outcome)
+    drawn = figures(outcome)
+    images = pictures(drawn)
     logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
     return {
-        "rig.html": page(outcome, images),
+        "rig.html": page(outcome, drawn),
         **logs,
         "truth/stage.toml": stage_text(outcome.stage, outcome.seed),
-        **pictures(images),
+        **images,
     }
 
 

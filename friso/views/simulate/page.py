@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.views.check.figures import response_figure
-from friso.views.drawing.matplotlib_renderer import save
+from friso.views.drawing.images import save
 from friso.views.files import Content
 
 if TYPE_CHECKING:

@@ -1,0 +1,72 @@
+"""Processes of Python beside this one, which answer what they are asked, one question after the other. Each ends by
+itself if nothing comes for a while, or with the process that started it."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from threading import Timer
+from typing import Any
+
+PATIENCE = 60.0
+"""How long [s] one waits for the next question: it may hold 150 MB."""
+
+
+class HelperProcess:
+    """A process that runs a module, which calls `answer_questions`; `paths` are where it finds modules."""
+
+    def __init__(self, module: str, *arguments: str, paths: Iterable[str]) -> None:
+        self._messages = tempfile.TemporaryFile()  # noqa: SIM115, open as long as the process lives
+        environ = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), "PYTHONIOENCODING": "utf-8"}
+        command = [sys.executable, "-P", "-m", module, *arguments]
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=self._messages, env=environ)
+
+    def ask(self, question: object) -> Any:
+        """What it answers. Raises EOFError where it has ended instead."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        with suppress(OSError):  # nobody reads it any more: the process ended, and says why
+            pickle.dump(question, self._process.stdin)
+            self._process.stdin.flush()
+        try:
+            return pickle.load(self._process.stdout)
+        except pickle.UnpicklingError as error:  # it ended on the way
+            raise EOFError(str(error)) from None
+
+    def end(self) -> str:
+        """End the process; what it has said on standard error."""
+        with suppress(OSError):
+            self._process.communicate()
+        self._messages.seek(0)
+        message = self._messages.read().decode(errors="replace")
+        self._messages.close()
+        return message
+
+    def kill(self) -> None:
+        """End the process, whatever it is at."""
+        self._process.kill()
+
+
+def answer_questions(answer: Callable[[Any], Any]) -> None:
+    """What such a process does: answer the questions on standard input until there are no more, or none comes for a
+    while."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it
+    answers, sys.stdout = sys.stdout.buffer, sys.stderr  # what plug-ins print is no answer
+    while True:
+        patience = Timer(PATIENCE, os._exit, (0,))
+        patience.daemon = True
+        patience.start()
+        try:
+            question = pickle.load(sys.stdin.buffer)
+        except EOFError:
+            return
+        patience.cancel()
+        pickle.dump(answer(question), answers)
+        answers.flush()
