@@ -58,7 +58,7 @@ def answer_questions(answer: Callable[[Any], Any]) -> None:
     """What such a process does: answer the questions on standard input until there are no more, or none comes for a
     while."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # of a terminal: who started this one ends it
-    answers, sys.stdout = sys.stdout.buffer, sys.stderr  # what plug-ins print is no answer
+    answers, sys.stdout = sys.stdout, sys.stderr  # what plug-ins print is no answer
     while True:
         patience = Timer(PATIENCE, os._exit, (0,))
         patience.daemon = True
@@ -68,5 +68,5 @@ def answer_questions(answer: Callable[[Any], Any]) -> None:
         except EOFError:
             return
         patience.cancel()
-        pickle.dump(answer(question), answers)
-        answers.flush()
+        pickle.dump(answer(question), answers.buffer)
+        answers.buffer.flush()
