@@ -18,7 +18,7 @@ import time
 import zipfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -34,6 +34,7 @@ from friso.app import gate, uploads
 from friso.app import machine as machines
 from friso.app.gate import Access
 from friso.app.ghosts import ghosts_of
+from friso.app.kept import MOST, KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
 from friso.app.serve import Server, listening
@@ -525,7 +526,7 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
         assert {trace.get("name") for trace in last} >= {"flip", "pinned", "this machine"}
         assert parts[-1]["notes"] == ["static friction of 9 N"]
         assert len(last) > len(first)
-    assert len(asked) == 3  # the pinned one's is kept
+    assert len(asked) == 2  # both are kept
 
 
 @pytest.mark.parametrize(
@@ -625,6 +626,32 @@ def test_warnings_go_with_the_answer_every_time(served: Served) -> None:
 
 
 UNSTABLE = {"controller.alpha": 0.99, "controller.beta": 1, "controller.crossover": "40 Hz"}
+
+
+def test_an_answer_is_there_at_once_for_whoever_comes_back_with_what_was_noted() -> None:
+    """The last of each kind; of other options it is another one, and what was overtaken is none."""
+    asked: list[tuple[Any, ...]] = []
+
+    def question(stage: Any, *, draws: int = 0, progress: Any) -> Any:
+        asked.append((stage.name, draws))
+        progress(0, 1, "")
+        work.notes.append("a note")
+        return object()
+
+    kept, rig = KeptAnswers(), Machine(RIG.read_text(encoding="utf-8"), "rig.toml")
+    work = Work(lambda part: None)
+    first = kept.answer(question, rig, work)
+    assert kept.answer(question, rig, work, {"draws": 10}) is not first
+    work = Work(lambda part: None)
+    assert (kept.answer(question, rig, work), work.notes, len(asked)) == (first, ["a note"], 2)
+    work.overtake()
+    other = replace(rig, changed='{"controller.crossover": "9 Hz"}')
+    with pytest.raises(Overtaken), ended_by(work.flag):
+        kept.answer(question, other, work)
+    work = Work(lambda part: None)
+    for crossover in range(MOST):
+        kept.answer(question, replace(rig, changed=f'{{"controller.crossover": "{9 + crossover} Hz"}}'), work)
+    assert kept.answer(question, rig, work) is not first
 
 
 def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Served) -> None:

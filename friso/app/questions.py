@@ -5,8 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +14,7 @@ from friso.app import machine as machines
 from friso.app.archive import archive
 from friso.app.frames import figure_on_page
 from friso.app.ghosts import ghosts_of, with_edge, with_places
+from friso.app.kept import KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine
 from friso.app.uploads import Uploads
@@ -35,6 +35,9 @@ if TYPE_CHECKING:
     from friso.app.work import Work
 
 AnswerPart = dict[str, Any]
+
+KEPT = KeptAnswers()
+"""Answers about machines; those of runs follow a slider, and are kept of the pinned machine alone."""
 
 
 @dataclass(frozen=True)
@@ -97,14 +100,14 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What the run does."""
     asked.chosen()
-    ghosts = _ghosts(asked, work, _run)
+    ghosts = _ghosts(asked, work, friso.simulate)
     yield parts_of(friso.simulate(asked.machine.stage), ghosts, **_lines("simulate", asked))
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What the run of a cell of a map does: its error alone."""
     asked.chosen()
-    ghosts = _ghosts(asked, work, _run)
+    ghosts = _ghosts(asked, work, friso.simulate)
     answer = friso.simulate(asked.machine.stage)
     with speaking_of(answer.axis_kind):
         (figure,) = map(ghosts, answer.figures())
@@ -126,8 +129,8 @@ def verdict(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """Does it hunt: every case, with its margin."""
     options = asked.chosen(*OPTIONS["check"])
-    ghosts = _ghosts(asked, work, _check)
-    answer = friso.check(asked.machine.stage, **options, progress=work.progress)
+    ghosts = _ghosts(asked, work, friso.check)
+    answer = KEPT.answer(friso.check, asked.machine, work, options)
     cases = {name: case.verdict for name, case in answer.result.items()}
     more = {"cases": _labelled(asked.machine.stage, cases), **_lines("check", asked, options)}
     yield parts_of(answer, ghosts, **more)
@@ -148,17 +151,18 @@ def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def _loops(asked: PageRequest, work: Work) -> tuple[Answer, AnswerPart]:
     asked.chosen()
-    ghosts = _ghosts(asked, work, _bode)
-    answer = friso.bode(asked.machine.stage, progress=work.progress)
+    ghosts = _ghosts(asked, work, friso.bode)
+    answer = KEPT.answer(friso.bode, asked.machine, work)
     return answer, figures_of(answer, ghosts)
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The leaf springs."""
     asked.chosen()
-    ghost = _flexure(asked.pinned) if asked.pinned and asked.pinned.stage.flexure else None
+    pinned = asked.pinned if asked.pinned and asked.pinned.stage.flexure else None
+    ghost = KEPT.answer(friso.flexure, pinned, work) if pinned else None
     work.notes.clear()
-    answer = friso.flexure(asked.machine.stage, progress=work.progress)
+    answer = KEPT.answer(friso.flexure, asked.machine, work)
     drawn = {"": answer, "pinned": ghost} if ghost else {"": answer}
     drawings = [{"label": label, "svg": item.files()["flexure_drawing.svg"]} for label, item in drawn.items()]
     yield parts_of(answer, ghosts_of(ghost), drawings=drawings, **_lines("flexure", asked))
@@ -189,7 +193,7 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
         return {name: f"{text}:{count}" for name, text in axes.items()}
 
     def swept(count: int) -> SweepAnswer:
-        return friso.sweep(asked.machine.stage, **ranges(count), **shown, progress=work.progress)
+        return KEPT.answer(friso.sweep, asked.machine, work, {**ranges(count), **shown})
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
         def drawn(figure: Figure) -> Figure:
@@ -208,9 +212,7 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     if options.get("edge"):
         yield {**whole, "kind": "partly"}
         try:
-            edge = friso.boundary(
-                asked.machine.stage, x=axes["x"], y=axes["y"], log=shown["log"], progress=work.progress
-            )
+            edge = KEPT.answer(friso.boundary, asked.machine, work, {**axes, "log": shown["log"]})
             whole = part(answer, finest, edge)
             whole["sentences"] += edge.sentences()
         except InputError as error:  # such as a stage that cannot hunt: its map is shown all the same
@@ -223,7 +225,7 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     options = asked.chosen(*OPTIONS["boundary"])
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
     lines = _lines("boundary", asked, options)
-    answer = friso.boundary(asked.machine.stage, **options, progress=work.progress)
+    answer = KEPT.answer(friso.boundary, asked.machine, work, options)
 
     def part(ghosts: Callable[[Figure], Figure]) -> AnswerPart:
         def drawn(figure: Figure) -> Figure:
@@ -237,7 +239,7 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     yield {**part(ghosts_of(None)), "kind": "partly"}
     notes = [*work.notes]
     try:
-        ghost = _boundary(asked.pinned, tuple(options.items()), _Reporting(work.progress))
+        ghost = KEPT.answer(friso.boundary, asked.pinned, work, options)
         whole = part(ghosts_of(ghost))
     except InputError as error:  # such as a stage that cannot hunt
         whole = part(ghosts_of(None))
@@ -353,7 +355,7 @@ def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRe
 
     def answer(asked: PageRequest, work: Work) -> Answer:
         options = asked.chosen(*OPTIONS.get(command, ()))
-        return function(asked.machine.stage, **options, progress=work.progress)
+        return KEPT.answer(function, asked.machine, work, options)
 
     return answer
 
@@ -363,7 +365,7 @@ def _mapped(asked: PageRequest, work: Work) -> Answer:
     options = asked.chosen(*OPTIONS["map"])
     options.pop("edge", None)
     options |= {name: f"{options[name]}:{COARSE_TO_FINE[-1]}" for name in ("x", "y") if name in options}
-    return friso.sweep(asked.machine.stage, **options, progress=work.progress)
+    return KEPT.answer(friso.sweep, asked.machine, work, options)
 
 
 COMMANDS: Mapping[str, Callable[[PageRequest, Work], Answer]] = {
@@ -424,11 +426,11 @@ def _of(machine: Machine) -> str:
     return "the stage file saved here" if machine.is_of_page else f"{machine.name} as it was opened"
 
 
-def _ghosts(asked: PageRequest, work: Work, answer: Callable[[Machine], Answer]) -> Callable[[Figure], Figure]:
-    """What puts the lines of the pinned machine's answer behind those of a figure."""
+def _ghosts(asked: PageRequest, work: Work, function: Callable[..., Answer]) -> Callable[[Figure], Figure]:
+    """What puts the lines of the answer about the pinned machine behind those of a figure."""
     if asked.pinned is None:
         return ghosts_of(None)
-    pinned = answer(asked.pinned)
+    pinned = KEPT.answer(function, asked.pinned, work)
     work.notes.clear()  # those on the pinned machine
     return ghosts_of(pinned)
 
@@ -437,38 +439,6 @@ def _stands(asked: PageRequest) -> list[tuple[str, Stage]]:
     """The machines whose places a map shows."""
     pinned = [("pinned", asked.pinned.stage)] if asked.pinned else []
     return [("this machine", asked.machine.stage), *pinned]
-
-
-@lru_cache(8)
-def _run(which: Machine) -> Any:
-    return friso.simulate(which.stage)
-
-
-@lru_cache(2)
-def _bode(which: Machine) -> Any:
-    return friso.bode(which.stage)
-
-
-@lru_cache(2)
-def _check(which: Machine) -> Any:
-    return friso.check(which.stage)
-
-
-@lru_cache(2)
-def _flexure(which: Machine) -> Any:
-    return friso.flexure(which.stage)
-
-
-@dataclass(frozen=True)
-class _Reporting:
-    """What takes progress: which one, is all the same to what is kept."""
-
-    progress: Callable[..., None] = field(compare=False)
-
-
-@lru_cache(4)
-def _boundary(which: Machine, options: tuple[tuple[str, Any], ...], reporting: _Reporting) -> Any:
-    return friso.boundary(which.stage, **dict(options), progress=reporting.progress)
 
 
 def _given(stage: Stage) -> str:
