@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -34,7 +34,8 @@ from friso.identification.output_error import fit as fitting
 from friso.identification.output_error.changes import changes_beside, explained_by, inverse_reaching
 from friso.identification.output_error.fit import OutputErrorFit, first_values
 from friso.identification.output_error.parameters import FitParameter, fit_parameters
-from friso.identification.output_error.problem import tracking
+from friso.identification.output_error.problem import Problem, Simulated, tracking
+from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.repeated import as_far_off_as_repeated
 from friso.identification.quality import Quality, halves, noise_of, whole_error
 from friso.identification.readings.common import record
@@ -506,6 +507,54 @@ def test_starts_are_tried_all_over_a_long_record() -> None:
     later = problem.part(parts[-1])
     assert later.start[0] == later.inputs.reference[0] == problem.inputs.reference[parts[-1].start]
     assert len(later.target) == len(later.counted) == parts[-1].stop - parts[-1].start
+
+
+def test_rests_do_not_count_where_the_motion_is_not_smoothed() -> None:
+    """A position that stands out of its noise at all frequencies is taken as it is: its noise is that of its samples."""
+    way = np.repeat([0.0, 0.01, 0.0, 0.02], 1000)
+    blurred = way + 2e-8 * np.random.default_rng(3).standard_normal(len(way))
+    log = record("steps", DT, position=blurred, force=np.zeros(len(way)))
+    flat = made_up(log, inverse_model(axis(), 5.0)).flat()
+    counted = tracking(flat, log, log.segments[0], _parameters(flat), 0.5 / DT).counted
+    assert counted.any()
+    assert not counted[(np.arange(len(way)) % 1000 > 200) & (np.arange(len(way)) % 1000 < 800)].any()
+
+
+@dataclass(frozen=True)
+class Valley:
+    """A problem with the residuals of Rosenbrock's valley, whose lowest place is (1, 1), and the rows of derivatives
+    that were asked for."""
+
+    weight: float
+    asked: list[int] = field(default_factory=list)
+    target: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    counted: np.ndarray = field(default_factory=lambda: np.ones(2))
+    parameters: tuple[FitParameter, ...] = tuple(
+        FitParameter(name, "", 0.0, -3.0, 3.0, logarithmic=False) for name in ("a", "b")
+    )
+
+    def _off(self, inner: np.ndarray) -> np.ndarray:
+        return self.weight * np.stack([10 * (inner[:, 1] - inner[:, 0] ** 2), 1 - inner[:, 0]], axis=1)
+
+    def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
+        off = self._off(inner)
+        yield np.arange(len(inner)), Simulated(off, off, off)
+
+    def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        self.asked.append(len(inner))
+        slopes = [self.weight * np.array([[-20 * a, 10.0], [-1.0, 0.0]]) for a, _ in inner]
+        return list(zip(self._off(inner), slopes, strict=True))
+
+
+def test_a_refined_fit_finds_its_way_along_a_valley_and_asks_for_no_derivative_twice() -> None:
+    pieces = [Valley(1.0), Valley(2.0)]
+    starts = np.array([[-1.2, 1.0], [1.0, 1.0], [2.0, -2.0]])
+    iterations = 25
+    refined = refine_fit(cast("list[Problem]", pieces), starts, np.ones(starts.shape, bool), iterations, 1e-9)
+    assert refined.inner == pytest.approx(np.ones(starts.shape), abs=1e-3)
+    assert pieces[0].asked == pieces[1].asked
+    assert pieces[0].asked[0] == len(starts)
+    assert sum(pieces[0].asked) < 2 * iterations
 
 
 def _parameters(flat: dict[str, Any]) -> list[FitParameter]:

@@ -14,8 +14,9 @@ from friso.engine.kernel import Kernel, empty_results
 BUDGET = 200
 """Steps that a run may take per sample on average."""
 
-CHUNK = 64
-"""Runs at a time: their sampled states are kept until they are handed over."""
+CHUNK, FEWEST, MOST = 4e6, 16, 256
+"""Samples of runs at a time, as the sampled states are kept until they are handed over; and runs at least and at most.
+"""
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,9 @@ def run_driven(
     )
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = options_of(replace(options, interval=inputs.sample_time))
-    for first in range(0, runs, CHUNK):
-        numbers = np.arange(first, min(first + CHUNK, runs))
+    at_once = int(np.clip(CHUNK / count, FEWEST, MOST))
+    for first in range(0, runs, at_once):
+        numbers = np.arange(first, min(first + at_once, runs))
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
         periods = np.full(len(numbers), inputs.sample_time)
         batch = batch._replace(

@@ -72,12 +72,12 @@ class Quality:
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
 
 
-def noise_of(force: np.ndarray) -> float:
-    """Standard deviation [N] of the noise of a force, shape (n,): of what neighbouring samples do not share, as its
-    third differences show it, or of its digits."""
-    steps = np.abs(np.diff(force))
+def noise_of(signal: np.ndarray) -> float:
+    """Standard deviation of the noise of a force [N] or a position [m], shape (n,): of what neighbouring samples do not
+    share, as its third differences show it, or of its digits."""
+    steps = np.abs(np.diff(signal))
     digit = steps[steps > 0].min() / np.sqrt(12) if (steps > 0).any() else 0.0
-    rough = np.diff(force, 3)
+    rough = np.diff(signal, 3)
     white = NORMAL_MAD * float(np.median(np.abs(rough))) / np.sqrt(20) if rough.size else 0.0
     return max(white, float(digit))
 

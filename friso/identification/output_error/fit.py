@@ -12,7 +12,7 @@ from scipy.stats import qmc
 from friso.engine.driven import Inputs
 from friso.identification.output_error.parameters import FitParameter, keys_of
 from friso.identification.output_error.problem import Problem
-from friso.identification.output_error.refine import bounds_of, costs, refine_fit
+from friso.identification.output_error.refine import bounds_of, refine_fit
 from friso.identification.spread import correlation_length, groups_of, spread_of
 from friso.intervals import COVERAGE
 
@@ -26,7 +26,7 @@ is not fitted, and which may be 0, the share of their range."""
 SCREENED, STRETCHES = 1e7, 8
 """Samples that the starts are simulated over, all together: long records are cut for them, into so many stretches."""
 
-FIRST, ROUGH, FINE = 4, 8, 30
+FIRST, ROUGH, FINE = 3, 5, 30
 """Iterations of the refinement of the starts tried, further ones of those kept, and most evaluations of lmfit times the
 parameters."""
 
@@ -99,13 +99,25 @@ def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
 
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErrorFit:
     """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
-    which are refined; the others stay as in the first of them. What a start is worth shows after a few iterations: of a
-    stage that sticks and slips the best of the starts as they are lead to other optima."""
-    mask = np.zeros(starts.shape[1], bool)
+    which are refined; the others stay as in the first of them."""
+    return fits([problem], free, starts)[0]
+
+
+def fits(problems: Sequence[Problem], free: Sequence[int], starts: np.ndarray) -> list[OutputErrorFit]:
+    """The same of problems that differ in nothing but what counts."""
+    pieces = _parts(problems[0], len(starts))
+    ranked = _ranked(problems, pieces, starts)
+    return [_fit(problem, pieces, free, tried) for problem, tried in zip(problems, ranked, strict=True)]
+
+
+def _fit(problem: Problem, pieces: Sequence[slice], free: Sequence[int], tried: np.ndarray) -> OutputErrorFit:
+    """Fit from the best starts. What one of them is worth shows after a few iterations, on pieces of a long record: of
+    a stage that sticks and slips the best of the starts as they are lead to other optima."""
+    mask = np.zeros(tried.shape[1], bool)
     mask[list(free)] = True
-    tried = _screened(problem, starts)
-    for most, iterations in ((TRIED, FIRST), (KEPT, ROUGH)):
-        refined = refine_fit(problem, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations)
+    rough = [problem] if problem.closed else [problem.part(piece) for piece in pieces]
+    for parts, most, iterations in ((rough, TRIED, FIRST), ([problem], KEPT, ROUGH)):
+        refined = refine_fit(parts, tried[:most], np.tile(mask, (len(tried[:most]), 1)), iterations)
         tried = refined.inner[np.argsort(refined.cost)]
     return polished(problem, tuple(free), tried[0])
 
@@ -144,12 +156,17 @@ def nearby(fit: OutputErrorFit) -> np.ndarray:
     return starts
 
 
-def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
-    """The best starts, shape (tried, parameters), the first one always among them."""
+def _ranked(problems: Sequence[Problem], pieces: Sequence[slice], starts: np.ndarray) -> list[np.ndarray]:
+    """Of each problem the best starts, shape (tried, parameters), the first one always among them."""
     if len(starts) <= TRIED:
-        return starts
-    screened = np.sum([costs(problem.part(part), starts[1:]) for part in _parts(problem, len(starts))], axis=0)
-    return np.vstack([starts[0], starts[1:][np.argsort(screened)[: TRIED - 1]]])
+        return [starts] * len(problems)
+    sums = np.zeros((len(problems), len(starts) - 1))
+    for piece in pieces:
+        part, counted = problems[0].part(piece), np.stack([problem.counted[piece] for problem in problems])
+        for numbers, record in part.simulated(starts[1:]):
+            sums[:, numbers] += counted**2 @ ((part.target - record.force) ** 2).T
+    best = np.argsort(np.where(np.isfinite(sums), sums, np.inf), axis=1)[:, : TRIED - 1]
+    return [np.vstack([starts[0], starts[1:][chosen]]) for chosen in best]
 
 
 def _parts(problem: Problem, starts: int) -> list[slice]:

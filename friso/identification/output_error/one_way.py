@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identification.output_error.fit import OutputErrorFit, everywhere, fit
+from friso.identification.output_error.fit import OutputErrorFit, everywhere, fits
 from friso.intervals import COVERAGE
 
 LEAST = 0.2
@@ -45,7 +45,7 @@ def either_way(both: OutputErrorFit, velocity: np.ndarray, thorough: bool) -> Ei
         return EitherWay(both)
     problems = [replace(both.problem, counted=way, unsettled=()) for way in ways]
     starts = everywhere(both.problem, free, both.inner) if thorough else both.inner[None]
-    alone = [fit(problem, free, starts) for problem in problems]
+    alone = fits(problems, free, starts)
     deviation = np.sqrt(np.diag(both.covariance))
     off = np.abs([one.inner - both.inner for one in alone]).max(axis=0)[list(both.free)] / COVERAGE
     usable = np.isfinite(deviation) & (deviation > 0)

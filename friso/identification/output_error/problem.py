@@ -20,6 +20,7 @@ from friso.errors import InputError
 from friso.identification.inverse_model import SMOOTH, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
+from friso.identification.quality import noise_of
 from friso.identification.readings.common import robust
 from friso.stage.controllers import CONTROLLER
 
@@ -263,13 +264,17 @@ def _moving(position: np.ndarray, smooth: np.ndarray, sample_time: float, settli
     the beginning."""
     window = max(3, round(REST / sample_time))
     span = maximum_filter1d(position, window) - minimum_filter1d(position, window)
-    steps = np.abs(np.diff(position))
-    digit = float(steps[steps > 0].min()) if (steps > 0).any() else 0.0
-    resting = span <= STILL * max(robust(position - smooth), digit / np.sqrt(12))
+    resting = span <= STILL * blur_of(position, smooth)
     resting[0] = True
     late = round(settling / sample_time)
     recent = maximum_filter1d(resting.astype(np.int8), 2 * late + 1, origin=late)
     return np.where(recent, 0.0, 1.0)
+
+
+def blur_of(position: np.ndarray, smooth: np.ndarray) -> float:
+    """Standard deviation [m] of the noise of a position, shape (n,): of what a `smooth` one leaves of it, or of what
+    neighbouring samples do not share, where little is smoothed."""
+    return max(robust(position - smooth), noise_of(position))
 
 
 def _after_start(count: int, sample_time: float) -> np.ndarray:

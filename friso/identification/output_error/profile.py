@@ -19,7 +19,7 @@ WIDE = 4.0
 WIDER = 5.0
 """Times as far each time that the interval does not end within."""
 
-ROUNDS, SETTLED = 6, 0.1
+ROUNDS, SETTLED = 5, 0.1
 """Iterations of each of these fits at most, and the share of what ends an interval by which one may still fall: along a
 ridge, such as that of a Stribeck curve that is passed quickly, a fit that is ended early makes intervals too narrow."""
 
@@ -75,9 +75,9 @@ def _fits(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
     return (
-        refine_fit(fit.problem, starts, free, ROUNDS, SETTLED * WORSE / fit.independent)
+        refine_fit([fit.problem], starts, free, ROUNDS, SETTLED * WORSE / fit.independent)
         if others
-        else Refined(starts, costs(fit.problem, starts))
+        else Refined(starts, costs([fit.problem], starts))
     )
 
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from friso.identification.output_error.problem import Problem
 
-FIRST, LESS, MORE = 1e-2, 0.3, 10.0
-"""Damping of the first step, as a share of the curvature, and by how much it falls and grows afterwards."""
+FIRST, MOST = 1e-2, 1e3
+"""Damping of the first step, as a share of the curvature, and that at which a fit that gets no better is left."""
+
+LADDER = np.array([0.1, 1.0, 10.0, 100.0])
+"""Dampings that are tried at once, in units of the last one that was best."""
 
 ENOUGH = 1e-4
 """Share by which the sum of squares of a fit falls at last, unless that has to be told more precisely."""
@@ -33,49 +37,69 @@ def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def costs(problem: Problem, inner: np.ndarray) -> np.ndarray:
+def costs(pieces: Sequence[Problem], inner: np.ndarray) -> np.ndarray:
     """Mean squares of the residuals [N^2], shape (runs,), of fitted numbers of shape (runs, parameters)."""
-    costs = np.empty(len(inner))
-    for numbers, record in problem.simulated(inner):
-        costs[numbers] = np.mean(((problem.target - record.force) * problem.counted) ** 2, axis=1)
+    costs = np.zeros(len(inner))
+    for problem in pieces:
+        for numbers, record in problem.simulated(inner):
+            costs[numbers] += np.sum(((problem.target - record.force) * problem.counted) ** 2, axis=1)
+    costs /= sum(len(problem.target) for problem in pieces)
     return np.where(np.isfinite(costs), costs, np.inf)
 
 
 def refine_fit(
-    problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: int, enough: float = ENOUGH
+    pieces: Sequence[Problem], starts: np.ndarray, free: np.ndarray, iterations: int, enough: float = ENOUGH
 ) -> Refined:
-    """Fit from several starts, shape (starts, parameters); of each only the numbers that are `free`, a mask of the same
-    shape. A fit is done when its sum of squares falls by less than the share `enough`."""
-    low, high = bounds_of(problem)
+    """Fit all `pieces` of a problem from several starts, shape (starts, parameters); of each only the numbers that are
+    `free`, a mask of the same shape. A fit is done when its sum of squares falls by less than the share `enough`.
+
+    Of every start several dampings are tried side by side, which costs less than the derivatives do; these are computed
+    anew only where one of them was better."""
+    low, high = bounds_of(pieces[0])
     margin = BOUND * (high - low)
-    inner = np.clip(starts, low + margin, high - margin)
-    cost = costs(problem, inner)
+    low, high = low + margin, high - margin
+    inner = np.clip(starts, low, high)
+    cost = costs(pieces, inner)
     damping = np.full(len(inner), FIRST)
     busy = np.isfinite(cost)
+    squares, gradients = np.zeros((*inner.shape, inner.shape[1])), np.zeros(inner.shape)
+    moved = busy.copy()
     for _ in range(iterations):
-        if not busy.any():
+        squares[moved], gradients[moved] = _curvature(pieces, inner[moved], free[moved])
+        busy &= np.isfinite(gradients).all(axis=1) & (damping < MOST)
+        rows = np.flatnonzero(busy)
+        if not rows.size:
             break
-        trial = inner.copy()
-        trial[busy] = _stepped(problem, inner[busy], free[busy], damping[busy])
-        trial = np.clip(trial, low + margin, high - margin)
-        trial_cost = np.full(len(inner), np.inf)
-        trial_cost[busy] = costs(problem, trial[busy])
-        better = trial_cost < cost
-        done = better & (trial_cost > cost * (1 - enough))
-        inner, cost = np.where(better[:, None], trial, inner), np.where(better, trial_cost, cost)
-        damping = np.where(better, damping * LESS, damping * MORE)
-        busy &= ~done & (damping < 1e3)
+        dampings = damping[rows, None] * LADDER
+        steps = _steps(squares[rows], gradients[rows], dampings)
+        trials = np.clip(inner[rows, None] + steps, low, high)
+        found = costs(pieces, trials.reshape(-1, inner.shape[1])).reshape(dampings.shape)
+        best = np.arange(len(rows)), found.argmin(axis=1)
+        better = found[best] < cost[rows]
+        done = better & (found[best] > cost[rows] * (1 - enough))
+        damping[rows] = np.where(better, dampings[best], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0])
+        moved[:] = False
+        moved[rows[better & ~done]] = True
+        inner[rows[better]], cost[rows[better]] = trials[best][better], found[best][better]
+        busy[rows[done]] = False
     return Refined(inner, cost)
 
 
-def _stepped(problem: Problem, inner: np.ndarray, free: np.ndarray, damping: np.ndarray) -> np.ndarray:
-    """One damped Gauss-Newton step of the free numbers of every start."""
-    moved = inner.copy()
-    for row, (residual, jacobian) in enumerate(problem.jacobians(inner, free)):
-        if not np.isfinite(jacobian).all():
-            continue
-        square = jacobian.T @ jacobian
-        curvature = np.diag(square).copy()
-        curvature[curvature == 0] = 1.0
-        moved[row, free[row]] += np.linalg.solve(square + damping[row] * np.diag(curvature), -jacobian.T @ residual)
-    return moved
+def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Of fitted numbers, shape (rows, parameters), the derivatives of the residual times themselves, and times the
+    residual; 0 of numbers that are not `free`."""
+    count = inner.shape[1]
+    squares, gradients = np.zeros((len(inner), count, count)), np.zeros((len(inner), count))
+    for problem in pieces if len(inner) else ():
+        for row, (residual, jacobian) in enumerate(problem.jacobians(inner, free)):
+            squares[row][np.ix_(free[row], free[row])] += jacobian.T @ jacobian
+            gradients[row, free[row]] += jacobian.T @ residual
+    return squares, gradients
+
+
+def _steps(squares: np.ndarray, gradients: np.ndarray, dampings: np.ndarray) -> np.ndarray:
+    """Damped Gauss-Newton steps, shape (rows, dampings, parameters)."""
+    curvature = np.diagonal(squares, axis1=1, axis2=2)
+    diagonal = np.where(curvature > 0, curvature, 1.0)[:, :, None] * np.eye(gradients.shape[1])
+    damped = squares[:, None] + dampings[:, :, None, None] * diagonal[:, None]
+    return np.linalg.solve(damped, -gradients[:, None, :, None])[..., 0]

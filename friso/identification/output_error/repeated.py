@@ -11,9 +11,8 @@ from scipy.stats import t as student
 
 from friso.identification.logs.log import Log
 from friso.identification.output_error.fit import OutputErrorFit
-from friso.identification.output_error.problem import Problem, tracking
+from friso.identification.output_error.problem import Problem, blur_of, tracking
 from friso.identification.output_error.refine import refine_fit
-from friso.identification.readings.common import robust
 from friso.identification.spread import CONFIDENCE
 from friso.intervals import COVERAGE
 from friso.progress import Progress
@@ -21,7 +20,7 @@ from friso.progress import Progress
 TIMES = 4
 """Simulated logs that the fit is repeated on: Student's t of so many is 1.4 times that of a known spread."""
 
-ITERATIONS = 12
+ITERATIONS = 8
 """Of each of these fits, which begin at their truth: one that has not settled by then is far off."""
 
 SEED = 11
@@ -39,7 +38,7 @@ def as_far_off_as_repeated(
     """
     free = np.isin(np.arange(len(once.inner)), once.free)
     again = [
-        refine_fit(problem, once.inner[None], free[None], ITERATIONS).inner[0]
+        refine_fit([problem], once.inner[None], free[None], ITERATIONS).inner[0]
         for problem in _simulated_logs(once, log, part, bandwidth, noise, progress)
     ]
     off = np.sqrt(np.mean([(inner - once.inner)[free] ** 2 for inner in again], axis=0))
@@ -73,7 +72,7 @@ def _simulated_logs(
     problem = once.problem
     record, rng = problem.record(once.inner), np.random.default_rng(SEED)
     measured = log["position"][part]
-    blur = robust(measured - problem.inputs.reference)
+    blur = blur_of(measured, problem.inputs.reference)
     for number in range(TIMES):
         progress(number, TIMES, "moves: the same fit of simulated logs")
         signals = {role: values.copy() for role, values in log.signals.items()}
