@@ -29,6 +29,7 @@ from friso.identification.method import identify
 from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
+from friso.identification.readings.ramps import force_ramps
 from friso.identification.readings.rate_effect import break_away, share_below, static_friction
 from friso.identification.response.fitting import ResponseFit
 from friso.identification.sources import recognised
@@ -494,6 +495,23 @@ def test_the_bound_on_the_rate_effect_holds() -> None:
         assert level > 1.5 * (1 - share_below(force_rate))
     small = np.array([share_below(r) for r in (1e-2, 1e-1)])
     assert small[1] / small[0] == pytest.approx(10 ** (2 / 3), rel=0.1)
+
+
+def test_a_step_of_the_force_behind_a_slow_rise_is_no_ramp() -> None:
+    """A stage at rest whose integral action winds slowly, until a step of its reference moves it off within a sample:
+    the force rises by far more in that step than it had."""
+    rest, go = np.linspace(0.0, 3.0, 1500), np.full(40, 60.0)
+    way = 0.5 * 18.0 * (np.arange(1, len(go) + 1) * DT) ** 2
+    position, force = np.zeros(0), np.zeros(0)
+    for direction in (1, -1) * 4:
+        at = position[-1] if position.size else 0.0
+        position = np.concatenate([position, np.full(len(rest), at), at + direction * way])
+        force = np.concatenate([force, direction * rest, direction * go])
+    rng = np.random.default_rng(6)
+    blurred = position + 2e-8 * rng.standard_normal(len(position))
+    found = force_ramps(record("steps", DT, position=blurred, force=force + 0.05 * rng.standard_normal(len(force))), 3.0)
+    assert not len(found.forces)
+    assert found.notes
 
 
 def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated(wording: Wording) -> None:

@@ -73,8 +73,9 @@ def force_ramps(log: Log, mass: float = 0.0) -> Ramps:
             if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
                 stops += 1
                 continue
-            begin = rest + _half(push)
-            if start - begin < max(SMEARED / (CUTOFF * log.sample_time), SAMPLES):
+            begin, shortest = rest + _half(push), max(SMEARED / (CUTOFF * log.sample_time), SAMPLES)
+            before = pushed[max(rest, start - round(shortest))]
+            if start - begin < shortest or direction * (2 * before - pushed[rest] - pushed[start]) < 0:
                 quick += 1
                 continue
             rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
