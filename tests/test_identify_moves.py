@@ -231,7 +231,7 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
             first[i] = parameter.inner(kept.get(parameter.name, flat.get(parameter.name)))
     first[names.index("mass")] += 0.1
     fitted = fit(exact, core, first[None])
-    assert fitted.cost < 1e-6 * float(costs(exact, first[None])[0])
+    assert fitted.cost < 1e-6 * float(costs([exact], first[None])[0])
     assert fitted.value("mass") == pytest.approx(flat["masses.cart"], rel=1e-3)
     assert fitted.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
 

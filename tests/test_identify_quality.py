@@ -19,7 +19,7 @@ from friso.identification.causes import causes, fragment
 from friso.identification.combine import combined
 from friso.identification.doubts import little_friction
 from friso.identification.estimate import Estimate
-from friso.identification.inverse_model import inverse_model
+from friso.identification.inverse_model import directions, inverse_model
 from friso.identification.logs.log import Log
 from friso.identification.model_error import (
     all_with_model_error,
@@ -37,8 +37,8 @@ from friso.identification.output_error.parameters import FitParameter, fit_param
 from friso.identification.output_error.problem import Problem, Simulated, tracking
 from friso.identification.output_error.refine import refine_fit
 from friso.identification.output_error.repeated import as_far_off_as_repeated
-from friso.identification.quality import Quality, halves, noise_of, whole_error
-from friso.identification.readings.common import record
+from friso.identification.quality import Quality, halves, whole_error
+from friso.identification.readings.common import noise_of, record
 from friso.identification.spread import groups_of, spread_of
 from friso.identification.stage_file import (
     NOT_IDENTIFIED,
@@ -510,7 +510,7 @@ def test_starts_are_tried_all_over_a_long_record() -> None:
 
 
 def test_rests_do_not_count_where_the_motion_is_not_smoothed() -> None:
-    """A position that stands out of its noise at all frequencies is taken as it is: its noise is that of its samples."""
+    """A position that stands out of its noise at all frequencies is taken as it is, noise and all."""
     way = np.repeat([0.0, 0.01, 0.0, 0.02], 1000)
     blurred = way + 2e-8 * np.random.default_rng(3).standard_normal(len(way))
     log = record("steps", DT, position=blurred, force=np.zeros(len(way)))
@@ -518,6 +518,15 @@ def test_rests_do_not_count_where_the_motion_is_not_smoothed() -> None:
     counted = tracking(flat, log, log.segments[0], _parameters(flat), 0.5 / DT).counted
     assert counted.any()
     assert not counted[(np.arange(len(way)) % 1000 > 200) & (np.arange(len(way)) % 1000 < 800)].any()
+
+
+def test_noise_goes_neither_way() -> None:
+    """Over many samples, noise alone goes as far to and fro as the motion does."""
+    time = np.arange(20_000) * DT
+    blur = 1e-7 * np.random.default_rng(8).standard_normal(len(time))
+    assert directions(5e-4 * time + blur) == (True, False)
+    assert directions(-5e-4 * time + blur) == (False, True)
+    assert directions(5e-4 * np.sin(time) + blur) == (True, True)
 
 
 @dataclass(frozen=True)

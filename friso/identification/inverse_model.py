@@ -22,7 +22,7 @@ from scipy.signal import butter, cheby1, sosfiltfilt, welch
 from friso.errors import InputError
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import ROLES, Log
-from friso.identification.readings.common import cart
+from friso.identification.readings.common import cart, noise_of, turns_of
 from friso.identification.spread import groups_of, spread_of
 
 SMOOTH, DECIMATE = 5.0, 2.0
@@ -44,8 +44,9 @@ ENERGY, ABOVE_NOISE, PIECES = 0.95, 4.0, 8
 """Share of the power of the acceleration within the bandwidth of the motion, by how much the spectrum of the position
 stands above its noise where it counts, and into how many pieces a record is cut for it (Welch's method)."""
 
-ONE_WAY = 0.02
-"""Share of the way that a log goes in one direction at least, for the two directions to be distinguished."""
+ONE_WAY, STILL = 0.02, 20.0
+"""Share of the way that a log goes in one direction at least, for the two directions to be distinguished; and standard
+deviations of the position's noise within which nothing has moved."""
 
 SLIDING, REST = 0.01, 0.1
 """Share of the highest speed below which a stage rests, and time [s] from which on a rest is left out of the fit: the
@@ -129,8 +130,8 @@ def bandwidth_of(log: Log) -> float:
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:
-    """Whether a motion, shape (n,) [m], goes forward, and whether it goes back."""
-    steps = np.diff(position)
+    """Whether a motion, shape (n,) [m], goes forward, and whether it goes back; its noise does neither."""
+    steps = np.diff(position[[0, *turns_of(position, STILL * noise_of(position)), len(position) - 1]])
     travelled = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
     forward, back = travelled > ONE_WAY * travelled.sum()
     return bool(forward), bool(back)

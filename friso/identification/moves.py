@@ -37,7 +37,8 @@ from friso.identification.output_error.problem import Problem, Simulated, loop_p
 from friso.identification.output_error.profile import Profile
 from friso.identification.output_error.repeated import as_far_off_as_repeated, late_by_a_sample
 from friso.identification.output_error.to_keys import estimates_of
-from friso.identification.quality import Quality, noise_of
+from friso.identification.quality import Quality
+from friso.identification.readings.common import noise_of
 from friso.identification.readings.ramps import force_ramps
 from friso.identification.slow_records import with_unexplained_inertia, without_sliding
 from friso.progress import Progress, silent

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from friso.identification.inverse_model import InverseModel
-from friso.identification.readings.common import NORMAL_MAD
 from friso.identification.spread import spread_of
 from friso.intervals import COVERAGE
 
@@ -70,16 +69,6 @@ class Quality:
     def lacking(self) -> float:
         """Share of what is left, RMS, that is not noise: 0 of a model that lacks nothing."""
         return float(np.sqrt(max(0.0, 1 - 1 / self.ratio**2))) if self.ratio > 1 else 0.0
-
-
-def noise_of(signal: np.ndarray) -> float:
-    """Standard deviation of the noise of a force [N] or a position [m], shape (n,): of what neighbouring samples do not
-    share, as its third differences show it, or of its digits."""
-    steps = np.abs(np.diff(signal))
-    digit = steps[steps > 0].min() / np.sqrt(12) if (steps > 0).any() else 0.0
-    rough = np.diff(signal, 3)
-    white = NORMAL_MAD * float(np.median(np.abs(rough))) / np.sqrt(20) if rough.size else 0.0
-    return max(white, float(digit))
 
 
 def steady_friction(flat: Mapping[str, Any], velocity: np.ndarray) -> np.ndarray:

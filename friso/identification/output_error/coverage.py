@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import find_peaks
 
 from friso.identification.inverse_model import FilteredMotion
+from friso.identification.readings.common import turns_of
 
 STEADY = 0.5
 """Share of the Coulomb friction that inertia has to stay below for a motion to count as steady."""
@@ -74,8 +74,7 @@ def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: 
 def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
     """Ways [m] gone from each turning point to the next at the samples at which inertia was small; a swing that is less
     than `swing` [m] turns nothing."""
-    turns = (find_peaks(sign * position, prominence=swing)[0] for sign in (1, -1))
-    ends = np.unique(np.concatenate([[0], *turns]))
+    ends = np.unique([0, *turns_of(position, swing)])
     calm = mass_per_force * np.abs(moved.acceleration) < STEADY
     pieces = zip(ends, [*ends[1:], len(position)], strict=True)
     return tuple(np.where(calm[a:b], np.abs(position[a:b] - position[a]), np.nan) for a, b in pieces)

@@ -1,4 +1,4 @@
-"""The fit: a thousand starts, the best of them refined side by side, and the best of those handed to lmfit."""
+"""The fit: a thousand starts, the best of them refined side by side, and the best of those to the end."""
 
 from __future__ import annotations
 
@@ -27,8 +27,10 @@ SCREENED, STRETCHES = 1e7, 8
 """Samples that the starts are simulated over, all together: long records are cut for them, into so many stretches."""
 
 FIRST, ROUGH, FINE = 3, 5, 30
-"""Iterations of the refinement of the starts tried, further ones of those kept, and most evaluations of lmfit times the
-parameters."""
+"""Iterations at most of the refinement of the starts tried, further ones of those kept, and of the best of these."""
+
+LITTLE = 1e-6
+"""Share by which the sum of squares of the best fit falls at last."""
 
 NEARBY, FAR = 127, 3.0
 """Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
@@ -180,29 +182,9 @@ def _parts(problem: Problem, starts: int) -> list[slice]:
 
 
 def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:
-    """The end of the fit by lmfit, with derivatives from runs side by side."""
-    import lmfit  # 0.4 s to import, with Matplotlib
-
-    low, high = bounds_of(problem)
+    """The end of the fit, and how well it is known."""
     mask = np.isin(np.arange(len(inner)), free)
-    names = [f"p{i}" for i in free]
-    parameters = lmfit.Parameters()
-    for name, i in zip(names, free, strict=True):
-        parameters.add(name, value=inner[i], min=low[i], max=high[i])
-
-    def numbers(parameters: lmfit.Parameters) -> np.ndarray:
-        full = inner.copy()
-        full[list(free)] = [parameters[name].value for name in names]
-        return full
-
-    def residual(parameters: lmfit.Parameters) -> np.ndarray:
-        return problem.residuals(numbers(parameters)[None])[0]
-
-    def jacobian(parameters: lmfit.Parameters) -> np.ndarray:
-        return problem.jacobians(numbers(parameters)[None], mask[None])[0][1]
-
-    result: Any = lmfit.minimize(residual, parameters, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
-    best = numbers(result.params)
+    best = refine_fit([problem], inner[None], mask[None], FINE, LITTLE).inner[0]
     ((rest, slopes),) = problem.jacobians(best[None], mask[None])
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T

@@ -20,8 +20,7 @@ from friso.errors import InputError
 from friso.identification.inverse_model import SMOOTH, motion
 from friso.identification.logs.log import Log
 from friso.identification.output_error.parameters import MASS, FitParameter, stages
-from friso.identification.quality import noise_of
-from friso.identification.readings.common import robust
+from friso.identification.readings.common import noise_of, robust
 from friso.stage.controllers import CONTROLLER
 
 STEP = 1e-4

@@ -54,7 +54,7 @@ def refine_fit(
     `free`, a mask of the same shape. A fit is done when its sum of squares falls by less than the share `enough`.
 
     Of every start several dampings are tried side by side, which costs less than the derivatives do; these are computed
-    anew only where one of them was better."""
+    anew only where one of them was better. A number at an end of its range from which it is driven out stays there."""
     low, high = bounds_of(pieces[0])
     margin = BOUND * (high - low)
     low, high = low + margin, high - margin
@@ -71,7 +71,9 @@ def refine_fit(
         if not rows.size:
             break
         dampings = damping[rows, None] * LADDER
-        steps = _steps(squares[rows], gradients[rows], dampings)
+        downhill = -gradients[rows]
+        inside = ((inner[rows] > low) | (downhill > 0)) & ((inner[rows] < high) | (downhill < 0))
+        steps = _steps(squares[rows] * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
         trials = np.clip(inner[rows, None] + steps, low, high)
         found = costs(pieces, trials.reshape(-1, inner.shape[1])).reshape(dampings.shape)
         best = np.arange(len(rows)), found.argmin(axis=1)
@@ -97,9 +99,9 @@ def _curvature(pieces: Sequence[Problem], inner: np.ndarray, free: np.ndarray) -
     return squares, gradients
 
 
-def _steps(squares: np.ndarray, gradients: np.ndarray, dampings: np.ndarray) -> np.ndarray:
+def _steps(squares: np.ndarray, downhill: np.ndarray, dampings: np.ndarray) -> np.ndarray:
     """Damped Gauss-Newton steps, shape (rows, dampings, parameters)."""
     curvature = np.diagonal(squares, axis1=1, axis2=2)
-    diagonal = np.where(curvature > 0, curvature, 1.0)[:, :, None] * np.eye(gradients.shape[1])
+    diagonal = np.where(curvature > 0, curvature, 1.0)[:, :, None] * np.eye(downhill.shape[1])
     damped = squares[:, None] + dampings[:, :, None, None] * diagonal[:, None]
-    return np.linalg.solve(damped, -gradients[:, None, :, None])[..., 0]
+    return np.linalg.solve(damped, downhill[:, None, :, None])[..., 0]

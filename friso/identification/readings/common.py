@@ -125,6 +125,36 @@ def robust(values: np.ndarray) -> float:
     return float(NORMAL_MAD * np.median(np.abs(values - np.median(values))))
 
 
+def noise_of(signal: np.ndarray) -> float:
+    """Standard deviation of the noise of a force [N] or a position [m], shape (n,): of what neighbouring samples do not
+    share, as its third differences show it, or of its digits."""
+    steps = np.abs(np.diff(signal))
+    digit = steps[steps > 0].min() / np.sqrt(12) if (steps > 0).any() else 0.0
+    rough = np.diff(signal, 3)
+    white = NORMAL_MAD * float(np.median(np.abs(rough))) / np.sqrt(20) if rough.size else 0.0
+    return max(white, float(digit))
+
+
+def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
+    """The samples at which a motion, shape (n,) [m], turns and goes back by more than `swing` [m]."""
+    turns, values = [], position.tolist()
+    lowest = highest = values[0]
+    low = high = 0
+    rises = falls = True  # what it may do until it has done either
+    for k, value in enumerate(values):
+        if value > highest:
+            highest, high = value, k
+        if value < lowest:
+            lowest, low = value, k
+        if rises and highest - value > swing:
+            turns.append(high)
+            rises, falls, lowest, low = False, True, value, k
+        elif falls and value - lowest > swing:
+            turns.append(low)
+            rises, falls, highest, high = True, False, value, k
+    return np.array(turns, dtype=int)
+
+
 def runs(mask: np.ndarray) -> list[slice]:
     """The stretches over which a mask, shape (n,), is true."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], mask.astype(np.int8), [0]))))
