@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from friso.app.machine import Machine
     from friso.app.work import Work
 
-MOST = 6
-"""Answers that are kept of each kind of question, those that were asked for last."""
+MOST = 4
+"""Answers that are kept of each function, those that were asked for last: a Bode plot takes 20 MB."""
 
 
 class KeptAnswers:
