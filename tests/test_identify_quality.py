@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, cast
 
 import numpy as np
@@ -564,6 +564,28 @@ def test_a_refined_fit_finds_its_way_along_a_valley_and_asks_for_no_derivative_t
     assert pieces[0].asked == pieces[1].asked
     assert pieces[0].asked[0] == len(starts)
     assert sum(pieces[0].asked) < 2 * iterations
+
+
+class Sudden(Problem):
+    """Residuals that are straight lines, but for a break-away that a number above its own place alone brings about."""
+
+    def residuals(self, inner: np.ndarray) -> np.ndarray:
+        lines = inner @ np.array([[1.0, -2.0, 0.5], [3.0, 0.0, 1.0]])
+        lines[:, 1] += 5.0 * (inner[:, 0] > 1.0)
+        return lines
+
+
+@pytest.mark.parametrize("at", [1.0, 2.0], ids=["beside a break-away", "beyond it"])
+def test_a_break_away_on_one_side_is_no_derivative(at: float) -> None:
+    log = axis()
+    flat = made_up(log, inverse_model(log, 5.0)).flat()
+    followed = tracking(flat, log, log.segments[0], _parameters(flat), 5.0)
+    free = np.array([True, True])
+    numbers = tuple(FitParameter(name, "", 0.0, -9.0, 9.0, logarithmic=False) for name in ("a", "b"))
+    parts = {each.name: getattr(followed, each.name) for each in fields(followed)} | {"parameters": numbers}
+    rest, slopes = Sudden(**parts).linearised(np.array([at, 0.0]), free)
+    assert rest[1] == pytest.approx(-2.0 * at + 5.0 * (at > 1))
+    assert slopes == pytest.approx(np.array([[1.0, 3.0], [-2.0, 0.0], [0.5, 1.0]]), abs=1e-6)
 
 
 def _parameters(flat: dict[str, Any]) -> list[FitParameter]:

@@ -84,8 +84,7 @@ class OutputErrorFit:
     def linearised(self) -> tuple[np.ndarray, np.ndarray]:
         """The residual, shape (n,), and its derivatives to the fitted numbers, shape (n, free)."""
         mask = np.isin(np.arange(len(self.inner)), self.free)
-        ((rest, slopes),) = self.problem.jacobians(self.inner[None], mask[None])
-        return rest, slopes
+        return self.problem.linearised(self.inner, mask)
 
     def value(self, name: str) -> float:
         """The SI value of a parameter."""
@@ -185,7 +184,7 @@ def polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Outp
     """The end of the fit, and how well it is known."""
     mask = np.isin(np.arange(len(inner)), free)
     best = refine_fit([problem], inner[None], mask[None], FINE, LITTLE).inner[0]
-    ((rest, slopes),) = problem.jacobians(best[None], mask[None])
+    rest, slopes = problem.linearised(best, mask)
     counted = problem.counted > 0
     velocity, acceleration = problem.inputs.segments[0, :-1, 2:4].T
     groups = groups_of(*(signal[counted] for signal in (problem.inputs.reference, velocity, acceleration)))

@@ -141,6 +141,25 @@ class Problem:
         slopes = (off - at[owner]) / steps[:, None]
         return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
+    def linearised(self, inner: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The residual of fitted numbers, shape (parameters,), and its derivatives to those that are `free`, shape (n,
+        free): of the differences to both sides the smaller one at each sample. A break-away that a step just brings
+        about, or prevents, is on one side of it alone, and no derivative."""
+        numbers = np.flatnonzero(free)
+        ahead = np.array([self._step(inner, int(i)) for i in numbers])
+        ranges = [
+            (self.parameters[i].inner(self.parameters[i].low), self.parameters[i].inner(self.parameters[i].high))
+            for i in numbers
+        ]
+        low, high = np.array(ranges).T
+        within = (inner[numbers] - ahead >= low) & (inner[numbers] - ahead <= high)
+        steps = np.concatenate([ahead, np.where(within, -ahead, ahead)])
+        moved = np.tile(inner, (len(steps), 1))
+        moved[np.arange(len(steps)), np.tile(numbers, 2)] += steps
+        at, *off = self.residuals(np.vstack([inner, moved]))
+        to, fro = np.split((np.array(off) - at) / steps[:, None], 2)
+        return at, np.where(np.abs(to) <= np.abs(fro), to, fro).T
+
     def _step(self, inner: np.ndarray, i: int) -> float:
         """The step of a number, away from the nearer end of its range."""
         parameter = self.parameters[i]
