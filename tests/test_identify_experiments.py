@@ -509,11 +509,11 @@ def test_a_step_of_the_force_behind_a_slow_rise_is_no_ramp() -> None:
         force = np.concatenate([force, direction * rest, direction * go])
     rng = np.random.default_rng(6)
     blurred = position + 2e-8 * rng.standard_normal(len(position))
-    found = force_ramps(
+    ramps = force_ramps(
         record("steps", DT, position=blurred, force=force + 0.05 * rng.standard_normal(len(force))), 3.0
     )
-    assert not len(found.forces)
-    assert found.notes
+    assert not len(ramps.forces)
+    assert ramps.notes
 
 
 def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated(wording: Wording) -> None:

@@ -582,7 +582,7 @@ def test_a_break_away_on_one_side_is_no_derivative(at: float) -> None:
     followed = tracking(flat, log, log.segments[0], _parameters(flat), 5.0)
     free = np.array([True, True])
     numbers = tuple(FitParameter(name, "", 0.0, -9.0, 9.0, logarithmic=False) for name in ("a", "b"))
-    parts = {each.name: getattr(followed, each.name) for each in fields(followed)} | {"parameters": numbers}
+    parts = {part.name: getattr(followed, part.name) for part in fields(followed)} | {"parameters": numbers}
     rest, slopes = Sudden(**parts).linearised(np.array([at, 0.0]), free)
     assert rest[1] == pytest.approx(-2.0 * at + 5.0 * (at > 1))
     assert slopes == pytest.approx(np.array([[1.0, 3.0], [-2.0, 0.0], [0.5, 1.0]]), abs=1e-6)

@@ -75,14 +75,14 @@ def refine_fit(
         inside = ((inner[rows] > low) | (downhill > 0)) & ((inner[rows] < high) | (downhill < 0))
         steps = _steps(squares[rows] * (inside[:, None] & inside[:, :, None]), downhill * inside, dampings)
         trials = np.clip(inner[rows, None] + steps, low, high)
-        found = costs(pieces, trials.reshape(-1, inner.shape[1])).reshape(dampings.shape)
-        best = np.arange(len(rows)), found.argmin(axis=1)
-        better = found[best] < cost[rows]
-        done = better & (found[best] > cost[rows] * (1 - enough))
+        squared = costs(pieces, trials.reshape(-1, inner.shape[1])).reshape(dampings.shape)
+        best = np.arange(len(rows)), squared.argmin(axis=1)
+        better = squared[best] < cost[rows]
+        done = better & (squared[best] > cost[rows] * (1 - enough))
         damping[rows] = np.where(better, dampings[best], dampings[:, -1] * (LADDER[1] / LADDER[0]) / LADDER[0])
         moved[:] = False
         moved[rows[better & ~done]] = True
-        inner[rows[better]], cost[rows[better]] = trials[best][better], found[best][better]
+        inner[rows[better]], cost[rows[better]] = trials[best][better], squared[best][better]
         busy[rows[done]] = False
     return Refined(inner, cost)
 
