@@ -1,7 +1,10 @@
 """A stage's equations written out by hand, sharing no code with friso but the reading of the stage file; for SciPy.
 
 Sources: thesis, Eq. 3 to 8 and Fig. 3; LuGre: doi:10.1109/9.376053; regularised Stribeck friction:
-doi:10.1016/0005-1098(94)90209-7; Dahl 1968. There are no events: the solver's own error control finds every kink.
+doi:10.1016/0005-1098(94)90209-7; Dahl 1968; active disturbance rejection with its observer:
+doi:10.1007/s11768-023-00129-y; leaks and limits of integrals: docs/controllers.md. There are no events: the solver's
+own error control finds every kink. (Settings that act within a window of the error are not written out: it steps over
+windows that a motion passes fast.)
 """
 
 from __future__ import annotations
@@ -14,9 +17,11 @@ import numpy as np
 from numba import njit
 from scipy.integrate import solve_ivp
 
-STATES = ("x", "v", "x_cart", "v_cart", "x_part", "v_part", "z", "filtered", "integral")
-X, V, XC, VC, XP, VP, Z, LOW, INTEGRAL = range(len(STATES))
+STATES = ("x", "v", "x_cart", "v_cart", "x_part", "v_part", "z", "filtered", "integral", "rate")
+X, V, XC, VC, XP, VP, Z, LOW, INTEGRAL, RATE = range(len(STATES))
+"""The last three are, of an observer, the error, the disturbance and the rate of the error that it estimates."""
 
+KINDS = ("pid", "adrc")
 JOINTS = ("rigid", "locked", "touching", "free")
 WINDUPS = ("none", "clamp", "back_calculation")
 LAWS = ("none", "lugre", "dahl", "stribeck")
@@ -28,6 +33,7 @@ NAMES = (
     *("asymmetry", "viscous_asymmetry", "v_regular", "tuned", "kp", "ki", "kd", "tau", "on_error", "limit"),
     *("windup", "unwinding", "bias_cart", "bias_stage"),
     *("deadband", "motor", "k_drive", "d_drive", "play", "at_motor"),
+    *("leak", "most", "observer", "feedback", "believed"),
 )
 """What the equations contain, in the order of `_rate`."""
 
@@ -36,6 +42,7 @@ WRITTEN = (
     *("controller.kind", "controller.crossover", "controller.alpha", "controller.beta", "controller.tuned_mass"),
     *("controller.kp", "controller.ki", "controller.kd", "controller.tau", "controller.derivative_on"),
     *("controller.force_limit", "controller.anti_windup", "controller.error_deadband"),
+    *("controller.bandwidth", "controller.observer_ratio", "controller.integral_leak", "controller.integral_limit"),
 )
 """How the keys begin that the equations contain."""
 
@@ -67,7 +74,8 @@ class ByHand:
         n = dict(zip(NAMES, self.numbers, strict=True))
         length, omega = self.length, self.omega
         bristle = n["static"] / n["sigma0"] if n["sigma0"] else 1.0
-        return np.array([*[length, length * omega] * 3, bristle, length, length / omega])
+        integral = length * omega**2 if n["observer"] else length / omega
+        return np.array([*[length, length * omega] * 3, bristle, length, integral, length * omega])
 
     @property
     def measured(self) -> int:
@@ -107,7 +115,7 @@ class ByHand:
         y = np.zeros(len(STATES))
         y[[X, XC, XP]] = displacement
         n = dict(zip(NAMES, self.numbers, strict=True))
-        y[LOW] = 0.0 if n["on_error"] else displacement
+        y[LOW] = 0.0 if n["on_error"] or n["observer"] else displacement
         return y
 
     def run(self, y: np.ndarray, times: np.ndarray, rtol: float = 1e-9, most: int = 4_000_000) -> np.ndarray:
@@ -153,7 +161,7 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
     if joint != "rigid" and "transmission.mass" in flat:
         raise NotWritten("a transmission before a joint")
     windup = flat.get("controller.anti_windup", "none")
-    if flat["controller.kind"] != "pid" or windup not in WINDUPS:
+    if flat["controller.kind"] not in KINDS or windup not in WINDUPS:
         raise NotWritten(f"{flat['controller.kind']}, {windup}")
     part = flat.get("parasitic.mass", 0.0) if joint != "rigid" else 0.0
     stage = flat.get("masses.stage", 0.0) - part
@@ -193,6 +201,8 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
         "d_drive": flat.get("transmission.damping", 0.0),
         "play": flat.get("transmission.backlash", 0.0),
         "at_motor": _side(flat),
+        "leak": 2 * np.pi * flat.get("controller.integral_leak", 0.0),
+        "most": flat.get("controller.integral_limit", np.inf),
         **_gains(flat),
     }
     return ByHand(np.array([float(values[name]) for name in NAMES]), _pieces(flat))
@@ -215,6 +225,27 @@ def _joint(flat: Mapping[str, Any]) -> str:
 
 
 def _gains(flat: Mapping[str, Any]) -> dict[str, float]:
+    """Those of a PID, or of an observer and its feedback."""
+    if flat["controller.kind"] == "adrc":
+        return _observer(flat)
+    return {"observer": 0.0, "feedback": 0.0, "believed": 0.0, **_pid(flat)}
+
+
+def _observer(flat: Mapping[str, Any]) -> dict[str, float]:
+    """The observer and its feedback, and the proportional and the integral gain that they come to."""
+    if {"controller.force_limit", "controller.integral_leak", "controller.integral_limit"} & set(flat):
+        raise NotWritten("an observer with a limit or a leak")
+    feedback, mass = 2 * np.pi * flat["controller.bandwidth"], flat["controller.tuned_mass"]
+    observer = flat["controller.observer_ratio"] * feedback
+    whole = 3 * observer**2 + 6 * observer * feedback + feedback**2
+    integral = observer**3 * feedback**2 / whole
+    linear = 3 * observer**2 * feedback**2 + 2 * observer**3 * feedback
+    proportional = (linear - integral * (3 * observer + 2 * feedback)) / whole
+    gains = {"kp": mass * proportional, "ki": mass * integral, "kd": 0.0, "tau": 0.0, "on_error": 0.0, "tuned": 0.0}
+    return gains | {"observer": observer, "feedback": feedback, "believed": mass}
+
+
+def _pid(flat: Mapping[str, Any]) -> dict[str, float]:
     """Van Dijk's rules (Eq. 7, 8) with kp, ki, kd of (s tau_z + 1)(s tau_i + 1) k_p/(s tau_i), multiplied out; or the
     gains of Eq. 6."""
     if "controller.crossover" in flat:
@@ -248,8 +279,9 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
     (law, static, coulomb, v_s, exponent, sigma0, sigma1, viscous) = n[11:19]
     (asymmetry, viscous_asymmetry, v_r, tuned, kp, ki, kd, tau, on_error, limit) = n[19:29]
     (windup, unwinding, bias_cart, bias_stage) = n[29:33]
-    (deadband, motor, k_drive, d_drive, play, at_motor) = n[33:]
-    out = np.zeros(9)
+    (deadband, motor, k_drive, d_drive, play, at_motor) = n[33:39]
+    (leak, most, observer, feedback, believed) = n[39:]
+    out = np.zeros(10)
     since = time - piece[0]
     r = piece[1] + since * (piece[2] + since * piece[3] / 2)
     place, pace = (y[4], y[5]) if at_motor > 0 else (y[0], y[1])
@@ -274,10 +306,19 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
     beyond = abs(demand) - limit
     if windup == 1 and beyond > 0 and demand * integrand > 0:
         share = max(0.0, 1 - beyond / (REST_BAND * limit))
-    out[8] = integrand * share
+    held = ki * y[8]
+    if abs(held) > most and held * integrand > 0:
+        share *= max(0.0, 1 - (abs(held) - most) / (REST_BAND * most))
+    out[8] = integrand * share - leak * y[8]
     force = min(max(demand, -limit), limit)
     if windup == 2 and ki > 0:
         out[8] += (force - demand) / (ki * unwinding)
+    if observer > 0:
+        force = believed * (feedback**2 * y[7] + 2 * feedback * y[9] + y[8])
+        short = e - y[7]
+        out[7] = y[9] + 3 * observer * short
+        out[9] = y[8] - force / believed + 3 * observer**2 * short
+        out[8] = observer**3 * short
 
     v = y[1] if joint == 0 else y[3]
     sign = 1.0 if v > 0 else -1.0
@@ -331,8 +372,8 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
 def _jacobian(time, y, piece, n, size):  # type: ignore[no-untyped-def]
     """By differences to the side on which the state is."""
     base = _rate(time, y, piece, n)
-    out = np.zeros((9, 9))
-    for k in range(9):
+    out = np.zeros((10, 10))
+    for k in range(10):
         step = 1e-7 * size[k]
         if (k == 1 or k == 3) and y[k] < 0:
             step = -step

@@ -132,6 +132,8 @@ def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
         equations = by_hand(bench.flat).held()
     except NotWritten as missing:
         return f"no equations by hand ({missing})"
+    if missing := [name for name in bench.kernel.states if name not in _PLACES]:
+        return f"no equations by hand ({', '.join(missing)})"
     y = equations.start()
     for name, value in zip(bench.kernel.states, end, strict=False):
         y[_PLACES[name]] = value
