@@ -193,7 +193,7 @@ GOALS = {"all": Goal(), "controller": Goal(joint=False), "joint": Goal(controlle
 
 def test_the_bandwidth_stays_below_its_limit(rigid: Stage, goal: Goal, machines: Fleet) -> None:
     """Settings above it cost more than any below that meet the goal; the limit itself is tried."""
-    search = Search(remedies(rigid, goal)[0], goal, machines, rigid, TINY, lambda label: None)
+    search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
     search.optimise()
     points = search.points
     above = points.bandwidth > 25.0
@@ -393,7 +393,7 @@ def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:
     """With a modulus margin of 0.9, that is what has to give."""
     goal = Goal(margin=0.9, bandwidth_limit=25.0, joint=False)
-    search = Search(remedies(rigid, goal)[0], goal, machines, rigid, TINY, lambda label: None)
+    search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
     search.optimise()
     assert not [*search.surveyed()]
     (relaxed,) = relaxations([RemedyOutcome(search.remedy, None, None, None, (), (), search.points)], goal, machines)
@@ -428,19 +428,44 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
 
 @pytest.mark.parametrize("first", np.arange(0, 0.95, 0.08))
 def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machines: Fleet, rigid: Stage) -> None:
-    """Of settings that settle the sooner the lower they are, a range of 6 % anywhere."""
+    """Of settings that settle the sooner the lower they are, a range of 6 % anywhere; next to those with which
+    something attracts, none is surveyed."""
     shares = np.linspace(0, 1, 60)
     points = TriedPoints(shares[:, None], 1 + shares, *np.ones((5, 60)))
-    search = Search(Remedy.settled_on("", rigid), Goal(), machines, rigid, TINY, lambda label: None, [points])
-    surveyed: list[float] = []
+    search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
+    attracted: list[float] = []
 
     def clear(batch: np.ndarray) -> np.ndarray:
-        surveyed.extend(batch[:, 0])
-        return (batch[:, 0] >= first) & (batch[:, 0] <= first + 0.06)
+        inside = (batch[:, 0] >= first) & (batch[:, 0] <= first + 0.06)
+        attracted.extend(batch[~inside, 0])
+        return inside
 
     search.clear = clear  # pyright: ignore[reportAttributeAccessIssue]
+    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
     assert [*search.surveyed()]
-    assert np.diff(np.sort(surveyed)).min() > 0.03
+    assert np.diff(np.sort(attracted)).min() > 0.03
+
+
+def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_machines(
+    machines: Fleet, rigid: Stage
+) -> None:
+    """The settings that settle soonest lie at the edge of the margin: 92 % of fresh machines met the goal with them,
+    98 % with a crossover lower by 4 %, and the remedy was said not to be sure."""
+    shares = np.linspace(0, 1, 201)
+    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((5, 201)))
+    search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
+    search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
+    search.share = lambda batch: 0.92 + 2 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
+    enough = Goal().surely(machines.count)
+    assert 0.92 + 2 * next(search.surveyed())[0] == pytest.approx(enough, abs=0.03)
+
+
+def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet) -> None:
+    """Held by its friction, it is in position once the reference is back: that was the fastest remedy of an axis."""
+    weak = {"kind": "pid", "kp": "1 N/m", "ki": "0 N/(m*s)", "kd": "1 N*s/m", "derivative_on": "measurement"}
+    stuck = Remedy.settled_on("", rigid.replace({"controller": weak}))
+    moves = moves_of_points(stuck, np.zeros((1, 0)), machines, Goal())
+    assert not np.isfinite(moves.looser).any()
 
 
 def test_windows_end_where_settings_no_longer_meet_the_goal() -> None:

@@ -69,10 +69,11 @@ class Runs:
 
     def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
         """The flat keys of these runs alone."""
-        return _part(flat, self.numbers)
+        return part_of(flat, self.numbers)
 
 
-def _part(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
+def part_of(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
+    """The flat keys of the stages with these numbers alone."""
     return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
 
 
@@ -151,7 +152,7 @@ def _run_with_room(
 ) -> Iterator[Runs]:
     """Run the runs with these numbers; those with more turning points than there is room for again, fewer at a time
     with more room each."""
-    part = _part(flat, numbers)
+    part = part_of(flat, numbers)
     least = options.least_swing
     part_options = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
     batch = prepare(kernel, part, len(numbers), part_options, None if starts is None else starts[numbers])

@@ -1,4 +1,4 @@
-"""The five kinds of motion as pieces of parabola: within a piece, r = r_0 + v_0 t + a_0 t^2/2, t from its start."""
+"""The kinds of motion as pieces of parabola: within a piece, r = r_0 + v_0 t + a_0 t^2/2, t from its start."""
 
 from __future__ import annotations
 
@@ -45,12 +45,18 @@ def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
     ]
 
 
+def _only_there(flat: Mapping[str, Any]) -> list[Piece]:
+    rows = _there_and_back(flat)
+    return rows[: len(rows) // 2]
+
+
 def _constant(position: Any, velocity: Any) -> list[Piece]:
     return [(0.0, position, velocity, 0.0)]
 
 
 _PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
     "there_and_back": _there_and_back,
+    "there": _only_there,
     "release": lambda flat: _constant(0.0, 0.0),
     "step": lambda flat: _constant(flat["motion.size"], 0.0),
     "ramp": lambda flat: _constant(0.0, flat["motion.velocity"]),
@@ -59,6 +65,7 @@ _PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
 
 _SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
     "there_and_back": _there,
+    "there": _there,
     "release": lambda flat: flat["motion.displacement"],
     "step": lambda flat: flat["motion.size"],
     "ramp": lambda flat: flat["motion.velocity"] * flat["motion.duration"],
@@ -91,6 +98,13 @@ def size(flat: Mapping[str, Any]) -> Any:
 def initial_displacement(flat: Mapping[str, Any]) -> Any:
     """Position of all masses at the start [m]."""
     return flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
+
+
+def way_there(flat: Mapping[str, Any]) -> dict[str, Any] | None:
+    """The same stages moved there, until they return; None for a motion that does not."""
+    if flat["motion.kind"] != "there_and_back":
+        return None
+    return {**flat, "motion.kind": "there", "motion.duration": flat["motion.return_at"]}
 
 
 def last_corner(flat: Mapping[str, Any]) -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from friso.frequency.crossover import WANTED
 from friso.hunting.margin import DISTANCE
 
@@ -27,3 +29,8 @@ class Goal:
     share: float = SHARE
     controller: bool = True
     joint: bool = True
+
+    def surely(self, machines: int) -> float:
+        """The share of so many machines that has to meet the goal for it to be taken that its share of all does: one
+        standard error more. Settings at the edge of what works would else be taken for ones that do half the time."""
+        return min(1.0, self.share + float(np.sqrt(self.share * (1 - self.share) / machines)))

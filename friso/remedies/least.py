@@ -17,8 +17,8 @@ from friso.stage.controllers import CONTROLLER
 BEYOND = 2.0
 """Factor by which keys may go further than in the settings that the search begins with."""
 
-STEPS = (1.0, 1.05, 1.15, 1.3)
-"""Powers of the factors of the least change that are verified, one after the other: the least of all is the one that
+STEPS = np.linspace(1.0, 1.5, 26)
+"""Powers of the factors of the least change that are looked at, one after the other: the least of all is the one that
 just works on the machines of the search, which is not to say on others."""
 
 PARTS = (0.15, 0.3, 0.5, 0.7)
@@ -87,7 +87,8 @@ def _ends(remedy: Remedy) -> np.ndarray:
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
     """The least change of those tried that break nothing, (variables,), the same change taken further, and then points
-    on the way from it to the settings that work: those with which nothing attracts the machines."""
+    on the way from it to the settings that work: those with which enough of the fresh machines meet the goal by their
+    moves and margins, or else most of them, and nothing attracts the machines."""
     if not search.tried:
         return
     points = search.points
@@ -100,5 +101,9 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     towards = [least + part * (works - least) for part in PARTS]
     tried = np.clip([*further, *towards], 0, 1)
     kept = tried[search.measured(tried).meets(search.goal)]
-    if len(kept):
-        yield from kept[search.clear(kept)]
+    if not len(kept):
+        return
+    share = search.share(kept)
+    most = min(share.max(), search.goal.surely(search.fresh.count))
+    kept = kept[share >= most]
+    yield from kept[search.clear(kept)]

@@ -44,8 +44,9 @@ from friso.stage.correlations import Correlations
 from friso.stage.rig import AS_BUILT
 from friso.studies.compare.options import linear_flat
 
-TRIES = 3
-"""Points of a remedy that are verified at most: the next best ones where the best are not sure to work."""
+TRIES, LOOKS = 3, 12
+"""Points of a remedy whose cycles are verified at most, and that are measured on fresh machines: the next best ones
+where the best are not sure to work."""
 
 PAIRS = 2
 """Settings against friction that are tried together with the bandwidth."""
@@ -292,7 +293,7 @@ class _Session:
     def _begun(self, remedy: Remedy, machines: int) -> Search:
         """The search for a remedy, on so many of the machines."""
         several = self.machines.take(np.arange(machines))
-        search = Search(remedy, self.goal, several, self.drive, self.budget, self.report)
+        search = Search(remedy, self.goal, several, self.fresh, self.drive, self.budget, self.report)
         self.outcomes.append(RemedyOutcome(remedy, None, None, None, (), interrupted=True))  # until it has ended
         self.searching = search
         return search
@@ -300,13 +301,17 @@ class _Session:
     def _ended(self, search: Search, points: Iterator[np.ndarray]) -> None:
         """The first of a few points that is verified, or else the first that is not sure to work."""
         unsure: RemedyOutcome | None = None
-        for shares in islice(points, TRIES):
+        tries = 0
+        for shares in islice(points, LOOKS):
             outcome = self._verified(search, shares)
+            tries += outcome.case is not None
             if outcome.certainty == "works":
                 unsure = outcome
                 break
             unsure = unsure or outcome
             self.outcomes[-1] = unsure
+            if tries == TRIES:
+                break
         tried = search.points if search.tried else None
         none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted)
         self.outcomes[-1] = unsure or none

@@ -43,8 +43,12 @@ NEAR = 0.12
 SPARE = 1e-3
 """Share by which a bandwidth stays below its limit: numbers are rounded, and bandwidths taken from a grid."""
 
-APART = 0.03
-"""Least distance of points that are surveyed one after the other, as a share of a range."""
+APART, ALIKE = 0.03, 0.01
+"""Least distance of points that are surveyed from those with which something attracts machines, and of points that are
+looked at on fresh machines, as a share of a range."""
+
+WIDE = 12
+"""Points that are looked at on fresh machines at once."""
 
 WIDENED = 1.5
 """By what factor the next points are farther away after a batch with all of which something attracts machines."""
@@ -120,12 +124,14 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 
 @dataclass
 class Search:
-    """The search for the best points of a remedy: what was `tried` so far, and of how many points that were surveyed
-    something `attracted` the machines, or may have."""
+    """The search for the best points of a remedy on `machines`, those that it takes having to do on `fresh` ones too:
+    what was `tried` so far, and of how many points that were surveyed something `attracted` the machines, or may have.
+    """
 
     remedy: Remedy
     goal: Goal
     machines: Fleet
+    fresh: Fleet
     drive: Stage
     budget: Budget
     report: Callable[[str], None]
@@ -216,26 +222,55 @@ class Search:
         self.attracted += int(np.count_nonzero(~clear))
         return np.asarray(clear)
 
+    def share(self, shares: np.ndarray) -> np.ndarray:
+        """How large a share of the fresh machines meet the goal by their moves and margins with points (points,
+        variables), shape (points,); of those with which too many lack the margin, the share that has it."""
+        self.report(f"{self.remedy.name}: fresh machines")
+        goal = self.goal
+        meets = modulus_margins(self.remedy, shares, self.fresh, self.drive) >= goal.margin
+        robust = np.flatnonzero(meets.mean(axis=1) >= goal.share)
+        if robust.size:
+            moves = moves_of_points(self.remedy, shares[robust], self.fresh, goal)
+            in_time = np.isfinite(moves.settling) & (moves.settling <= _most(goal.settle))
+            meets[robust] &= in_time & (moves.force <= _most(goal.force_limit))
+        return np.asarray(meets.mean(axis=1))
+
     def surveyed(self) -> Iterator[np.ndarray]:
-        """The best points first, shape (variables,), as far as nothing attracts the machines with them; those that
-        are alike are taken for one. After each batch with all of which something does, the next one is taken from
-        farther away, as far as there are as many: the points that settle soonest are often at the edge of hunting."""
+        """The best points first, shape (variables,), with which enough of the fresh machines meet the goal, as far as
+        nothing attracts the machines with them; those that are alike are taken for one. After each batch without any,
+        the next one is taken from farther away, as far as there are as many: the points that settle soonest are often
+        at the edge of what works. Where there are none at all, the one with which most of the fresh machines do."""
         if not self.tried:
             return
         points = self.points
         free = np.flatnonzero(points.meets(self.goal))
-        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], APART
-        away = np.full(len(left), np.inf)  # from those that were surveyed
+        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], ALIKE
+        away = np.full(len(left), np.inf)  # from those that were looked at
+        enough, found = self.goal.surely(self.fresh.count), False
+        best, most = np.zeros((0, points.shares.shape[1])), 0.0
         for _ in range(MOST):
-            left, away = left[away > APART], away[away > APART]
+            left, away = left[away > ALIKE], away[away > ALIKE]
             if not len(left):
-                return
-            while len(batch := _apart(left[away > apart], BATCH, apart)) < BATCH and apart > APART:
-                apart = max(APART, apart / WIDENED)
-            clear = self.clear(batch)
-            yield from batch[clear]
-            apart = APART if clear.any() else WIDENED * apart
-            away = np.minimum(away, np.abs(left[:, None] - batch[None]).max(axis=2, initial=0.0).min(axis=1))
+                break
+            while len(batch := _apart(left[away > apart], WIDE, apart)) < WIDE and apart > ALIKE:
+                apart = max(ALIKE, apart / WIDENED)
+            share = self.share(batch)
+            if share.max() > most:
+                best, most = batch[[share.argmax()]], share.max()
+            few = _apart(batch[share >= enough], BATCH, APART)
+            clear = self.clear(few) if len(few) else np.zeros(0, bool)
+            found |= bool(clear.any())
+            yield from few[clear]
+            apart = ALIKE if clear.any() else WIDENED * max(apart, APART if len(few) else ALIKE)
+            away = np.minimum(away, _distance(left, np.concatenate([batch[share < enough], few])))
+            away[_distance(left, few[~clear]) <= APART] = 0.0
+        if not found and len(best) and most < enough:
+            yield from best[self.clear(best)]
+
+
+def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """How far points (points, variables) are from the nearest of others, shape (points,); infinitely without any."""
+    return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
 
 def _evolve(

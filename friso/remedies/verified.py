@@ -169,15 +169,9 @@ def missed_parts(measured: Performance, goal: Goal) -> tuple[str, ...]:
     """The parts of the goal that too many machines miss."""
     parts = measured.meets(goal)
     listed = [name for name, meets in parts.items() if np.mean(meets) < goal.share]
-    if not listed and np.mean(np.all([*parts.values()], axis=0)) < surely(goal.share, measured.count):
+    if not listed and np.mean(np.all([*parts.values()], axis=0)) < goal.surely(measured.count):
         listed.append("together")
     return tuple(listed)
-
-
-def surely(share: float, machines: int) -> float:
-    """The share of so many machines that has to meet a goal for it to be taken that a `share` of all does: one standard
-    error more. Settings at the edge of what works would else be taken for ones that do half the time."""
-    return min(1.0, share + float(np.sqrt(share * (1 - share) / machines)))
 
 
 ROUNDED = 2e-3
