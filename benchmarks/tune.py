@@ -77,7 +77,7 @@ MODE = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": 0.01}
 
 HEAD = ("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "CPU")
 
-CHUNK, BATCH = 4096, 8
+CHUNK, BATCH = 1024, 8
 """Settings that are measured, and surveyed, at once."""
 
 BEYOND = 1.3
@@ -101,8 +101,11 @@ def brute(search: Search, count: int, most: float) -> float:
     attracts; infinite where none is. It is exact: among so few machines the slowest twentieth is the slowest one, so a
     setting goes no further once it is too slow, or breaks a constraint, on one of them."""
     shares = qmc.Sobol(len(search.remedy.variables), rng=0).random(count)
-    bandwidth = loop_bandwidths(search.remedy.stage, search.remedy.changes(shares), count)
-    shares = shares[bandwidth <= LIMIT]
+    chunks = np.array_split(shares, max(1, count // CHUNK))
+    stage, remedy = search.remedy.stage, search.remedy
+    shares = np.concatenate(
+        [chunk[loop_bandwidths(stage, remedy.changes(chunk), len(chunk)) <= LIMIT] for chunk in chunks]
+    )
     slowest = np.zeros(len(shares))
     for number in range(search.machines.count):
         machine = search.machines.take(np.array([number]))

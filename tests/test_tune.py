@@ -18,6 +18,7 @@ from friso.design_method.isolator import isolated
 from friso.engine.arrays import Results
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
+from friso.engine.simulate import simulate
 from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.settings import settings_named
 from friso.equations.structure import shared_structure
@@ -125,11 +126,22 @@ def test_both_parts_of_a_split_mass_are_as_heavy_as_the_whole(rigid: Stage) -> N
     assert free.flat()["joint.stiffness"] * free.flat()["joint.stroke"] < least_breakaway(whole.flat())
 
 
+def moved_there(stage: Stage, within: float) -> float:
+    """How long a stage that has been moved there takes to settle, before it returns [s]."""
+    trace = simulate(stage, 1e-6, 1e-4)
+    time, off = np.asarray(trace["time"]), np.asarray(trace["position"] - trace["reference"])
+    flat = stage.flat()
+    outside = time[(time < flat["motion.return_at"]) & (np.abs(off) > within)]
+    return float(outside[-1] - 2 * flat["motion.acceleration_time"])
+
+
 def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet, goal: Goal) -> None:
     fast = rigid.replace({"controller.crossover": "20 Hz"})
     moves = moves_of_points(Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal)
     alone = measured_run(fast)
-    assert moves.settling[0, 0] == pytest.approx(alone.settling_time[0][0], rel=1e-9)
+    there = moved_there(fast, goal.within)
+    assert moves.settling[0, 0] == pytest.approx(max(alone.settling_time[0][0], there), abs=2e-4)
+    assert moves.looser[0, 0] == pytest.approx(max(alone.settling_time[1][0], moved_there(fast, 1e-5)), abs=2e-4)
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
     limited = fast.replace({"controller.force_limit": "60 N"})
     assert moves_of_points(Remedy.settled_on("", limited), np.zeros((1, 0)), machines, goal).force.max() == 60.0
@@ -455,9 +467,9 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
     points = TriedPoints(shares[:, None], 1 + shares, *np.ones((5, 201)))
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
-    search.share = lambda batch: 0.92 + 2 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
-    enough = Goal().surely(machines.count)
-    assert 0.92 + 2 * next(search.surveyed())[0] == pytest.approx(enough, abs=0.03)
+    search.share = lambda batch: 0.92 + 0.5 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
+    enough = (Goal().surely(machines.count) - 0.92) / 0.5  # not reached by the first of those that are looked at
+    assert enough <= next(search.surveyed())[0] < enough + 0.1
 
 
 def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet) -> None:

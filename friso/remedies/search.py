@@ -37,6 +37,9 @@ MOST_POINTS = 40
 WORK = 6e8
 """Work of a search (see `friso.engine.allowance`): about 7 s on one core. Moves that chatter take most of it."""
 
+FAR_ABOVE = 1.5
+"""Factor of the limit of the bandwidth above which it is far above."""
+
 NEAR = 0.12
 """Share of the ranges about the best point, to both sides, in which a search goes on."""
 
@@ -197,10 +200,14 @@ class Search:
         return np.array([share]) if 0 <= share <= 1 else np.zeros(0)
 
     def measured(self, shares: np.ndarray) -> TriedPoints:
-        """Points on the machines: the moves are run only where the loop is stable and has half of the margin."""
+        """Points on the machines: the moves are run only where the loop is stable and has half of the margin and, of
+        remedies that vary more than the bandwidth, this is not far above its limit: such moves chatter and would take
+        most of the work."""
         goal, count = self.goal, len(shares)
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
-        stable = np.flatnonzero(margin > goal.margin / 2)
+        bandwidth = loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), count)
+        far = bandwidth > FAR_ABOVE * _most(goal.bandwidth_limit)
+        stable = np.flatnonzero((margin > goal.margin / 2) & ~(far & (len(self.remedy.variables) > 1)))
         columns = [np.full(count, np.inf) for _ in range(4)]
         if stable.size:
             moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal)
@@ -211,7 +218,6 @@ class Search:
             for column, value in zip(columns, values, strict=True):
                 column[stable] = quantile(value, goal.share)
         settling, looser, slower, force = columns
-        bandwidth = loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), count)
         return TriedPoints(shares, settling, looser, slower, force, margin, bandwidth)
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
@@ -296,4 +302,4 @@ def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):
             chosen.append(row)
-    return np.array(chosen)
+    return np.array(chosen).reshape(-1, shares.shape[1])

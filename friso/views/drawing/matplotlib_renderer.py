@@ -33,12 +33,13 @@ from matplotlib.transforms import Bbox
 
 from friso.errors import InputError
 from friso.views.drawing.drawable import drawable, word_ticks
-from friso.views.drawing.figure import GREY, INK, Figure, Panel
+from friso.views.drawing.figure import GREY, INK, Band, Figure, Markers, Panel, Series
 from friso.views.drawing.images import FORMATS
 from friso.views.drawing.matplotlib_maps import LINE, add_colour_bars, add_footer, draw_coloured, footer_height
 
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
+LEGEND_ROWS, LEGEND_ROW = 3, 13  # rows of a legend that this has room for, and [point] what each takes
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
@@ -246,7 +247,9 @@ def _row_height(figure: Figure) -> float:
     if any(panel.equal for panel in figure.panels):
         return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
     mapped = any(panel.coloured for panel in figure.panels)
-    return MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
+    height = MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
+    rows = max(_legend_rows(_labels(panel), WIDTH / figure.columns) for panel in figure.panels)
+    return height + LEGEND_ROW / 72 * max(0, rows - LEGEND_ROWS)
 
 
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
@@ -315,18 +318,33 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> 
     """Labels, and title over legend above the axes, where the legend covers no data."""
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
-    labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers)]
+    labels = [item.label for item in _items(panel)]
     handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
     labels = [label for label in labels if label]
-    rows = 0
-    if len(labels) > 1 and not panel.coloured:
-        rows = -(-len(labels) // _legend_columns(labels, width))
+    rows = _legend_rows(_labels(panel), width)
+    if rows:
         columns = -(-len(labels) // rows)  # matplotlib fills them one after the other
         place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
         legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
         for text in legend.get_texts():
             text.set_parse_math(False)
-    axes.set_title(panel.title, pad=5 + 13 * rows, parse_math=False)
+    axes.set_title(panel.title, pad=5 + LEGEND_ROW * rows, parse_math=False)
+
+
+def _items(panel: Panel) -> list[Band | Series | Markers]:
+    """What the legend of a panel names, in its order."""
+    return [*panel.bands, *panel.series, *panel.markers]
+
+
+def _labels(panel: Panel) -> list[str]:
+    """The labels in the legend of a panel; none where there is no legend."""
+    labels = [item.label for item in _items(panel) if item.label]
+    return labels if len(labels) > 1 and not panel.coloured else []
+
+
+def _legend_rows(labels: list[str], width: float) -> int:
+    """How many rows the legend with these labels has in `width` [inch]."""
+    return -(-len(labels) // _legend_columns(labels, width)) if labels else 0
 
 
 def _legend_columns(labels: list[str], width: float) -> int:

@@ -99,11 +99,16 @@ def _response(tuning: Advice, lines: Lines) -> Panel:
 
 def _settling(tuning: Advice, lines: Lines) -> Panel:
     flat = tuning.stage.flat()
-    end = flat["motion.duration"] - float(last_corner(flat))
+    drawn = [(outcome.measured if outcome else tuning.present, line) for _, outcome, line in lines]
+    longest = max(
+        np.max(measured.moves.settling, where=np.isfinite(measured.moves.settling), initial=0.0)
+        for measured, _ in drawn
+        if measured
+    )
+    end = max(flat["motion.duration"] - float(last_corner(flat)), float(longest))  # the way there may take longer
     start = 1e-3 * end
     series = []
-    for _, outcome, line in lines:
-        measured = tuning.present if outcome is None else outcome.measured
+    for measured, line in drawn:
         if measured is not None:
             times = measured.moves.settling[0]
             ordered = np.maximum(np.sort(times[np.isfinite(times)]), start)

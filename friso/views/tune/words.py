@@ -353,7 +353,7 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
     sentences = {
         "margin": f"No setting keeps {margin} on {percent(goal.share)} of the machines: the best has "
         f"{points.margin.max(initial=0.0):.2f}.",
-        "settling": f"{tried} brings {percent(goal.share)} of the machines to rest in position by the end of the run.",
+        "settling": f"{tried} brings {percent(goal.share)} of the machines to rest in position in time.",
         "distance": f"{tried} still does so at {1 / goal.distance:.2f} of its bandwidth: the edge of hunting is too "
         "close.",
         "force": f"{settle} take more force than there is.",
