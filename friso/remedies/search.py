@@ -252,7 +252,7 @@ class Search:
         free = np.flatnonzero(points.meets(self.goal))
         left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], ALIKE
         away = np.full(len(left), np.inf)  # from those that were looked at
-        enough, found = self.goal.surely(self.fresh.count), False
+        enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
         for _ in range(MOST):
             left, away = left[away > ALIKE], away[away > ALIKE]
@@ -265,12 +265,12 @@ class Search:
                 best, most = batch[[share.argmax()]], share.max()
             few = _apart(batch[share >= enough], BATCH, APART)
             clear = self.clear(few) if len(few) else np.zeros(0, bool)
-            found |= bool(clear.any())
+            any_clear |= bool(clear.any())
             yield from few[clear]
             apart = ALIKE if clear.any() else WIDENED * max(apart, APART if len(few) else ALIKE)
             away = np.minimum(away, _distance(left, np.concatenate([batch[share < enough], few])))
             away[_distance(left, few[~clear]) <= APART] = 0.0
-        if not found and len(best) and most < enough:
+        if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
 
 
