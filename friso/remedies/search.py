@@ -302,4 +302,4 @@ def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:
     for row in shares:
         if len(chosen) < most and all(np.abs(row - other).max() > apart for other in chosen):
             chosen.append(row)
-    return np.array(chosen).reshape(-1, shares.shape[1])
+    return np.array(chosen).reshape(len(chosen), shares.shape[1])
