@@ -251,7 +251,7 @@ def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: the ways, and the stage of each that works."""
     options = asked.chosen(*OPTIONS["tune"])
-    answer = friso.tune(asked.machine.stage, **options, progress=work.progress)
+    answer = KEPT.answer(friso.tune, asked.machine, work, options)
     ways = [{"name": outcome.remedy.name, "toml": outcome.stage.to_toml()} for outcome in answer.working]
     yield parts_of(answer, ways=ways, **_lines("tune", asked, options))
 
@@ -259,7 +259,7 @@ def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 def design(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: an isolator with its leaf springs."""
     asked.chosen()
-    answer = friso.design(asked.machine.stage, progress=work.progress)
+    answer = KEPT.answer(friso.design, asked.machine, work)
     work.notes += work.meanwhile
     ways = [{"name": "design", "toml": answer.stage.to_toml()}]
     yield parts_of(answer, ways=ways, **_lines("design", asked))

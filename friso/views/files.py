@@ -19,6 +19,15 @@ Files = Mapping[str, Content]
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:
     """Every figure in all forms ("png", "svg", "pdf"), each drawn when it is written, or as it goes on a page, at the
     latest."""
-    figures, forms = [*figures], FORMATS if forms is None else (*forms,)
-    draw_beforehand(figures, [ON_PAGE, *map(Image, forms)])
-    return {f"{figure.name}.{form}": partial(save, figure) for figure in figures for form in forms}
+    forms = FORMATS if forms is None else (*forms,)
+    several = [image_files(figure, figure.name, forms, shown=[ON_PAGE]) for figure in figures]
+    return {name: content for images in several for name, content in images.items()}
+
+
+def image_files(
+    figure: Figure, stem: str, forms: Iterable[str] = FORMATS, shown: Iterable[Image] = ()
+) -> dict[str, Content]:
+    """A figure in some forms, in files that begin with a stem; it is also `shown` as such images on a page."""
+    forms = [*forms]
+    draw_beforehand([figure], [*shown, *map(Image, forms)])
+    return {f"{stem}.{form}": partial(save, figure) for form in forms}

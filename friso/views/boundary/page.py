@@ -10,16 +10,13 @@ from friso.hunting.boundary import Diagram, Plane
 from friso.studies.boundary_lines import lines
 from friso.views.boundary.figures import boundary_figure
 from friso.views.boundary.words import ShownKey
-from friso.views.drawing.images import FORMATS, Image, draw_beforehand, save
-from friso.views.files import Content
+from friso.views.files import Content, image_files
 
 
 def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], name: str, stem: str) -> dict[str, Content]:
     """The figure in all formats, and the table of its points."""
     figure = boundary_figure(traced, keys, name)
-    draw_beforehand([figure], map(Image, FORMATS))
-    pictures: dict[str, Content] = {f"{stem}.{form}": partial(save, figure) for form in FORMATS}
-    return {**pictures, f"{stem}.csv": partial(_write_table, traced)}
+    return {**image_files(figure, stem), f"{stem}.csv": partial(_write_table, traced)}
 
 
 def _write_table(traced: Diagram | Plane, path: Path) -> None:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING
 
 from friso.views.convert.figures import conversion_figure
-from friso.views.drawing.images import save
-from friso.views.files import Content
+from friso.views.files import Content, image_files
 
 if TYPE_CHECKING:
     from friso.studies.laws.conversion import LawConversion
@@ -15,5 +13,5 @@ if TYPE_CHECKING:
 
 def convert_files(conversion: LawConversion, stem: str) -> dict[str, Content]:
     """The stage file with the law, and the figure."""
-    figure = conversion_figure(conversion)
-    return {f"{stem}.toml": conversion.stage.to_toml(), f"{stem}.png": partial(save, figure)}
+    image = image_files(conversion_figure(conversion), stem, ["png"])
+    return {f"{stem}.toml": conversion.stage.to_toml(), **image}

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from friso.views.check.figures import response_figure
-from friso.views.drawing.images import save
-from friso.views.files import Content
+from friso.views.files import Content, image_files
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,7 +18,7 @@ def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:
     return {
         f"{stem}.nc": lambda path: response.to_netcdf(path, engine="scipy"),
         f"{stem}.csv": partial(_write_samples, response),
-        f"{stem}.png": partial(save, response_figure(response)),
+        **image_files(response_figure(response), stem, ["png"]),
     }
 
 
