@@ -296,6 +296,47 @@ def test_an_orbit_that_is_lost_while_it_attracts_well_is_certain_to_a_thousandth
         assert end.reserve == pytest.approx(1e-3, rel=0.01)
 
 
+WINDOWED = Stage(
+    masses={"cart": "2.2093 kg", "stage": "6.3981 kg"},
+    friction={
+        "model": "rolling",
+        "static": "33.9481 N",
+        "coulomb": "16.5426 N",
+        "stribeck_velocity": "0.00737342 m/s",
+        "stribeck_exponent": 2.0,
+        "viscous": "1.66789 N*s/m",
+        "bristle_stiffness": "1839530 N/m",
+        "bristle_damping": "751.53 N*s/m",
+        "rolling_exponent": 1.7042797134956384,
+    },
+    joint={
+        "stiffness": "88459.9 N/m",
+        "damping": "7.66496 N*s/m",
+        "stroke": "0.000520529 m",
+        "limiter_stiffness": "1.07343e+08 N/m",
+        "limiter_damping": "1365.44 N*s/m",
+    },
+    controller={
+        "kind": "pid",
+        "crossover": "3 Hz",
+        "alpha": 0.132886167077582,
+        "beta": 7.362771926315565,
+        "tuned_mass": "11.5375 kg",
+    },
+    motion={"kind": "hold", "duration": "20 s"},
+)
+"""Hunts below 3.016 Hz, and again from 3.10 to 3.35 Hz by cycles that are not symmetric, which no orbit leads to: by
+brute force at 1e-9 (`benchmarks.laws --law rolling --seed 27`, number 91)."""
+
+
+def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -> None:
+    window, _ = Outward(WINDOWED.flat(), 10.0).window_beyond(3.016 / 3)
+    assert window is not None
+    factor, motions = window
+    assert 3.1 < 3 * factor < 3.35
+    assert min(motion.amplitude for motion in motions) > 4e-3
+
+
 def test_thorough_starts_are_those_of_single_stages() -> None:
     stages = Ensemble.held(VARIANTS["rigid"].flat(), 3)
     begun = starts.Starts(stages)

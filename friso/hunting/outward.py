@@ -40,6 +40,10 @@ BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
 multipliers rough."""
 
+FARTHER = np.array([1.03, 1.06])
+"""Factors beyond the end of an orbit at which it is looked whether something attracts again: windows that nothing
+followed leads to lie there most often, and are narrower than the steps of a search through all bandwidths."""
+
 BETWEEN = np.array([0.1, 0.3, 0.6])
 """Shares of the way there at which, as at its end, cycles, and motions beside those that repel, are looked for that
 attract over less, or from a narrow range."""
@@ -133,13 +137,11 @@ class Outward:
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
         """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
         where orbits attract as far as the search goes. Where an allowance is used up on the way, the end is as close as
-        it is known by then, and not certain; raises Exhausted where nothing is known of it."""
+        it is known by then, and not certain: what attracts may have been followed past `outside` by then."""
         place = _Place(at, motions, outside)
         try:
             return self._followed_to_the_end(place)
         except Exhausted:
-            if self._ahead(place.at) * (place.outside - place.at) <= 0:
-                raise
             return AttractionEnd(place.at, place.outside, False)
 
     def _followed_to_the_end(self, place: _Place) -> AttractionEnd:
@@ -171,9 +173,13 @@ class Outward:
             mapped = {FOUND: suggested.like(orbit), LOST: False, UNCLEAR: True}[end]
             closer, decided = self._between(suggested, ALONG * distance, mapped)
             if closer is None:
+                window, quiet = self.window_beyond(at)
+                if window is not None:
+                    place.at, place.motions = window
+                    continue
                 if end == LOST:
                     reserve = max(reserve, abs(float(suggested.factors[0]) / at - 1))
-                certain = end != UNCLEAR and decided and bool(survey.decided[0])
+                certain = end != UNCLEAR and decided and bool(survey.decided[0]) and quiet
                 inside = at if certain or end == LOST else at * (1 + reserve) ** -self._ahead(at)
                 return AttractionEnd(inside, next_to, certain, reserve)
             (place.at, place.motions), place.outside = closer, next_to
@@ -211,6 +217,19 @@ class Outward:
             return None, decided
         at = max(motion.stage for motion in motions)
         return (float(suggested.factors[at]), tuple(motion for motion in motions if motion.stage == at)), decided
+
+    def window_beyond(self, at: float) -> tuple[tuple[float, tuple[Swinging, ...]] | None, bool]:
+        """The last of a few factors beyond the end of an orbit, `at`, at which something attracts again, and what; None
+        if nothing does; and whether that is decided."""
+        factors = at * FARTHER ** self._ahead(at)
+        factors = factors[self._ahead(at) * (self.farthest - factors) >= 0]
+        survey = self.surveyed(factors, cycles=False)
+        for number in np.flatnonzero(survey.attracts)[::-1]:
+            distances = [motion.distance for motion in survey.motions if motion.stage == number]
+            proved = self.surveyed_at_once(factors[number : number + 1], np.outer(distances, ALONG).ravel())
+            if proved.attracts[0]:
+                return (float(factors[number]), proved.motions), True
+        return None, bool(survey.decided.all())
 
     def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
         """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""
