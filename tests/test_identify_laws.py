@@ -9,12 +9,15 @@ from variants import VARIANTS
 import friso
 from friso.equations.friction.measured import MeasuredFriction
 from friso.errors import InputError
+from friso.identification import method
 from friso.identification.laws.comparison import LawComparison, LawPrediction, comparable
 from friso.identification.laws.dragging import DraggedRecord, blocks, dragged_record
 from friso.identification.laws.fit import LawFit, LawProblem
+from friso.identification.method import Identification
 from friso.identification.readings.at_bearing import Between, LowPass
 from friso.identification.readings.common import record
 from friso.stage import Stage
+from friso.stage.correlations import Correlations
 from friso.stage.tables import friction_law
 from friso.studies.laws.conversion import with_friction
 
@@ -86,12 +89,25 @@ def prediction(law: str, *errors: float) -> LawPrediction:
         ((prediction("a", 0.05, 0.06, 0.05), prediction("b", 0.052, 0.062, 0.052)), ["a", "b"]),
         ((prediction("a", 0.05, 0.06, 0.05), prediction("b", 0.05, np.inf, 0.05)), ["a"]),
         ((prediction("a", 0.5, 0.6, 0.5), prediction("b", 0.5, 0.6, 0.5)), []),
+        ((prediction("a", *[0.01] * 9), prediction("b", *[0.04] * 8, 0.9)), ["a"]),
+        ((prediction("a", *[0.01] * 3), prediction("b", 0.02, 0.02, 0.9)), ["a"]),
     ],
 )
 def test_laws_are_supported_that_predict_as_well_as_the_best(
     laws: tuple[LawPrediction, ...], supported: list[str]
 ) -> None:
     assert [law.law for law in LawComparison(laws, ("made",), {}, 3).supported] == supported
+
+
+@pytest.mark.parametrize(("law", "doubted"), [("lugre", False), ("gms", True), ("stribeck", False)])
+def test_bristles_of_a_law_that_the_record_does_not_support_are_doubted(
+    law: str, doubted: bool, rig: Stage, lugre: MeasuredFriction, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    predictions = (prediction("lugre", *[0.01] * 9), prediction("gms", *[0.2] * 9))
+    monkeypatch.setattr(method, "compare_laws", lambda *_: LawComparison(predictions, ("made",), {}, 9))
+    nothing = Identification(None, Correlations(), (), (), ())
+    stage = with_friction(rig, law, friction_law(law).keeping(lugre, 2))
+    assert bool(method.with_laws(nothing, [], stage).doubts) == doubted
 
 
 def test_every_sample_is_left_out_once() -> None:

@@ -17,8 +17,11 @@ from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.at_bearing import Between, StructureMode, machine_between
 from friso.identification.readings.common import deflections, jackknife, record
+from friso.progress import silent
+from friso.stage.tables import friction_law
+from friso.studies.laws.conversion import with_friction
 from friso.studies.rig.excitation import excite
-from friso.studies.rig.experiments.presliding import GENTLE, presliding_log
+from friso.studies.rig.experiments.presliding import GENTLE, TURNS, loop_log, presliding_log, run_experiment
 from friso.studies.rig.outcome import rig_log
 from friso.studies.rig.sizes import locked_stage, travel
 
@@ -154,12 +157,49 @@ def test_sliding_is_not_taken_for_bristles(size: float, wording: Wording) -> Non
     wording(bristles.stiffness.reason)
 
 
+@pytest.mark.parametrize("size", [3e-6, 1e-5, 2e-5])
+def test_a_slow_loop_of_another_law_is_no_mass(size: float) -> None:
+    """Springs with sliders bend otherwise than the bristles here, and at one frequency inertia looks like stiffness: a
+    mass of 1.7 kg was told as 761 to 1406 kg."""
+    time, rng = np.arange(0, 4, 1e-3), np.random.default_rng(1)
+    position = size * np.sin(4 * np.pi * time)
+    stiffness, most = np.array([40e3, 30e3, 20e3, 10e3]), STATIC * np.array([0.1, 0.25, 0.35, 0.3])
+    springs = np.zeros((len(time), 4))
+    for n, move in enumerate(np.diff(position), start=1):
+        springs[n] = np.clip(springs[n - 1] + stiffness * move, -most, most)
+    force = -MASS * (4 * np.pi) ** 2 * position + springs.sum(axis=1) + DAMPING * np.gradient(position, 1e-3)
+    force += 1e-3 * rng.standard_normal(len(time))
+    log = record("loop", 1e-3, position=position + 1e-9 * rng.standard_normal(len(time)), force=force)
+    bristles = bristles_from_presliding(log)
+    assert bristles.mass.holds(MASS) or not bristles.mass.determined
+    assert bristles.stiffness.holds(1e5) or not bristles.stiffness.determined
+
+
 @pytest.mark.parametrize("strength", [0.3, 2.0])
 def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> None:
     stage = locked_stage(friso.load(EXAMPLE))
     log = rig_log(excite(stage, 0.02, 1, kind=replace(GENTLE, strength=strength)), 0, "x", None, stage, 1).log
     bristles = bristles_from_presliding(log, machine_between(stage.flat()))
     assert not any(item.determined for item in (bristles.mass, bristles.damping, bristles.stiffness))
+
+
+def test_loops_before_sliding_close_under_gms_and_drift_under_lugre() -> None:
+    """On the rig, up to half of static friction: by how much a turn ends beside the one before, over its width."""
+    stage = locked_stage(friso.load(EXAMPLE)).replace({"rail": None})
+    measured = friction_law("lugre").shown(stage.flat())
+    drift = {}
+    for machine in (stage, with_friction(stage, "gms", friction_law("gms").keeping(measured, 2))):
+        log = loop_log(machine, "loop", 0.02, 1, 0.5)
+        turns = np.reshape(log.logged["position"], (TURNS, -1))
+        assert np.max(np.abs(log.logged["disturbance"])) == pytest.approx(1.5, rel=1e-3)
+        drift[machine.flat()["friction.model"]] = abs(turns[-1].mean() - turns[-2].mean()) / np.ptp(turns[-1])
+    assert drift["lugre"] > 2 * drift["gms"]  # the integrator, too, moves a loop
+
+
+def test_friction_without_bristles_has_none_to_show(refused: Refused) -> None:
+    stage = friso.load(EXAMPLE).replace({"friction": {"model": "none"}})
+    with refused("friction.model"):
+        run_experiment(stage, 1, silent)
 
 
 def test_a_slow_current_loop_is_taken_off() -> None:
@@ -226,7 +266,7 @@ def test_damping_found_without_the_viscous_friction_is_at_most_its_sum_with_that
         (damping,) = (one for one in estimates if one.name == "friction.bristle_damping")
         assert not damping.determined
         assert damping.low == 0
-        assert damping.high == pytest.approx(DAMPING + viscous, rel=0.02)
+        assert DAMPING + viscous <= damping.high < 1.05 * (DAMPING + viscous)
         wording(damping.reason)
 
 

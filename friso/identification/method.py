@@ -119,8 +119,20 @@ def with_laws(
     InputError as `compare_laws`."""
     estimates = {estimate.name: estimate for estimate in identification.estimates if estimate.determined}
     times = [log for log in logs if isinstance(log, Log)]
-    laws = compare_laws(times, identification.stage or base, Prior(base, True, estimates), progress)
-    return replace(identification, laws=laws)
+    stage = identification.stage or base
+    laws = compare_laws(times, stage, Prior(base, True, estimates), progress)
+    return replace(identification, laws=laws, doubts=(*identification.doubts, *_of_another_law(laws, stage)))
+
+
+def _of_another_law(laws: LawComparison, stage: Stage) -> tuple[str, ...]:
+    """That the record supports other laws than that of the stage, if it does."""
+    model, supported = stage.flat()["friction.model"], [law.law for law in laws.supported]
+    if not supported or model in supported or model not in (law.law for law in laws.predictions):
+        return ()
+    return (
+        f"The record supports {' and '.join(supported)}, but not {model}, the law of the stage: what is told of "
+        f"bristles is what {model} comes nearest with",
+    )
 
 
 def nothing_learnt(estimates: Sequence[Estimate], failed: bool) -> bool:

@@ -91,12 +91,14 @@ class Presliding:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Mass, damping and stiffness, shape (3,), and their covariance by the jackknife; by how much later [s] the force
-    comes than was taken; whether the bristles are at their end, and the share of the friction that is left; over time
-    [s], shape (n,), the position of the body on the bearing, its force and that of the model, low-passed."""
+    """Mass, damping and stiffness, shape (3,), their covariance by the jackknife, and by how much what the model leaves
+    unexplained may hide of each, `doubt`; by how much later [s] the force comes than was taken; whether the bristles
+    are at their end, and the share of the friction that is left; over time [s], shape (n,), the position of the body on
+    the bearing, its force and that of the model, low-passed."""
 
     values: np.ndarray
     covariance: np.ndarray
+    doubt: np.ndarray
     late: float
     ends: bool
     left: float
@@ -112,8 +114,9 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
 
     A joint is held, or its deflection is measured. The intervals contain by how much the answer changes with a lower
     low-pass and with the delay that fits best (which is taken where none is given), the doubt about the viscous
-    friction that is taken off the damping, and the share of the friction that is left unexplained: it falls with speed,
-    which the model leaves out. Where that share is large, nothing is shown. Raises InputError for missing channels.
+    friction that is taken off the damping, and what the friction that is left unexplained may hide: it falls with
+    speed, which the model leaves out, and bristles of another law bend otherwise. Where much is left, nothing is shown.
+    Raises InputError for missing channels.
     """
     record = record_of(log, log.longest, between)
     if why := why_unseen(record, FEWEST):
@@ -122,7 +125,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     tried = [(cutoff, looked_for), (CHECKED * cutoff, looked_for), *([] if looked_for else [(cutoff, True)])]
     best, *others = (_converged_fit(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
-    even = (best.left + LINEARITY) * np.abs(best.values)
+    even = best.doubt + LINEARITY * np.abs(best.values)
     even[KEYS.index(DAMPING)] += between.viscous[1]
     systematic = np.abs(changes).sum(axis=0) + even
     why = _no_bristles(best, between, record.bent is None)
@@ -189,11 +192,24 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     x = equation.columns(bending)
     solution = solve_normal_equations(x.T @ x, x.T @ target)
     bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
-    covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
-    left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
+    columns, friction = np.column_stack([x, bends]), target - x[:, 0] * solution[0]
+    covariance = jackknife(columns, target)[:3, :3]
+    unexplained = target - x @ solution
+    hidden = np.linalg.norm(unexplained) + LINEARITY * np.linalg.norm(friction)
+    doubt = hidden / np.array([_apart(columns, number) for number in range(len(KEYS))])
+    left = float(unexplained.std() / friction.std())
     ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
     curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
-    return _Fit(solution[:3], covariance, more, ends, left, *curves)
+    return _Fit(solution[:3], covariance, doubt, more, ends, left, *curves)
+
+
+def _apart(columns: np.ndarray, number: int) -> float:
+    """The size of what one of some columns, shape (m, p), has that the others do not."""
+    sizes = np.linalg.norm(columns, axis=0)
+    scaled = columns / np.where(sizes > 0, sizes, 1.0)
+    others = np.delete(scaled, number, axis=1)
+    own = scaled[:, number] - others @ np.linalg.lstsq(others, scaled[:, number], rcond=None)[0]
+    return float(np.linalg.norm(own) * sizes[number])
 
 
 @dataclass(frozen=True)

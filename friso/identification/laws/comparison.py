@@ -2,7 +2,8 @@
 
 A law with more numbers always fits better; what it predicts of what it was not fitted to need not be better (cross-
 validation). A law is supported unless it clearly predicts worse than the best: by more than chance would have it (a t
-test of the differences by parts, at a level that counts all laws: Bonferroni), and by more than `LEAST_WORSE`.
+test of the differences by parts and one of their signs, at a level that counts all laws: Bonferroni), and by more than
+`LEAST_WORSE`.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binomtest
 from scipy.stats import t as student
 
 from friso.errors import InputError
@@ -74,23 +76,25 @@ class LawComparison:
 
     @property
     def supported(self) -> tuple[LawPrediction, ...]:
-        """The laws that do not clearly predict worse than the best; none where no law predicts the record."""
+        """The laws that predict the record, and not clearly worse than the best; none where no law predicts it."""
         best = self.predictions[0]
         if not self.explained:
             return ()
         level = LEVEL / max(len(self.predictions) - 1, 1)
-        others = (law for law in self.predictions[1:] if not _worse(law.errors - best.errors, level))
-        return (best, *others)
+        others = (law for law in self.predictions[1:] if law.error < EXPLAINED)
+        return (best, *(law for law in others if not _worse(law.errors - best.errors, level)))
 
 
 def _worse(differences: np.ndarray, level: float) -> bool:
     """Whether errors, shape (parts,), are larger than those of another law: by more than parts differ by chance, at a
-    level, and by more than `LEAST_WORSE`. A law that could not be run for a part is."""
+    level, and by more than `LEAST_WORSE`, on average or, where single parts stand out, in their sign and median. A law
+    that could not be run for a part is."""
     if not np.isfinite(differences).all():
         return True
-    count = len(differences)
+    count, level = len(differences), level / 2  # of two tests
     chance = student.ppf(1 - level, count - 1) * differences.std(ddof=1) / np.sqrt(count) if count > 1 else np.inf
-    return bool(differences.mean() > max(chance, LEAST_WORSE))
+    more_often = binomtest(int((differences > 0).sum()), count, alternative="greater").pvalue < level
+    return bool(differences.mean() > max(chance, LEAST_WORSE) or (more_often and np.median(differences) > LEAST_WORSE))
 
 
 def comparable() -> list[str]:

@@ -146,7 +146,8 @@ class LawProblem:
 
     def _weighed(self, rows: np.ndarray, weights: Sequence[np.ndarray]) -> np.ndarray:
         """Residuals of all records, shape (rows, samples); a large number where a run failed."""
-        parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
+        with np.errstate(invalid="ignore"):  # a run that failed, where its weight is 0
+            parts = [left * weight for left, weight in zip(self.errors(rows), weights, strict=True)]
         return np.nan_to_num(np.hstack(parts), nan=FAILED, posinf=FAILED, neginf=-FAILED)
 
 

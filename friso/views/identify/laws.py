@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from friso.quantities import percent
@@ -24,12 +25,18 @@ def law_sentence(comparison: LawComparison) -> str:
     if len(supported) == len(comparison.predictions):
         return (
             f"The record does not distinguish the laws: {names} predict what they were not fitted to. Loops of force "
-            "over displacement before sliding, of several amplitudes, would."
+            "over displacement before sliding, of several amplitudes, would (rehearsed by friso rig presliding)."
         )
     others = [law for law in comparison.predictions if law not in supported]
-    verb = "predicts" if len(supported) == 1 else "predict"
     worse = _laws_with_errors(others)
-    return f"The record supports {names}, which {verb} best what was left out of the fit; {worse} predict worse."
+    return (
+        f"The record supports {names}, which {_predict(supported)} best what was left out of the fit; {worse} "
+        f"{_predict(others)} worse."
+    )
+
+
+def _predict(laws: Sequence[LawPrediction]) -> str:
+    return "predicts" if len(laws) == 1 else "predict"
 
 
 def law_facts(comparison: LawComparison) -> tuple[tuple[str, str], ...]:
@@ -75,7 +82,7 @@ def _error_share(prediction: LawPrediction) -> str:
     return percent(prediction.error)
 
 
-def _laws_with_errors(laws: tuple[LawPrediction, ...] | list[LawPrediction]) -> str:
+def _laws_with_errors(laws: Sequence[LawPrediction]) -> str:
     return ", ".join(f"{law.law} (off by {_error_share(law)})" for law in laws)
 
 

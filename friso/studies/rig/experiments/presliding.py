@@ -1,4 +1,5 @@
-"""Stiffness and damping of the bearing's bristles by small motion before it slides.
+"""Stiffness and damping of the bearing's bristles by small motion before it slides, and loops of force over
+displacement up to break-away, which tell friction laws apart.
 
 The joint is locked. The thesis has no such experiment, but the bristles decide whether a machine near the boundary of
 hunting hunts.
@@ -15,10 +16,12 @@ from friso.identification.experiments.presliding import Presliding, bristles_fro
 from friso.identification.readings.at_bearing import machine_between
 from friso.progress import Progress
 from friso.stage import Stage
+from friso.stage.tables import friction_law
 from friso.studies.rig.excitation import Excitation, excite
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
-from friso.studies.rig.sizes import locked_stage, pace, travel
-from friso.virtual_rig.run import as_built_keys
+from friso.studies.rig.sizes import friction, interval, locked_stage, pace, travel
+from friso.virtual_rig.run import as_built_keys, run
+from friso.virtual_rig.task import standing
 
 PLACES = 3
 """Places along the travel: our choice."""
@@ -28,36 +31,63 @@ GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
 sample to sample on slower ones."""
 
 
+LOOPS = np.linspace(0.2, 0.9, 8)
+"""Shares of static friction up to which the force of a loop swings: along the rail some break away."""
+
+PERIOD, TURNS, SAMPLES = 4.0, 4, 125.0
+"""Periods of the crossover that a loop takes, how often it is run through, and samples of its log per period of the
+crossover (0.5 s and 1 ms on the thesis's rig)."""
+
+
 @dataclass(frozen=True)
 class Bristles:
-    """What the log of each place shows, and the bristles' true stiffness [N/m] and damping [N s/m]."""
+    """What the log of each place shows, the bristles' true stiffness [N/m] and damping [N s/m], and the logs of the
+    loops."""
 
     by_place: tuple[Presliding, ...]
     stiffness: float
     damping: float
+    loops: tuple[RigLog, ...]
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """A small multisine at each place. Raises InputError for a stage whose friction has no bristles."""
+    """A small multisine at each place, and loops at the middle one. Raises InputError for a stage whose friction has no
+    bristles."""
     flat = stage.flat()
-    if "friction.bristle_stiffness" not in flat:
+    measured = friction_law(flat["friction.model"]).shown(flat) if "friction.model" in flat else None
+    if measured is None or not measured.stiffness > 0:
         actual = f"model = {flat.get('friction.model', 'none')!r}"
         raise InputError("friction.model", actual, "friction with bristles", 'model = "lugre"')
     held = locked_stage(stage) if stage.joint else stage
     places = np.linspace(*travel(stage), PLACES)
-    logs = []
+    logs, loops, count = [], [], PLACES + len(LOOPS)
     for number, place in enumerate(places):
-        progress(number, PLACES, f"place {number + 1} of {PLACES}")
+        progress(number, count, f"place {number + 1} of {PLACES}")
         logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
-    progress(PLACES, PLACES, "")
+    for number, share in enumerate(LOOPS):
+        progress(PLACES + number, count, f"loop {number + 1} of {len(LOOPS)}")
+        name, own_seed = f"presliding_loop_{number + 1}", seed + PLACES + number
+        loops.append(loop_log(held, name, float(places[PLACES // 2]), own_seed, float(share)))
+    progress(count, count, "")
     contact = machine_between(as_built_keys(stage))
     results = tuple(bristles_from_presliding(log.log, contact) for log in logs)
-    true = (flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0))
+    shown = Bristles(results, measured.stiffness, measured.damping, tuple(loops))
     notes = ("the joint is held by its limiter, as an engineer would clamp it",) if stage.joint else ()
-    return Outcome("presliding", stage, seed, tuple(logs), Bristles(results, *map(float, true)), notes)
+    return Outcome("presliding", stage, seed, (*logs, *loops), shown, notes)
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
     """The log of one small excitation at a place [m]."""
     kind = replace(GENTLE, samples=max(GENTLE.samples, 1 / (LONGEST * pace(stage))))
     return rig_log(excite(stage, place, seed, kind=kind), 0, name, "presliding", stage, seed)
+
+
+def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> RigLog:
+    """The log of a loop at a place [m]: a sine of force, up to a `share` of static friction."""
+    step = as_built_keys(stage)["drive.sample_time"]
+    samples = round(PERIOD / pace(stage) / step)
+    turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)
+    task = standing(place, TURNS * samples * step)
+    task = replace(task, injected=np.tile(turn, TURNS), injected_each=step)
+    (recorded,) = run(stage, task, [seed], interval(stage, min(LONGEST, 1 / (SAMPLES * pace(stage)))))
+    return rig_log(recorded, 0, name, "presliding", stage, seed)

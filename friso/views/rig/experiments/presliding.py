@@ -5,13 +5,17 @@ from __future__ import annotations
 from typing import Any
 
 from friso.identification.experiments.presliding import Presliding
-from friso.studies.rig.experiments.presliding import Bristles
+from friso.quantities import percent
+from friso.studies.rig.experiments.presliding import LOOPS, Bristles
 from friso.studies.rig.outcome import Outcome
-from friso.views.drawing.figure import Figure
+from friso.views.drawing.figure import BLUE, Axis, Figure, Panel, Series
 from friso.views.drawing.prefixes import with_unit
 from friso.views.identify.kinds.presliding import presliding_caption, presliding_panels
 from friso.views.identify.numbers import with_interval
 from friso.views.rig.outcome_view import OutcomeView
+
+ROWS = 4
+"""Rows of loops in their figure."""
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -19,7 +23,11 @@ def sentences(outcome: Outcome) -> list[str]:
     result: Bristles = outcome.result
     lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
     stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)
-    return [*lines, f"True bristles: stiffness {stiffness}, damping {damping}."]
+    loops = (
+        f"{len(result.loops)} loops of force over displacement, to {percent(LOOPS[0])} up to {percent(LOOPS[-1])} of "
+        "static friction, tell friction laws apart: friso identify --laws."
+    )
+    return [*lines, f"True bristles: stiffness {stiffness}, damping {damping}.", loops]
 
 
 def _place(result: Presliding) -> str:
@@ -31,17 +39,33 @@ def _place(result: Presliding) -> str:
 
 
 def figures(outcome: Outcome) -> list[Figure]:
-    """Force and model at the first place that shows the bristles."""
+    """Force and model at the first place that shows the bristles, and the loops."""
     bristles: Bristles = outcome.result
     result = next((place for place in bristles.by_place if len(place.model)), None)
-    if result is None:
-        return []
+    small = [] if result is None else [_small(result, outcome)]
+    return [*small, _loops(bristles, outcome)]
+
+
+def _small(result: Presliding, outcome: Outcome) -> Figure:
     title = "Small motion before sliding"
-    return [
-        Figure(
-            "rig_presliding", title, presliding_caption(result), presliding_panels(result), subject=outcome.stage.name
-        )
-    ]
+    return Figure(
+        "rig_presliding", title, presliding_caption(result), presliding_panels(result), subject=outcome.stage.name
+    )
+
+
+def _loops(bristles: Bristles, outcome: Outcome) -> Figure:
+    """Force over displacement, from the smallest loop on."""
+    panels = []
+    for share, log in zip(LOOPS, bristles.loops, strict=True):
+        displacement = log.logged["position"] - log.logged["position"][:1]
+        line = Series(displacement, log.logged["force"], "", BLUE, width=1.0)
+        title = f"To {percent(share)} of static friction"
+        panels.append(Panel(title, Axis("Displacement", "m"), Axis("Force", "N"), (line,)))
+    caption = "Commanded force over displacement at one place, four turns each. A loop of millimetres broke away."
+    columns = len(LOOPS) // ROWS
+    return Figure(
+        "rig_presliding_loops", "Loops before sliding", caption, tuple(panels), columns, subject=outcome.stage.name
+    )
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
@@ -56,7 +80,12 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         }
         for result in bristles.by_place
     ]
-    return {"places": places, "true_stiffness_n_per_m": bristles.stiffness, "true_damping_n_s_per_m": bristles.damping}
+    return {
+        "places": places,
+        "true_stiffness_n_per_m": bristles.stiffness,
+        "true_damping_n_s_per_m": bristles.damping,
+        "loops_share_of_static": [*LOOPS],
+    }
 
 
 VIEW = OutcomeView(sentences, figures, numbers)
