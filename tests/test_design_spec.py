@@ -15,7 +15,7 @@ from friso.design_method.outline import outline
 from friso.design_method.population import corners, random_machines, typical_move
 from friso.design_method.prepare import assumed, by_rules, prepared, with_leaves
 from friso.design_method.spec import Spec, load_spec, read_spec
-from friso.frequency.bandwidth import loop_bandwidth
+from friso.frequency.bandwidth import rigid_bandwidth
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 SPEC = EXAMPLES / "specs" / "thesis.toml"
@@ -44,7 +44,7 @@ def test_the_example_is_read() -> None:
 
 
 def test_parasitic_frequencies_set_the_limit() -> None:
-    spec = changed("machine", bandwidth_limit=None, parasitic_frequencies=["730 Hz", "480 Hz"])
+    spec = changed("machine", crossover_limit=None, parasitic_frequencies=["730 Hz", "480 Hz"])
     assert spec.limit == pytest.approx(48)
 
 
@@ -66,7 +66,7 @@ def test_a_single_length_is_the_largest() -> None:
         ("friction", {"coulomb": "1 N"}, "one of the two"),
         ("friction", {"gap": None, "coulomb": "3 N .. 4 N"}, "below the static friction"),
         ("machine", {"parasitic_frequencies": ["480 Hz"]}, "both"),
-        ("machine", {"bandwidth_limit": None}, "neither"),
+        ("machine", {"crossover_limit": None}, "neither"),
         ("leaves", {"materials": ["stainles"]}, "did you mean stainless 1.4310"),
         ("leaves", {"materials": []}, "an empty list"),
         ("leaves", {"thickness": ["80 mm"]}, "thinner than the length"),
@@ -175,11 +175,11 @@ def test_other_controllers_give_way_to_the_rules_at_their_bandwidth(rig: friso.S
     limited = {**cascade, "force_limit": "200 N"}
     stage = rig.replace({"controller": limited, "joint": None, "parasitic": None})
     ruled = by_rules(stage)
-    assert ruled.flat()["controller.crossover"] == pytest.approx(loop_bandwidth(stage), rel=1e-3)
+    assert ruled.flat()["controller.crossover"] == pytest.approx(rigid_bandwidth(stage), rel=1e-3)
     assert ruled.flat()["controller.force_limit"] == 200.0
     assert by_rules(ruled) is ruled
     spec = read_spec(outline(stage))
-    assert spec.limit == pytest.approx(loop_bandwidth(stage), rel=1e-3)
+    assert spec.limit == pytest.approx(rigid_bandwidth(stage), rel=1e-3)
     assert prepared(stage, spec).flat()["controller.crossover"] == spec.limit
 
 

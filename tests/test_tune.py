@@ -1,5 +1,6 @@
 """`friso tune`: machines, remedies, searches and outcomes, with tiny budgets."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -8,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from refusals import Wording
+from scipy.optimize import brentq
 from variants import maxwell, release, van_dijk
 from variants import stage as variant
 
@@ -23,7 +25,7 @@ from friso.equations.breakaway import breakaway, least_breakaway, sliding
 from friso.equations.settings import settings_named
 from friso.equations.structure import shared_structure
 from friso.errors import InputError
-from friso.frequency.bandwidth import loop_bandwidth, loop_bandwidths
+from friso.frequency.bandwidth import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
@@ -219,6 +221,78 @@ CONTROLLERS = {
     "gains": {"kind": "pid", "kp": "1.4 kN/m", "ki": "11 kN/(m*s)", "kd": "85 N*s/m", "tau": "5 ms"},
     "cascade": {"kind": "cascade", "kv": "10 1/s", "kp": "85 N*s/m", "velocity_integral_time": "100 ms"},
 }
+
+
+def crossing(loop: Callable[[complex], complex], low: float, high: float) -> float:
+    """Where the gain of a loop is 1 between two frequencies [Hz]."""
+    root: Any = brentq(lambda hertz: np.log(abs(loop(2j * np.pi * hertz))), low, high, xtol=1e-9)
+    return float(root)
+
+
+def by_rules(s: complex) -> complex:
+    """The thesis's Eq. 7 and 8 at 8 Hz, alpha 0.1, beta 2, for 1.7 kg [N/m]."""
+    rate = 2 * np.pi * 8
+    lead, lag, integral = np.sqrt(1 / 0.1) / rate, np.sqrt(0.1) / rate, 2 * np.sqrt(1 / 0.1) / rate
+    return 1.7 * rate**2 * np.sqrt(0.1) * (lead * s + 1) * (1 + 1 / (integral * s)) / (lag * s + 1)
+
+
+def observed(s: complex) -> complex:
+    """The feedback of what an observer estimates [N/m], from its own equations: w_c = 2 pi 3 Hz, w_o = 5 w_c,
+    1.7 kg."""
+    slow = 2 * np.pi * 3
+    fast, mass = 5 * slow, 1.7
+    feedback = np.array([slow**2, 2 * slow, 1.0])
+    gains = np.array([3 * fast, 3 * fast**2, fast**3])
+    drift = np.diag([1.0, 1.0], 1) - np.outer(gains, [1, 0, 0]) - np.outer([0, 1, 0], feedback)
+    return complex(mass * feedback @ np.linalg.solve(s * np.eye(3) - drift, gains))
+
+
+@pytest.mark.parametrize(
+    ("controller", "force", "free", "between"),
+    [
+        ({}, by_rules, False, (4.0, 16.0)),
+        ({}, by_rules, True, (15.0, 40.0)),
+        ({"kind": "adrc", "bandwidth": "3 Hz"}, observed, False, (4.0, 16.0)),
+    ],
+)
+def test_the_bandwidth_is_where_the_loop_last_crosses_0_db(
+    controller: dict[str, Any], force: Callable[[complex], complex], free: bool, between: tuple[float, float]
+) -> None:
+    """By transfer functions written by hand, whatever the key of the controller says: 8.08, 24.75 and 8.21 Hz."""
+    rig = load(EXAMPLES / "thesis_rig.toml").replace({"parasitic": None, "joint.locked": not free})
+    stage = Stage(**{**rig.as_written(), "controller": controller}) if controller else rig
+    flat = stage.flat()
+    cart, end, viscous = flat["masses.cart"], flat["masses.stage"], flat["friction.viscous"]
+
+    def plant(s: complex) -> complex:
+        if not free:
+            return 1 / ((cart + end) * s**2 + viscous * s)
+        joint = flat["joint.damping"] * s + flat["joint.stiffness"]
+        carried = cart * s**2 + viscous * s + joint
+        return carried / ((end * s**2 + joint) * carried - joint**2)
+
+    by_hand = crossing(lambda s: force(s) * plant(s), *between)
+    assert loop_bandwidth(stage) == pytest.approx(by_hand, rel=1e-3)
+    assert bandwidths_at(stage, [1.0]) == pytest.approx([by_hand], rel=1e-3)
+    assert rigid_bandwidth(stage) == pytest.approx(by_hand if not free else 8.08, rel=1e-3)
+
+
+def test_a_light_mode_that_rises_above_0_db_is_where_the_loop_last_crosses_it(rigid: Stage) -> None:
+    mode = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": 5e-4}
+    stage = rigid.replace({"controller.crossover": "30 Hz", "joint": {**LIMITER, "locked": True}, "parasitic": mode})
+    assert loop_bandwidth(stage) > 200
+    assert bandwidths_at(stage, [1.0]) == pytest.approx([loop_bandwidth(stage)], rel=1e-3)
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_a_search_tries_the_bandwidth_at_its_limit(free: bool, machines: Fleet) -> None:
+    """Also where it does not go with the key of the controller."""
+    rig = load(EXAMPLES / "thesis_rig.toml").replace({"parasitic": None, "joint.locked": not free})
+    stage = Stage(**{**rig.as_written(), "controller": {"kind": "adrc", "bandwidth": "3 Hz"}})
+    goal = Goal(bandwidth_limit=40.0)
+    search = Search(remedies(stage, goal)[0], goal, machines, machines, stage, TINY, lambda label: None)
+    (share,) = search._at_the_limit(np.linspace(0, 1, 20))
+    assert loop_bandwidth(search.remedy.tuned(np.array([share]))) == pytest.approx(40.0, rel=3e-3)
 
 
 @pytest.mark.parametrize("kind", [*CONTROLLERS])
@@ -421,6 +495,8 @@ def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) ->
     assert all(f"{part.needed:.3g}" == f"{part.needed:.6g}" for part in three.relaxations)
     assert three.remedy is search.remedy
 
+
+LIMITER = {"limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 
 DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
 

@@ -135,8 +135,8 @@ def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
     """One value is meant there, or a range that is allowed: not what is known of a machine."""
     from friso.design_method.spec import SpecMachine
 
-    with refused("bandwidth_limit"):
-        SpecMachine(bandwidth_limit="48 Hz +/- 5 Hz")
+    with refused("crossover_limit"):
+        SpecMachine(crossover_limit="48 Hz +/- 5 Hz")
 
 
 def test_single_valued_commands_say_that_centres_are_used(

@@ -13,6 +13,7 @@ from friso.design_method.method import Design
 from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules, check_designable
 from friso.design_method.spec import Spec, load_spec, read_spec
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
 from friso.system import shell_word
@@ -92,7 +93,7 @@ def design(
     stage : Stage, path or dict
         The stage as it is, its file, or the tables of one.
     spec : path, optional
-        The specification: bandwidth limit, friction, moves, load, space, sheets; default: one made from the stage.
+        The specification: crossover limit, friction, moves, load, space, sheets; default: one made from the stage.
     set : dict, optional
         Keys of the stage to override.
     laws : bool
@@ -142,7 +143,6 @@ def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -
 
 def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
     """Say what neither the stage file nor a specification tells."""
-    from friso.frequency.bandwidth import loop_bandwidth
     from friso.views.drawing.prefixes import with_unit
 
     if outlined:
@@ -150,10 +150,10 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
         LOGGER.warning(f"no specification: one is made from the stage file; {made}")
     rules = by_rules(stage)
     if rules is not stage:
-        hertz = with_unit(loop_bandwidth(rules), "Hz")
+        hertz = with_unit(rules.flat()[CROSSOVER], "Hz")
         LOGGER.warning(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
-            f"controller, whose bandwidth is {hertz}; friso export gains lists its gains"
+            f"controller, with its bandwidth when the joint is locked, {hertz}; friso export gains lists its gains"
         )
     if keys := assumed(stage, spec):
         units = numeric_keys(stage.flat() | keys)

@@ -286,7 +286,7 @@ def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: fl
     above = [max(low, needed) for low, high in fit.comfortable if high > needed]
     allowed_ = fit.choice.frequency / spec.safety.parasitic
     if spec.limit < needed and above and min(above) <= allowed_:
-        yield Relaxation(name, "machine.bandwidth_limit", spec.limit, min(above), "Hz")
+        yield Relaxation(name, "machine.crossover_limit", spec.limit, min(above), "Hz")
     if edge < crossover:
         yield Relaxation(name, "safety.hunting", spec.safety.hunting, crossover / edge, "")
     damping = fit.stage.flat()["joint.damping"]

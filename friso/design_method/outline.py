@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from friso.design_method.prepare import check_designable
+from friso.design_method.prepare import by_rules, check_designable
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.equations.motion import size
-from friso.frequency.bandwidth import loop_bandwidth
 from friso.quantities import as_toml, percent
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
@@ -21,12 +21,12 @@ SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscou
 
 
 def outline(stage: Stage) -> str:
-    """The text of a specification with comments: the present bandwidth as the machine's limit, ranges from what is
+    """The text of a specification with comments: the present crossover as the machine's limit, ranges from what is
     uncertain in the stage file (else assumed ones), moves up to its travel, and spring steel in usual gauges. Raises
     InputError for a stage that `friso design` cannot design for."""
     check_designable(stage)
     flat = stage.flat()
-    limit = f"{loop_bandwidth(stage):.4g}"
+    limit = f"{by_rules(stage).flat()[CROSSOVER]:.4g}"
     friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
     masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
     both = masses if len(masses) == 2 else [f"# {line}   # to be divided, unless both are given" for line in masses]
@@ -37,8 +37,8 @@ def outline(stage: Stage) -> str:
         [
             f"name = {as_toml('Friction isolator of ' + (stage.name or 'the stage'))}",
             "",
-            "[machine]                                  # the highest bandwidth that it allows",
-            f'bandwidth_limit = "{limit} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',
+            "[machine]                                  # the highest crossover that it allows, by van Dijk's rules",
+            f'crossover_limit = "{limit} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',
             "",
             "[friction]                                 # ranges; a key left out stays as in the stage file",
             *friction,

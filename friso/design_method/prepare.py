@@ -8,7 +8,7 @@ from friso.design_method.isolator import isolated
 from friso.design_method.spec import Spec
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS, controller_table
 from friso.errors import InputError
-from friso.frequency.bandwidth import loop_bandwidth
+from friso.frequency.bandwidth import rigid_bandwidth
 from friso.materials import materials
 from friso.quantities import as_toml, exactly
 from friso.stage import Stage
@@ -55,12 +55,12 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
 
 def by_rules(stage: Stage) -> Stage:
     """The stage with a controller by van Dijk's rules, whose crossover follows from the design: its own, or else one of
-    the same bandwidth and force limit."""
+    the same bandwidth of the mass as a whole and the same force limit."""
     if CROSSOVER in stage.flat():
         return stage
     written = stage.as_written()
     kept = {key: written["controller"][key] for key in LIMITS if key in written["controller"]}
-    return Stage(**{**written, "controller": {**controller_table(f"{loop_bandwidth(stage):.4g} Hz"), **kept}})
+    return Stage(**{**written, "controller": {**controller_table(f"{rigid_bandwidth(stage):.4g} Hz"), **kept}})
 
 
 def complete_joint(stage: Stage, spec: Spec) -> Stage:

@@ -102,17 +102,17 @@ _GAUGES = 'thickness = ["0.2 mm", "0.25 mm", "0.3 mm"]'
 class SpecMachine(Section):
     """How fast the controller of the machine may be, or the parasitic frequencies that decide it."""
 
-    bandwidth_limit: Annotated[Value | None, Quantity("Hz", positive, "48 Hz")] = None
+    crossover_limit: Annotated[Value | None, Quantity("Hz", positive, "48 Hz")] = None
     parasitic_frequencies: Annotated[
         tuple[Any, ...] | None, OneOrMany(Quantity("Hz", positive, "480 Hz"), '["480 Hz", "730 Hz"]')
     ] = None
 
     @model_validator(mode="after")
     def _has_one(self) -> Self:
-        if (self.bandwidth_limit is None) == (self.parasitic_frequencies is None):
-            text = "both" if self.bandwidth_limit else "neither"
-            example = 'bandwidth_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
-            raise SpecError("", text, "the bandwidth limit, or the parasitic frequencies that determine it", example)
+        if (self.crossover_limit is None) == (self.parasitic_frequencies is None):
+            text = "both" if self.crossover_limit else "neither"
+            example = 'crossover_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
+            raise SpecError("", text, "the crossover limit, or the parasitic frequencies that determine it", example)
         return self
 
 
@@ -230,7 +230,7 @@ class Safety(Section):
     """Share by which the drive stiffness may be off: the thickness, in its cube, by a third of that."""
 
 
-_MACHINE = Table(lambda _: SpecMachine, '[machine] bandwidth_limit = "48 Hz"')
+_MACHINE = Table(lambda _: SpecMachine, '[machine] crossover_limit = "48 Hz"')
 _FRICTION = Table(lambda _: SpecFriction, '[friction] static = "1 N .. 3 N"')
 _MASSES = Table(lambda _: SpecMasses, '[masses] stage = "0.5 kg +/- 5 %"')
 _MOVES = Table(lambda _: SpecMoves, '[moves] travel = "1 mm .. 100 mm", acceleration = "10 m/s^2 .. 100 m/s^2"')
@@ -259,13 +259,13 @@ class Spec(Section):
     @property
     def limit(self) -> float:
         """The highest crossover [Hz] that the machine allows."""
-        if self.machine.bandwidth_limit is not None:
-            return float(self.machine.bandwidth_limit)
+        if self.machine.crossover_limit is not None:
+            return float(self.machine.crossover_limit)
         frequencies: Sequence[float] = self.machine.parasitic_frequencies or ()
         return min(frequencies) / self.safety.parasitic
 
 
-EXAMPLE = '[machine] and, on the next line, bandwidth_limit = "48 Hz"'
+EXAMPLE = '[machine] and, on the next line, crossover_limit = "48 Hz"'
 EXPECTED = "a specification; examples/specs/thesis.toml is one"
 
 

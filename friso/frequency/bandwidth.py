@@ -1,43 +1,55 @@
-"""The bandwidth of a stage: what its controller states, or where the gain of its loop is 1."""
+"""The bandwidth of a loop: the highest frequency at which its gain is 1, whatever its controller calls so."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import bandwidth
-from friso.frequency.loops import open_loop
-from friso.frequency.margins import margins
+from friso.equations.bandwidth import sped_up
+from friso.frequency.drive import DriveTiming
+from friso.frequency.loops import open_loop, poles
+from friso.frequency.margins import margins, with_resonances
 from friso.frequency.members import Members, limit_cases
 from friso.stage import Stage
 
 GRID = np.geomspace(0.01, 1e4, 800)
-"""Frequencies [Hz] at which the loops of many points are looked at for their bandwidth."""
+"""Frequencies [Hz] at which the loops of many points are looked at for their bandwidth, beside those about resonances
+of the stage."""
 
 
 def loop_bandwidth(stage: Stage) -> float:
-    """The bandwidth [Hz] that the controller states; else the last frequency at which the loop's gain is 1 while the
-    stage slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it."""
-    flat = stage.flat()
-    stated = bandwidth(flat)
-    if stated is not None:
-        return float(stated)
-    crossings = margins(flat, _sliding(stage)).crossovers
+    """The bandwidth [Hz] of a stage: the last frequency at which the gain of its open loop is 1 (0 dB) while the stage
+    slides (NaN: there is none): stuck, its bearing holds it, and the loop hardly moves it."""
+    return _last_crossing(stage.flat())
+
+
+def rigid_bandwidth(stage: Stage) -> float:
+    """The same with its joint locked and without a parasitic mode: of the mass as a whole, as crossovers by van Dijk's
+    rules are."""
+    flat = {key: value for key, value in stage.flat().items() if not key.startswith("parasitic.")}
+    return _last_crossing({**flat, "joint.locked": True} if stage.joint else flat)
+
+
+def _last_crossing(flat: Mapping[str, Any]) -> float:
+    crossings = margins(flat, _sliding(flat)).crossovers
     return float(crossings[-1]) if crossings else float("nan")
+
+
+def bandwidths_at(stage: Stage, factors: Sequence[float] | np.ndarray) -> np.ndarray:
+    """The bandwidths [Hz] of a stage whose controller is faster as a whole by factors, as of `loop_bandwidths`."""
+    return loop_bandwidths(stage, sped_up(stage.flat(), np.array(factors)), len(factors))
 
 
 @np.errstate(all="ignore")
 def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.ndarray:
-    """The same [Hz] of a stage with changes, arrays of shape (count,): to a share of 1e-3, as loops are looked at on a
-    grid of frequencies and their gain is taken to be a power of it in between."""
-    flat = {**stage.flat(), **changes}
-    stated = bandwidth(flat)
-    if stated is not None:
-        return np.array(np.broadcast_to(stated, (count,)), float)
-    loops = open_loop(flat, _sliding(stage).repeated(count)).at(2j * np.pi * GRID)[:, :, 0, 0]
-    gain, frequency = np.log(np.abs(loops)), np.log(GRID)
+    """The bandwidths [Hz] of a stage with changes, arrays of shape (count,), in continuous time: to a share of 1e-3, as
+    loops are looked at on a grid of frequencies and their gain is taken to be a power of it in between."""
+    flat, sliding = stage.flat(), _sliding(stage.flat())
+    omega = with_resonances(2 * np.pi * GRID, [poles(flat, sliding, DriveTiming(0.0, 0.0)).cut])
+    loops = open_loop({**flat, **changes}, sliding.repeated(count)).at(1j * omega)[:, :, 0, 0]
+    gain, frequency = np.log(np.abs(loops)), np.log(omega / (2 * np.pi))
     falls = (gain[:, :-1] >= 0) & (gain[:, 1:] < 0)
     last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
     rows = np.arange(count)
@@ -46,6 +58,6 @@ def loop_bandwidths(stage: Stage, changes: Mapping[str, Any], count: int) -> np.
     return np.where(falls.any(axis=1), np.exp(at), np.nan)
 
 
-def _sliding(stage: Stage) -> Members:
+def _sliding(flat: Mapping[str, Any]) -> Members:
     """The limit case in which the stage slides."""
-    return next(case for name, case in limit_cases(stage.flat()).items() if not name.startswith("stuck"))
+    return next(case for name, case in limit_cases(flat).items() if not name.startswith("stuck"))

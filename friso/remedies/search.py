@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from scipy.optimize import differential_evolution
+from scipy.optimize import brentq, differential_evolution
 
 from friso.engine.allowance import Exhausted, allowance
-from friso.frequency.bandwidth import loop_bandwidth, loop_bandwidths
+from friso.frequency.bandwidth import loop_bandwidths
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.machines import Fleet
 from friso.remedies.trials import Moves, attraction, modulus_margins, moves_of_points, quantile
-from friso.remedies.variables import BANDWIDTH
 from friso.stage import Stage
 
 SEED = 27
@@ -75,7 +75,7 @@ class TriedPoints:
     """Points that were tried, one a row: their `shares` of the ranges (n, variables), and, each of shape (n,), the
     settling time of the slowest twentieth [s] and within the looser tolerance, the same with the bandwidth lower by the
     distance from hunting, the largest force [N] and least modulus margin of all but a twentieth, and the bandwidth [Hz]
-    of the machine of the stage file."""
+    (see `loop_bandwidth`) of the machine of the stage file."""
 
     shares: np.ndarray
     settling: np.ndarray
@@ -171,7 +171,8 @@ class Search:
 
         if variables == 1:
             count = self.budget.points * 6
-            cost(np.union1d(np.linspace(0, 1, count), self._at_the_limit())[None])
+            grid = np.linspace(0, 1, count)
+            cost(np.union1d(grid, self._at_the_limit(grid))[None])
             points = self.points
             best = points.cost(self.goal, None if wanted is None else wanted(points.shares)).argmin()
             at = points.shares[int(best), 0]
@@ -191,13 +192,23 @@ class Search:
         near[0] = best
         _evolve(cost, near, ends, self.budget.refined)
 
-    def _at_the_limit(self) -> np.ndarray:
-        """Where a remedy of the bandwidth alone is at the limit of that, (1,), or (0,)."""
-        (variable,), limit = self.remedy.variables, self.goal.bandwidth_limit
-        if variable.name != BANDWIDTH or limit is None:
-            return np.zeros(0)
-        share = variable.share(limit * (1 - SPARE) / loop_bandwidth(self.remedy.stage))
-        return np.array([share]) if 0 <= share <= 1 else np.zeros(0)
+    def _at_the_limit(self, grid: np.ndarray) -> list[float]:
+        """Where between shares of its range a remedy of one variable comes to the limit of the bandwidth from below."""
+        limit = self.goal.bandwidth_limit
+        if limit is None:
+            return []
+
+        def above(shares: np.ndarray) -> np.ndarray:
+            return np.log(self._bandwidth(shares[:, None]) / (limit * (1 - SPARE)))
+
+        over = above(grid)
+        passed = np.flatnonzero((over[:-1] < 0) & (over[1:] >= 0))
+        roots: Any = [brentq(lambda share: above(np.array([share]))[0], grid[k], grid[k + 1]) for k in passed]
+        return roots
+
+    def _bandwidth(self, shares: np.ndarray) -> np.ndarray:
+        """The bandwidths of points (points, variables) on the machine of the stage file [Hz]."""
+        return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
     def measured(self, shares: np.ndarray) -> TriedPoints:
         """Points on the machines: the moves are run only where the loop is stable and has half of the margin and, of
@@ -205,7 +216,7 @@ class Search:
         most of the work."""
         goal, count = self.goal, len(shares)
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
-        bandwidth = loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), count)
+        bandwidth = self._bandwidth(shares)
         far = bandwidth > FAR_ABOVE * _most(goal.bandwidth_limit)
         stable = np.flatnonzero((margin > goal.margin / 2) & ~(far & (len(self.remedy.variables) > 1)))
         columns = [np.full(count, np.inf) for _ in range(4)]

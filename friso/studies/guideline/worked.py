@@ -1,4 +1,4 @@
-"""The worked steps: from the friction range and the bandwidth limit of a machine to its isolator, on the thesis rig."""
+"""The worked steps: from the friction range and the crossover limit of a machine to its isolator, on the thesis rig."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class WorkedMachine:
 
 @dataclass(frozen=True)
 class WorkedDesign:
-    """An isolator for a bandwidth limit [Hz]: the edge [Hz] for which it is laid out by the law, `aim`; its stiffness
+    """An isolator for a crossover limit [Hz]: the edge [Hz] for which it is laid out by the law, `aim`; its stiffness
     [N/m], the stroke that it needs [m] and the `force` at full stroke [N]; its edges over the friction range, and the
     least modulus `margin` of the settled states at the limit, with the rig's own friction and parasitic mode."""
 
@@ -88,7 +88,7 @@ class WorkedDesign:
 
 @dataclass(frozen=True)
 class IsolatorNeed:
-    """Whether a machine with a bandwidth limit [Hz] needs an isolator: if that is below `edge` [Hz], the highest locked
+    """Whether a machine with a crossover limit [Hz] needs an isolator: if that is below `edge` [Hz], the highest locked
     edge by the law over the friction range, with its safety factor."""
 
     limit: float
@@ -103,7 +103,7 @@ class IsolatorNeed:
 class Worked:
     """The rig: its `rates` [Hz] by name; `machines` by law and computation; its edge over the `friction` range, rigid,
     the `bound` [Hz] that the law has over all friction forces at the rig's bristles and masses and the gaps swept, and
-    the `safe` factor on the locked law; what it `needs`, by bandwidth limit, and where that
+    the `safe` factor on the locked law; what it `needs`, by crossover limit, and where that
     is an isolator its `designs`, by the law and then corrected until computation agrees; and the `studies` of claims of
     the thesis, by name."""
 

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from friso.design_method.geometry import Geometry
+from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
-from friso.frequency.bandwidth import loop_bandwidth
+from friso.frequency.bandwidth import bandwidths_at
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.quantities import Quantity, percent, positive
@@ -379,18 +380,18 @@ def _lowest(points: TriedPoints, goal: Goal) -> str:
 
 def _edges(tuning: Advice) -> str:
     """Where hunting ends in bandwidth, and up to where there is margin."""
-    edge, comfortable = tuning.case.judgement.margin, tuning.limits.highest_comfortable
-    present = loop_bandwidth(tuning.stage)
+    edge, comfortable, stage = tuning.case.judgement.margin, tuning.limits.highest_comfortable, tuning.stage
     parts = []
     if edge is not None:
-        ends, needed = (with_unit(factor * edge.quiet * present, "Hz") for factor in (1.0, tuning.goal.distance))
+        factors = (edge.quiet, tuning.goal.distance * edge.quiet)
+        ends, needed = (with_unit(float(hertz), "Hz") for hertz in bandwidths_at(stage, factors))
         parts.append(f"hunting ends at {ends}, so that {needed} is needed")
     if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
-        hertz = comfortable if tuning.stage.controller.bandwidth_key else comfortable * present
-        parts.append(f"the margin is kept up to {with_unit(hertz, 'Hz')}")
+        (hertz,) = bandwidths_at(stage, [comfortable / (bandwidth(stage.flat()) or 1.0)])
+        parts.append(f"the margin is kept up to {with_unit(float(hertz), 'Hz')}")
     if tuning.goal.bandwidth_limit is not None:
         parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")
-    return f" In bandwidth {listed(parts, 'and')}." if parts else ""
+    return f" In bandwidth (where the loop last crosses 0 dB) {listed(parts, 'and')}." if parts else ""
 
 
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
@@ -422,16 +423,19 @@ def _row(measured: Performance, tuning: Advice, works: str) -> list[str]:
 
 
 def window_words(window: VariableWindow, outcome: RemedyOutcome) -> str:
-    """Where a number may lie, all else being as tuned."""
-    name, low, high = window.name, window.low, window.high
-    unit = ""
-    if window.name == BANDWIDTH:
-        present = loop_bandwidth(outcome.remedy.stage)
-        low, high, unit = low * present, high * present, "Hz"
-    else:
-        keys = outcome.remedy.stage.numeric_keys()
-        unit = keys[name].unit if name in keys else ""
-    first, last = (number(value, unit) for value in (low, high))
+    """Where a number may lie, all else being as tuned: of the bandwidth the key that states it, or else where the loop
+    last crosses 0 dB."""
+    stage, name, ends = outcome.stage, window.name, np.array([window.low, window.high])
+    assert stage is not None
+    if name == BANDWIDTH:
+        pairs = zip(outcome.remedy.variables, outcome.shares, strict=True)
+        tuned = next(variable.at(share) for variable, share in pairs if variable.name == name)
+        stated = bandwidth(stage.flat())
+        ends = bandwidths_at(stage, ends / tuned) if stated is None else stated * ends / tuned
+        name = stage.controller.bandwidth_key or name
+    keys = stage.numeric_keys()
+    unit = "Hz" if name == BANDWIDTH else keys[name].unit if name in keys else ""
+    first, last = (number(float(value), unit) for value in ends)
     first = f"{first} (the least tried)" if window.open_below else first
     last = f"{last} (the most tried)" if window.open_above else last
     return f"{name}: from {first} to {last}"
