@@ -130,8 +130,8 @@ def _of_another_law(laws: LawComparison, stage: Stage) -> tuple[str, ...]:
     if not supported or model in supported or model not in (law.law for law in laws.predictions):
         return ()
     return (
-        f"The record supports {' and '.join(supported)}, but not {model}, the law of the stage: what is told of "
-        f"bristles is what {model} comes nearest with",
+        f"The record does not support {model}, the law of the stage: what is told of bristles is what {model} comes "
+        "nearest with",
     )
 
 
