@@ -43,6 +43,10 @@ def test_the_example_is_read() -> None:
     assert len(sheets(spec)) == 8
 
 
+def test_a_limit_by_its_former_name_is_read() -> None:
+    assert changed("machine", crossover_limit=None, bandwidth_limit="25 Hz").limit == 25
+
+
 def test_parasitic_frequencies_set_the_limit() -> None:
     spec = changed("machine", crossover_limit=None, parasitic_frequencies=["730 Hz", "480 Hz"])
     assert spec.limit == pytest.approx(48)

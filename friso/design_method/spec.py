@@ -99,6 +99,9 @@ _GAUGE = Quantity("m", positive, "0.3 mm")
 _GAUGES = 'thickness = ["0.2 mm", "0.25 mm", "0.3 mm"]'
 
 
+FORMER_LIMIT = "bandwidth_limit"
+
+
 class SpecMachine(Section):
     """How fast the controller of the machine may be, or the parasitic frequencies that decide it."""
 
@@ -106,6 +109,15 @@ class SpecMachine(Section):
     parasitic_frequencies: Annotated[
         tuple[Any, ...] | None, OneOrMany(Quantity("Hz", positive, "480 Hz"), '["480 Hz", "730 Hz"]')
     ] = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _by_its_former_name(cls, table: Any) -> Any:
+        """Earlier specifications call the crossover limit `bandwidth_limit`."""
+        if isinstance(table, dict) and FORMER_LIMIT in table and "crossover_limit" not in table:
+            others = {key: value for key, value in table.items() if key != FORMER_LIMIT}
+            return {**others, "crossover_limit": table[FORMER_LIMIT]}
+        return table
 
     @model_validator(mode="after")
     def _has_one(self) -> Self:
