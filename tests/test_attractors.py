@@ -21,6 +21,7 @@ from friso.hunting import verdict
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Pending, lengthened
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
@@ -335,6 +336,28 @@ def test_a_window_just_beyond_an_edge_is_narrower_than_the_steps_of_a_search() -
     factor, motions = window
     assert 3.1 < 3 * factor < 3.35
     assert min(motion.amplitude for motion in motions) > 4e-3
+
+
+@pytest.mark.parametrize(("farthest", "settled"), [(3.02 / 3, None), (10.0, 3.06 / 3)])
+def test_no_window_is_looked_for_beyond_the_range_or_a_stage_that_settles(
+    farthest: float, settled: float | None
+) -> None:
+    """A stage in the gap below the window was said to be contradicted by an orbit that is followed to it."""
+    assert Outward(WINDOWED.flat(), farthest, settled).window_beyond(3.016 / 3) == (None, True)
+
+
+@pytest.mark.parametrize("proved", [True, False])
+def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
+    proved: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def surveyed(decided: list[bool], *motions: Swinging) -> Attractors:
+        count = len(decided)
+        return Attractors(motions, np.array(decided), np.ones(count), (), np.zeros(count, bool), np.ones(count, bool))
+
+    found = surveyed([True, True], Swinging(1, 1e-3, 0.1, 0.1, 1e-3, 2))
+    monkeypatch.setattr(Outward, "surveyed", lambda *_, **__: found)
+    monkeypatch.setattr(Outward, "surveyed_at_once", lambda *_: surveyed([proved]))
+    assert Outward(WINDOWED.flat(), 10.0).window_beyond(1.0) == (None, proved)
 
 
 def test_thorough_starts_are_those_of_single_stages() -> None:

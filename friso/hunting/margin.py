@@ -123,6 +123,7 @@ class _Grid:
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         self.ends: dict[tuple[int, int], AttractionEnd] = {}
         self.inspected: set[int] = set()
+        self.settled: float | None = None
         self._survey(np.arange(first, len(factors)))
 
     def search_below(self) -> None:
@@ -144,6 +145,8 @@ class _Grid:
         self.attracts[index], self.decided[index] = survey.attracts[0], survey.decided[0]
         self.motions[index] = list(survey.motions)
         self.inspected.add(index)
+        if self.decided[index] and not self.attracts[index]:
+            self.settled = float(self.factors[index])
 
     def last_edge(self, index: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
@@ -178,7 +181,7 @@ class _Grid:
 
     def _followed(self, at: int, ahead: int) -> AttractionEnd | None:
         """The same, of an end that was not followed before. Raises Exhausted."""
-        outward = Outward(self.flat, FARTHEST**ahead)
+        outward = Outward(self.flat, FARTHEST**ahead, self.settled)
         if not self.proved(at, outward):
             return None
         try:

@@ -129,10 +129,11 @@ class Beyond(Exception):
 @dataclass(frozen=True)
 class Outward:
     """The search for the end of what attracts a stage, given as flat keys, from a bandwidth towards the `farthest` one
-    (factors)."""
+    (factors). Nothing attracts at the one that is `settled`, if any: a window beyond it is another one."""
 
     flat: Mapping[str, Any]
     farthest: float
+    settled: float | None = None
 
     def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
         """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
@@ -155,7 +156,7 @@ class Outward:
                 if place.outside / place.at < beyond and place.at / place.outside < beyond:
                     break
                 continue
-            flip = self._flip(at, outside) if self._chatters and _is_simple(orbit) else None
+            flip = self._flip(at, self._still_ahead(at, outside)) if self._chatters and _is_simple(orbit) else None
             if flip:
                 (place.at, reserve), distance, end = flip, orbit.distance, FOUND
             else:
@@ -222,14 +223,21 @@ class Outward:
         """The last of a few factors beyond the end of an orbit, `at`, at which something attracts again, and what; None
         if nothing does; and whether that is decided."""
         factors = at * FARTHER ** self._ahead(at)
-        factors = factors[self._ahead(at) * (self.farthest - factors) >= 0]
+        within = self._ahead(at) * (self.farthest - factors) >= 0
+        if self.settled is not None:
+            within &= (factors < self.settled) == (at < self.settled)
+        factors = factors[within]
+        if not factors.size:
+            return None, True
         survey = self.surveyed(factors, cycles=False)
+        decided = survey.decided.copy()
         for number in np.flatnonzero(survey.attracts)[::-1]:
             distances = [motion.distance for motion in survey.motions if motion.stage == number]
             proved = self.surveyed_at_once(factors[number : number + 1], np.outer(distances, ALONG).ravel())
             if proved.attracts[0]:
                 return (float(factors[number]), proved.motions), True
-        return None, bool(survey.decided.all())
+            decided[number] = proved.decided[0]
+        return None, bool(decided.all())
 
     def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
         """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""
@@ -271,6 +279,11 @@ class Outward:
 
     def _ahead(self, at: float) -> float:
         return 1.0 if self.farthest >= at else -1.0
+
+    def _still_ahead(self, at: float, outside: float) -> float:
+        """A factor at which nothing attracts; where it was passed, one ahead instead."""
+        ahead = self._ahead(at)
+        return outside if ahead * (outside - at) > 0 else float(at * np.exp(ahead * SCALE))
 
     @np.errstate(all="ignore")
     def followed(self, at: float, orbit: Swinging) -> tuple[float, float, str, float]:
@@ -359,7 +372,7 @@ class Outward:
         """The last of some factors at which something attracts that simulations follow from motions at one, `at`, with
         what it is, and the next one, at which nothing does. They may lose it before it ceases to attract."""
         ahead = self._ahead(at)
-        farther = outside if ahead * (outside - at) > 0 else at * np.exp(ahead * SCALE)
+        farther = self._still_ahead(at, outside)
         factors = np.geomspace(at, farther, FINER + 2)[1:]
         survey = self.surveyed(factors, np.outer([motion.distance for motion in motions], ALONG).ravel())
         attract = np.flatnonzero(survey.attracts)
