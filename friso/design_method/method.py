@@ -161,7 +161,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent, laws: Friction
     progress(0, 1, "margins")
     control = choose_controller(fit.stage, fit.choice.beams, population)
     progress(0, 1, "hunting map")
-    edges_map = hunting_map(fit.stage, spec, population)
+    edges_map = hunting_map(fit.stage, spec, population, progress)
     by_beams = tuple(confirmed(fit.task, candidates))
     tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
     damped, faster = with_damping(fit)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from friso.design_method.prepare import by_rules, check_designable
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.equations.motion import size
@@ -17,6 +19,9 @@ TRAVELS = 0.1
 
 STATIC, COULOMB = "friction.static", "friction.coulomb"
 
+COMMENT = "   # "
+"""What stands between a line and what is said of it."""
+
 SPREAD = ("static", "coulomb", "stribeck_velocity", "bristle_stiffness", "viscous")
 
 
@@ -29,18 +34,17 @@ def outline(stage: Stage) -> str:
     limit = f"{by_rules(stage).flat()[CROSSOVER]:.4g}"
     friction = [_line(stage, f"friction.{name}", FRICTION) for name in SPREAD if flat.get(f"friction.{name}")]
     masses = [_line(stage, f"masses.{name}", MASS) for name in ("cart", "stage") if f"masses.{name}" in flat]
-    both = masses if len(masses) == 2 else [f"# {line}   # to be divided, unless both are given" for line in masses]
+    both = masses if len(masses) == 2 else [f"# {line}; to be divided, unless both are given" for line in masses]
     travel, acceleration = _move(stage)
     own = flat.get("joint.stroke")
     stroke = f"{own / 2:.4g} m .. {own:.4g} m" if own else "0.3 mm .. 1 mm"
-    return "\n".join(
+    name = f"name = {as_toml('Friction isolator of ' + (stage.name or 'the stage'))}\n\n"
+    return name + _aligned(
         [
-            f"name = {as_toml('Friction isolator of ' + (stage.name or 'the stage'))}",
+            "[machine]   # the highest crossover that it allows, by van Dijk's rules",
+            f'crossover_limit = "{limit} Hz"   # the present one; or parasitic_frequencies = ["480 Hz"]',
             "",
-            "[machine]                                  # the highest crossover that it allows, by van Dijk's rules",
-            f'crossover_limit = "{limit} Hz"               # the present one; or parasitic_frequencies = ["480 Hz"]',
-            "",
-            "[friction]                                 # ranges; a key left out stays as in the stage file",
+            "[friction]   # ranges; a key left out stays as in the stage file",
             *friction,
             "",
             "[masses]",
@@ -51,27 +55,34 @@ def outline(stage: Stage) -> str:
             f'acceleration = "{TRAVELS * acceleration:g} m/s^2 .. {acceleration:g} m/s^2"',
             "",
             "[position]",
-            'window = "1 um"                            # in position: stays this close to the reference',
-            '# settling_time = "1 s"                    # what 95 % of the moves may take',
+            'window = "1 um"   # in position: stays this close to the reference',
+            '# settling_time = "1 s"   # what 95 % of the moves may take',
             "",
-            "[load]                                     # at the leaf ends, beside the weight of the stage",
-            'force_x = "0 N"                            # along the leaves',
-            'force_y = "0 N"                            # along their width, as of a cable',
+            "[load]   # at the leaf ends, beside the weight of the stage",
+            'force_x = "0 N"   # along the leaves',
+            'force_y = "0 N"   # along their width, as of a cable',
             "",
-            "[leaves]                                   # what may be built",
+            "[leaves]   # what may be built",
             "leaves = 2",
             'length = "30 mm .. 70 mm"',
             'width = "15 mm .. 45 mm"',
             'spacing = "30 mm .. 60 mm"',
-            'thickness = "0.1 mm .. 0.5 mm"             # standard gauges in this range, or a list of available sheets',
+            'thickness = "0.1 mm .. 0.5 mm"   # standard gauges in this range, or a list of available sheets',
             'materials = ["stainless 1.4310"]',
-            f'stroke = "{stroke}"                  # the largest feasible one is chosen',
+            f'stroke = "{stroke}"   # the largest feasible one is chosen',
             "",
-            "[safety]                                   # factors; those left out are the defaults",
-            "hunting = 1.2                              # crossover over the edge of hunting",
+            "[safety]   # factors; those left out are the defaults",
+            "hunting = 1.2   # crossover over the edge of hunting",
             "",
         ]
     )
+
+
+def _aligned(lines: Sequence[str]) -> str:
+    """Lines with their comments below each other."""
+    parts = [line.partition(COMMENT) for line in lines]
+    widest = max(len(line) for line, _, comment in parts if comment)
+    return "\n".join(f"{line:{widest}}{COMMENT}{comment}" if comment else line for line, _, comment in parts)
 
 
 def _line(stage: Stage, key: str, share: float) -> str:

@@ -42,6 +42,9 @@ THERE_AND_BACK = {
 RTOL = 1e-5
 """Relative tolerance of these runs."""
 
+CHUNK = 512
+"""Runs between two reports of progress."""
+
 
 @dataclass(frozen=True)
 class MachineOutcomes:
@@ -141,7 +144,9 @@ def move_machines(
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
-        longer = _followed_moves(keys, again.size, window, LONGER * FOLLOWED, silent, label)
+        longer = _followed_moves(
+            keys, again.size, window, LONGER * FOLLOWED, progress, f"{label}, those not at rest for longer"
+        )
         better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
         for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
@@ -155,7 +160,12 @@ def _followed_moves(
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
     options = RunOptions(
-        rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=np.inf, least_swing=window / 4
+        rtol=RTOL,
+        bands=(window, 10 * window),
+        window=1 - LAST,
+        record_from=np.inf,
+        least_swing=window / 4,
+        chunk=CHUNK,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
