@@ -23,6 +23,7 @@ from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.attractors.rounds import Pending, lengthened
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.basin import ends_in, swings_seldom
+from friso.hunting.boundary import KeyRange, Space, diagram
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
@@ -33,6 +34,8 @@ from friso.hunting.motions import Motions, run_motions
 from friso.hunting.outward import Beyond, Outward
 from friso.hunting.verdict import STILL_SWINGS, WORK, judge_many, judge_runs, own_motion
 from friso.stage import Stage
+from friso.studies.boundary_lines import REPELS, UNKNOWN, place_verdicts
+from friso.studies.sweep import sweep
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
     {
@@ -595,7 +598,7 @@ def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_a
     survey = attractors(Ensemble.held(flat, 1))
     larger = replace(survey, motions=tuple(replace(m, amplitude=10 * m.amplitude) for m in survey.motions))
     still_moving = Motions(np.ones(1, bool), np.zeros(1), np.full(1, np.nan), np.full(1, np.nan))
-    assert judge_runs(flat, still_moving, larger, 1e-6).tolist() == ["hunts"]
+    assert judge_runs(flat, still_moving, larger, larger.decided, 1e-6).tolist() == ["hunts"]
 
 
 def test_runs_that_have_not_swung_are_not_followed_for_thousands_of_swings_next() -> None:
@@ -645,9 +648,9 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
     survey = attractors(Ensemble.held(flat, 1))
     assert not survey.attracts[0]
     moving = Motions(np.ones(1, bool), np.zeros(1), np.full(1, 1e-4), np.full(1, np.nan))
-    assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["transient"]
+    assert judge_runs(flat, moving, survey, survey.decided, 1e-6).tolist() == ["transient"]
     with allowance(1):
-        assert judge_runs(flat, moving, survey, 1e-6).tolist() == ["failed"]
+        assert judge_runs(flat, moving, survey, survey.decided, 1e-6).tolist() == ["failed"]
 
 
 @pytest.mark.usefixtures("own_bandwidth")
@@ -666,7 +669,7 @@ def test_a_motion_that_swings_on_within_the_band_of_10_um_is_not_at_rest_for_sur
     larger = tuple(replace(motion, amplitude=10 * motion.amplitude) for motion in survey.motions)
     moved = run_motions(flat, 1, measuring_options(1e-6))
     for motions in ((), larger):
-        assert judge_runs(flat, moved, replace(survey, motions=motions), 1e-6).tolist() == ["failed"]
+        assert judge_runs(flat, moved, replace(survey, motions=motions), survey.decided, 1e-6).tolist() == ["failed"]
 
 
 def asymmetric_stage() -> Stage:
@@ -763,6 +766,11 @@ def test_many_stages_are_judged_no_more_surely_than_one() -> None:
     assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["failed"]
     clamped = stage.replace({"controller.anti_windup": "clamp"})
     assert judge_many(clamped.flat(), 1, 1e-6).tolist() == ["settles"]
+    for either, word in ((stage, "unknown"), (clamped, "nothing")):
+        runs = sweep(either, {"controller.crossover": ["20 Hz"]}, metrics=["attractor"])
+        traced = diagram(Space.of(either, [KeyRange("controller.crossover", 20.0, 21.0)]), seeds=2)
+        assert runs.attractor.values.tolist() == [word]
+        assert place_verdicts(traced) == [REPELS if word == "nothing" else UNKNOWN] * 2
 
 
 def test_a_large_swing_that_dies_out_slowly_does_not_attract() -> None:

@@ -205,6 +205,14 @@ def test_corners_hunt_as_long_as_anything_attracts() -> None:
     assert edges.unknown == 0
 
 
+def test_corners_in_which_large_motions_may_run_away_are_not_certain() -> None:
+    limit = {"joint": None, "parasitic": None, "controller.force_limit": "5 kN", "controller.anti_windup": "none"}
+    limited = friso.load(EXAMPLES / "thesis_rig.toml").replace(limit)
+    one = Population({"friction.static": np.array([3.0])}, 1)
+    edges = edges_over(limited.flat(), one, 20.0, 40.0, 2)
+    assert (edges.hunts, edges.unknown) == (False, 1)
+
+
 def test_corners_without_hunting_and_with_no_end() -> None:
     part = Population({}, 3)
     none = Corners(part, np.zeros(3), (1.0, 40.0))

@@ -25,6 +25,7 @@ from friso.hunting.cycle.shooting import close
 from friso.hunting.margin import margin
 from friso.hunting.verdict import judge_many
 from friso.stage import Stage
+from friso.studies.sweep import sweep
 
 RIGID = pytest.mark.xdist_group("rigid")
 LOCKED_RIG = pytest.mark.xdist_group("locked")
@@ -481,6 +482,8 @@ def test_without_friction_only_a_stable_loop_surely_settles(integral: float, sta
     result = hunting(stage)
     assert (result.certain, "no friction to stick to" in result.reason) == (stable, stable)
     assert (judge_many(stage.flat(), 1, 1e-6)[0] == "failed") == (not stable)
+    runs = sweep(stage, {"controller.ki": [f"{integral} N/(m*s)"]}, metrics=["attractor"])
+    assert runs.attractor.values.tolist() == ["nothing" if stable else "unknown"]
 
 
 def test_without_friction_a_loop_that_the_limiter_makes_unstable_does_not_surely_settle() -> None:

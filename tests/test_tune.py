@@ -155,13 +155,14 @@ def test_margins_of_a_machine_are_those_of_its_loop(rigid: Stage, machines: Flee
 
 
 def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines: Fleet, goal: Goal) -> None:
-    """The edge is at 9.75 Hz: at 11 Hz nothing attracts, at 11 Hz over 1.2 something does."""
+    """The edge is at 9.75 Hz: at 11 Hz nothing attracts, at 11 Hz over 1.2 something does. With a force limit and no
+    anti-windup farther motions may grow: nothing found to attract is not certain."""
     near, far = (rigid.replace({"controller.crossover": f"{hertz} Hz"}) for hertz in (11, 14))
     one = machines.take(np.array([0]))
-    results = [
-        attraction(Remedy.settled_on("", stage), np.zeros((1, 0)), one, goal).attracts[0, 0] for stage in (near, far)
-    ]
-    assert results == [True, False]
+    limited = far.replace({"controller.force_limit": "5 kN", "controller.anti_windup": "none"})
+    results = [attraction(Remedy.settled_on("", stage), np.zeros((1, 0)), one, goal) for stage in (near, far, limited)]
+    assert [result.clear[0, 0] for result in results] == [False, True, True]
+    assert [result.surely_clear[0, 0] for result in results] == [False, True, False]
 
 
 def test_a_quantile_is_a_machine_s() -> None:
@@ -754,7 +755,7 @@ def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: range
     ok = {name: np.array([k not in failing.get(name, ()) for k in range(machines)])[None] for name in PARTS}
     moves = Moves(np.where(ok["settling"], 0.1, np.inf), np.full((1, machines), 0.1), np.where(ok["force"], 1.0, 99.0))
     margin = np.where(ok["margin"], 0.6, 0.1)
-    survey = Attraction(~ok["hunting"], np.ones((1, machines), bool))
+    survey = Attraction(~ok["hunting"], np.ones((1, machines), bool), np.ones((1, machines), bool))
     return SimpleNamespace(judgement=judgement, unstable=()), Performance(moves, margin, survey, 0.6, 1e6)
 
 

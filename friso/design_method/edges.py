@@ -16,6 +16,7 @@ from friso.design_method.population import Population
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.progress import Progress, silent
 
 ROUNDS = 3
@@ -29,7 +30,8 @@ RTOL = 1e-7
 class Corners:
     """The corners of a specification with the highest crossover [Hz] at which anything attracts in each, shape (n,): 0
     where nothing does from `searched[0]` on, infinite where something does at `searched[1]`. In `unknown` of them the
-    simulations below the edge failed or had not settled when they were stopped: that counts as hunting."""
+    simulations below the edge failed or had not settled when they were stopped, which counts as hunting, or something
+    may attract above it that no simulation starts from."""
 
     population: Population
     edges: np.ndarray
@@ -66,12 +68,12 @@ def edges_over(
     `label` names the search to the progress."""
     ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
     grid, count = np.log(np.geomspace(low, high, steps)), population.count
-    inside, outside, undecided = np.full(count, -np.inf), np.full(count, np.inf), np.zeros(count, bool)
+    inside, outside, unsure = np.full(count, -np.inf), np.full(count, np.inf), np.zeros((2, count), bool)
 
     def survey(which: np.ndarray, crossover: np.ndarray) -> None:
-        attract, decided = _attract(ensemble, which, crossover)
-        outside[which[~attract]] = crossover[~attract]
-        inside[which[attract]], undecided[which[attract]] = crossover[attract], ~decided[attract]
+        attract, certain = _attract(ensemble, which, crossover)
+        outside[which[~attract]], inside[which[attract]] = crossover[~attract], crossover[attract]
+        unsure[attract.astype(int), which] = ~certain
 
     for k, point in enumerate(grid[::-1]):
         progress(k, steps + ROUNDS, label)
@@ -82,7 +84,7 @@ def edges_over(
         progress(steps + k, steps + ROUNDS, label)
         survey(between, (inside[between] + outside[between]) / 2)
     edges = np.where(np.isneginf(inside), 0.0, np.exp((inside + outside) / 2))
-    return Corners(population, edges, (low, high), int(undecided.sum()))
+    return Corners(population, edges, (low, high), int(unsure.any(axis=0).sum()))
 
 
 def worst_edges(by_law: Mapping[str, Corners]) -> Corners:
@@ -109,10 +111,10 @@ def under_law(flat: Mapping[str, Any], friction: Mapping[str, Any]) -> dict[str,
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attract(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
-    whether they decided that."""
-    chosen = ensemble.take(which)
-    survey = attractors(Ensemble.held({**chosen.flat, CROSSOVER: np.exp(crossover)}, len(which)), rtol=RTOL)
-    return survey.attracts | ~survey.decided, survey.decided
+    whether that is certain."""
+    stages = Ensemble.held({**ensemble.take(which).flat, CROSSOVER: np.exp(crossover)}, len(which))
+    survey = attractors(stages, rtol=RTOL)
+    return survey.attracts | ~survey.decided, surely_surveyed(stages, survey)
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:

@@ -33,12 +33,12 @@ from friso.hunting.cycle.hunting import (
     Cycle,
     Hunting,
     Swing,
-    beyond_the_survey,
     cannot_hunt,
     hunting,
+    surely_surveyed,
     why_not,
 )
-from friso.hunting.loop import far_beyond_a_limit, may_run_away, surely_calm
+from friso.hunting.loop import far_beyond_a_limit, may_run_away
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import FollowedMotions, Motions, followed_motions, resting, run_motions, some_of
@@ -348,8 +348,10 @@ def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     As by `judge`, but from fewer starts, which may miss what attracts from a narrow range of them; simulations that
     fail leave the verdict "failed".
     """
-    survey = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
-    return judge_runs(flat, run_motions(flat, count, measuring_options(rtol)), survey, rtol)
+    stages = Ensemble.held(flat, count, form=shared_structure(flat))
+    survey = attractors(stages) if can_hunt(flat) else None
+    motions = run_motions(flat, count, measuring_options(rtol))
+    return judge_runs(flat, motions, survey, surely_surveyed(stages, survey), rtol)
 
 
 @np.errstate(all="ignore")
@@ -357,20 +359,17 @@ def judge_runs(
     flat: Mapping[str, Any],
     motions: Motions,
     survey: Attractors | None,
+    certain: np.ndarray,
     rtol: float,
     threads: int | None = None,
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
-    """The same where the stages' own motions were run, and what attracts is known already (None: they cannot hunt);
-    `threads` and `cancel` as in `RunOptions`."""
+    """The same where the stages' own motions were run, and what attracts is known already (None: they cannot hunt), and
+    of which that is `certain`, shape (count,); `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
-    decided, attracts = motions.completed.copy(), np.zeros(count, bool)
     stages = Ensemble.held(flat, count, form=shared_structure(flat))
-    if survey is None and why_not(stages.structure):
-        decided &= surely_calm(stages)
-    if survey is not None:
-        decided &= survey.decided & (beyond_the_survey(stages, survey) == "")
-        attracts = survey.attracts.copy()
+    decided = motions.completed & certain
+    attracts = np.zeros(count, bool) if survey is None else survey.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
     run_options = measuring_options(rtol, threads, cancel)
     attracted = np.flatnonzero(decided & attracts)

@@ -14,6 +14,7 @@ from friso.errors import InputError
 from friso.frequency.crossover import settled_margin
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
 from friso.remedies.variables import DAMPING_RATIOS, joint_variables
@@ -60,8 +61,9 @@ def suggestion(stage: Stage) -> Suggestion | None:
     attracts = np.zeros(len(tried), bool)
     for factor in (1.0, 1 / Goal.distance):
         slower = faster(flat, factor)
-        survey = attractors(Ensemble.held(slower, len(tried), form=shared_structure(slower)), cycles=False)
-        attracts |= survey.attracts | ~survey.decided
+        stages = Ensemble.held(slower, len(tried), form=shared_structure(slower))
+        survey = attractors(stages, cycles=False)
+        attracts |= survey.attracts | ~surely_surveyed(stages, survey)
     for number in np.flatnonzero(~attracts):
         settled = remedy.tuned(shares[number])
         margin = settled_margin(settled.flat())

@@ -16,6 +16,7 @@ from friso.equations.motion import last_corner, way_there
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.verdict import can_hunt
 from friso.remedies.catalogue import Remedy
 from friso.remedies.goal import Goal
@@ -107,16 +108,23 @@ def modulus_margins(
 
 @dataclass(frozen=True)
 class Attraction:
-    """Whether anything hunting attracts machines at their bandwidth or down to the distance below it (`attracts`), and
-    whether simulations decided that, both of shape (points, machines)."""
+    """Whether anything hunting attracts machines at their bandwidth or down to the distance below it (`attracts`),
+    whether simulations decided that, and whether it is `certain`, as nothing may lie beyond these, all of shape
+    (points, machines)."""
 
     attracts: np.ndarray
     decided: np.ndarray
+    certain: np.ndarray
 
     @property
     def clear(self) -> np.ndarray:
-        """Which machines surely have nothing that attracts."""
+        """Which machines have nothing that attracts, as far as simulations reach."""
         return ~self.attracts & self.decided
+
+    @property
+    def surely_clear(self) -> np.ndarray:
+        """Which machines surely have nothing that attracts."""
+        return ~self.attracts & self.certain
 
 
 @np.errstate(all="ignore")
@@ -125,14 +133,13 @@ def attraction(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: Goal) 
     simulations from many starts; closed orbits have to confirm it for the answer."""
     flat = machines.laid_over(remedy.stage, remedy.changes(shares), len(shares))
     shape = len(shares), machines.count
-    if not can_hunt(flat):
-        return Attraction(np.zeros(shape, bool), np.ones(shape, bool))
-    attracts, decided = np.zeros(shape, bool), np.ones(shape, bool)
+    attracts, decided, certain = np.zeros(shape, bool), np.ones(shape, bool), np.ones(shape, bool)
     for factor in (1.0, goal.distance**-0.5, 1 / goal.distance):
         slower = faster(flat, factor)
-        survey = attractors(
-            Ensemble.held(slower, len(shares) * machines.count, form=shared_structure(slower)), cycles=False
-        )
-        attracts |= survey.attracts.reshape(shape)
-        decided &= survey.decided.reshape(shape)
-    return Attraction(attracts, decided)
+        stages = Ensemble.held(slower, len(shares) * machines.count, form=shared_structure(slower))
+        survey = attractors(stages, cycles=False) if can_hunt(flat) else None
+        if survey is not None:
+            attracts |= survey.attracts.reshape(shape)
+            decided &= survey.decided.reshape(shape)
+        certain &= surely_surveyed(stages, survey).reshape(shape)
+    return Attraction(attracts, decided, certain)

@@ -72,7 +72,7 @@ class Performance:
         late = np.inf if goal.settle is None else goal.settle
         most = np.inf if goal.force_limit is None else goal.force_limit
         return {
-            "hunting": self.attraction.clear[0],
+            "hunting": self.attraction.surely_clear[0],
             "settling": np.isfinite(self.moves.settling[0]) & (self.moves.settling[0] <= late),
             "margin": self.margin[0] >= goal.margin,
             "force": self.moves.force[0] <= most,

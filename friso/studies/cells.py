@@ -15,6 +15,7 @@ from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.measures import BANDS, Measures, measure_runs, measuring_options
 from friso.hunting.motions import Motions
 from friso.hunting.verdict import can_hunt, judge_runs
@@ -46,7 +47,8 @@ UNITS = RUN_UNITS | CYCLE_UNITS
 
 CYCLE, SWING, NOTHING, UNKNOWN = "cycle", "swing", "nothing", "unknown"
 """What attracts a stage: a cycle that was closed as an orbit; a swing that simulations do not leave, of which no orbit
-could be closed; nothing; or it is not certain, because simulations failed or had not settled when they were stopped."""
+could be closed; nothing; or it is not certain, because simulations failed or had not settled when they were stopped, or
+because something may attract beyond them."""
 
 WORDS = {"outcome": "<U9", "verdict": "<U9", "attractor": "<U9", "status": "<U160"}
 """The measures that are words, and how they are stored; a status longer than that is cut."""
@@ -113,10 +115,10 @@ def run_cells(
         for runs in run_chunks(kernel(shape), flat, len(cells), measuring_options(rtol, threads, cancel)):
             table.write(cells[runs.numbers], measure_runs(runs.part(flat), runs), runs)
     if any(name in metrics for name in BY_ATTRACTORS):
-        for flat, cells, survey in cell_attractors(parts, table.ran, threads, cancel):
-            table.write_attractors(cells, survey)
+        for flat, cells, survey, certain in cell_attractors(parts, table.ran, threads, cancel):
+            table.write_attractors(cells, survey, certain)
             if "verdict" in metrics:
-                words = judge_runs(flat, table.motions(cells), survey, rtol, threads, cancel)
+                words = judge_runs(flat, table.motions(cells), survey, certain, rtol, threads, cancel)
                 table.columns["verdict"][cells] = words
     return table.columns
 
@@ -127,26 +129,29 @@ Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
 
 def cell_attractors(
     parts: Parts, chosen: np.ndarray, threads: int | None = None, cancel: np.ndarray | None = None
-) -> Iterator[tuple[dict[str, Any], np.ndarray, Attractors | None]]:
+) -> Iterator[tuple[dict[str, Any], np.ndarray, Attractors | None, np.ndarray]]:
     """What attracts the stages of the cells that are chosen, shape (cells,), by the equations they need: their flat SI
-    form, their numbers, and the survey; None where they cannot hunt.
+    form, their numbers, the survey (None where they cannot hunt), and whether what attracts each is certain.
 
     The motion plays no part: of cells that differ in it alone one is surveyed.
     """
     for flat, cells, shape in by_equations(parts, chosen):
-        yield flat, cells, _once(flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
+        yield flat, cells, *_once(flat, len(cells), shape, threads, cancel)
 
 
 def _once(
     flat: Mapping[str, Any], count: int, shape: Structure, threads: int | None, cancel: np.ndarray | None
-) -> Attractors:
-    """What attracts stages of one structure, looked for once for all that differ in their motion alone."""
+) -> tuple[Attractors | None, np.ndarray]:
+    """What attracts stages of one structure, and of which that is certain, looked for once for all that differ in
+    their motion alone."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
     of_structure = {key: value[first] if np.ndim(value) else value for key, value in flat.items()}
     stages = Ensemble.held(of_structure, len(first), form=shape, threads=threads, cancel=cancel)
-    return attractors(stages).take(again.ravel())
+    survey = attractors(stages) if can_hunt(flat) else None
+    certain = surely_surveyed(stages, survey)[again.ravel()]
+    return survey and survey.take(again.ravel()), certain
 
 
 def allowed_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -260,19 +265,20 @@ class _Table:
         for name, column in written.items():
             self.columns[name][which[ran]] = column[ran]
 
-    def write_attractors(self, cells: np.ndarray, survey: Attractors | None) -> None:
-        """Write those measures of what attracts the cells' stages that the table has: of the largest swing of each."""
-        count = len(cells)
-        word = np.full(count, NOTHING, dtype=object)
-        measures = {name: np.full(count, np.nan) for name in CYCLE_UNITS}
-        if survey is not None:
-            word[~survey.decided] = UNKNOWN
-            for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest last
-                k, orbit = motion.stage, motion.cycles
-                word[k] = SWING if orbit is None else CYCLE
-                multiplier = np.nan if orbit is None else orbit.multiplier[motion.number]
-                for name, value in zip(CYCLE_UNITS, (multiplier, motion.amplitude, motion.period), strict=True):
-                    measures[name][k] = value
+    def write_attractors(self, cells: np.ndarray, survey: Attractors | None, certain: np.ndarray) -> None:
+        """Write those measures of what attracts the cells' stages that the table has: of the largest swing of each, as
+        far as that is certain."""
+        word = np.where(certain, NOTHING, UNKNOWN).astype(object)
+        measures = {name: np.full(len(cells), np.nan) for name in CYCLE_UNITS}
+        motions = () if survey is None else survey.motions
+        for motion in sorted(motions, key=lambda motion: motion.amplitude):  # the largest last
+            k, orbit = motion.stage, motion.cycles
+            if not certain[k]:
+                continue
+            word[k] = SWING if orbit is None else CYCLE
+            multiplier = np.nan if orbit is None else orbit.multiplier[motion.number]
+            for name, value in zip(CYCLE_UNITS, (multiplier, motion.amplitude, motion.period), strict=True):
+                measures[name][k] = value
         for name, column in {"attractor": word, **measures}.items():
             if name in self.columns:
                 self.columns[name][cells] = column

@@ -13,6 +13,7 @@ from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
@@ -99,7 +100,8 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS, progress: Prog
             skipped += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     once = each_once(special, hundredth)
     attracting = sought[0].attracting & ~_in_doubt(once, places)
-    attracts, decided = surveyed.attracts | attracting, surveyed.decided | attracting
+    decided = surely_surveyed(stages, surveyed) | attracting
+    attracts = surveyed.attracts & decided | attracting
     unstable = np.any([*unstable_among(stages).values()], axis=0)
     return Diagram(space, tuple(branches), once, places, sought[0], attracts, decided, unstable)
 

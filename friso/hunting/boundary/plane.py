@@ -17,6 +17,7 @@ from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, families
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable_among
 from friso.progress import Progress, Tally, silent
 
@@ -70,8 +71,10 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES, progress: Progre
     attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     undecided = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
     if undecided.size:
-        surveyed = attractors(stages.take(undecided), rtol=rtol)
-        attracts[undecided], decided[undecided] = surveyed.attracts, surveyed.decided
+        others = stages.take(undecided)
+        surveyed = attractors(others, rtol=rtol)
+        decided[undecided] = surely_surveyed(others, surveyed)
+        attracts[undecided] = surveyed.attracts & decided[undecided]
     sides = (_on_grid(allowed[decided & which], nodes) for which in (attracts, ~attracts))
     for a, b in _changes(*sides):  # of what attracts, whatever it is
         middle = (points[a] + points[b]) / 2

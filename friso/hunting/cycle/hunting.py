@@ -246,6 +246,14 @@ def hunting(stage: Stage, rtol: float = RTOL, work: float = np.inf) -> Hunting:
     )
 
 
+def surely_surveyed(stages: Ensemble, survey: Attractors | None) -> np.ndarray:
+    """Of which stages it is certain what attracts them, shape (count,): a survey decided that, and nothing may lie
+    beyond it; of those that were not surveyed because they cannot hunt (None), which keep up no other swing."""
+    if survey is None:
+        return surely_calm(stages) if why_not(stages.structure) else np.ones(stages.count, bool)
+    return np.asarray(survey.decided & (beyond_the_survey(stages, survey) == ""))
+
+
 def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
     """Why it is not certain what attracts stages, whatever a survey of them decided: words of shape (count,), "" where
     there is no such reason."""

@@ -117,10 +117,8 @@ def _survey(coarse: xr.Dataset) -> dict[str, np.ndarray]:
     valid = (coarse["outcome"].values != "invalid").ravel()
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
-    for _, cells, attractors in cell_attractors(parts, valid):
-        attracts[cells], decided[cells] = (
-            (False, True) if attractors is None else (attractors.attracts, attractors.decided)
-        )
+    for _, cells, survey, certain in cell_attractors(parts, valid):
+        attracts[cells], decided[cells] = survey is not None and survey.attracts, certain
     return {"attracts": attracts, "decided": decided & valid}
 
 

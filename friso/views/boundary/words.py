@@ -33,7 +33,8 @@ from friso.views.drawing.prefixes import listed, plus_minus, pretty, with_unit
 VERDICTS = {
     ATTRACTS: "hunting is possible",
     REPELS: "no hunting was found",
-    UNKNOWN: "unknown (some simulations failed, or had not settled when they were stopped)",
+    UNKNOWN: "unknown (some simulations failed or had not settled when they were stopped, or something may attract "
+    "beyond them)",
     INVALID: "not a valid stage",
 }
 CYCLES: dict[CycleShape, str] = {

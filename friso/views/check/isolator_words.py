@@ -22,7 +22,7 @@ def isolator_sentence(suggestion: Suggestion) -> str:
         f"{with_unit(flat['joint.stroke'], 'm')} and damping {with_unit(flat['joint.damping'], 'N*s/m')}"
     )
     if not suggestion.settles:
-        return f"It would not settle on {joint}, or on any shorter stroke tried."
+        return f"It would not surely settle on {joint}, or on any shorter stroke tried."
     low = "" if suggestion.margin >= LITTLE else ": too little, so that the controller has to be tuned as well"
     masses = [with_unit(flat[f"masses.{part}"], "kg") for part in ("cart", "stage")]
     return (

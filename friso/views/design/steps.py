@@ -105,7 +105,8 @@ def _worst(corners: Corners, design: Design) -> list[str]:
     if corners.unknown:
         sentences.append(
             f"In {corners.unknown} of {corners.population.count} corners the edge is not certain: simulations below it "
-            "failed or had not settled when they were stopped, which counts as hunting."
+            "failed or had not settled when they were stopped, which counts as hunting, or something may attract above "
+            "it that no simulation starts from."
         )
     return sentences
 
