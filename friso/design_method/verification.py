@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.design_method.population import Population, random_machines
 from friso.design_method.spec import Spec
-from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.batch import CAPACITY, RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
@@ -165,6 +165,7 @@ def _followed_moves(
         window=1 - LAST,
         record_from=np.inf,
         least_swing=window / 4,
+        room=round(CAPACITY * time / FOLLOWED),
         chunk=CHUNK,
     )
     outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
