@@ -196,6 +196,28 @@ def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browse
     page.wait_for_selector("#answer .case:not(.stale)")
 
 
+def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
+    """Those below what is in sight are drawn after the others, when the machine may have changed."""
+    page = browsed.page
+    old = page.evaluate(
+        """async () => {
+            const { draw, stale } = await import('/plot.js');
+            const layout = { height: 2000 };
+            const figure = (name) => ({ name, title: name, caption: '', data: [], bars: [], layout, narrow: layout });
+            const place = document.createElement('div');
+            document.body.append(place);
+            draw(place, ['one', 'two'].map(figure));
+            stale(place);
+            const due = () => [...place.querySelectorAll('.plot')].some((plot) => plot.due);
+            while (due()) await new Promise((then) => setTimeout(then, 10));
+            const boxes = [...place.querySelectorAll('.figure')];
+            place.remove();
+            return boxes.map((box) => box.classList.contains('stale'));
+        }"""
+    )
+    assert old == [True, True]
+
+
 def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) -> None:
     """Progress does not take its place; the whole answer says itself what is true of the machine."""
     page = browsed.page

@@ -13,6 +13,7 @@ import sys
 import zlib
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from threading import Event
 from urllib.parse import unquote
 from xml.etree import ElementTree
 
@@ -241,6 +242,30 @@ def test_a_figure_that_no_process_draws_is_drawn_here(monkeypatch):
     with images.drawing_beside():
         images.draw_beforehand([figure := small_figure()], [images.Image("png")])
         assert images.image(figure, "png").startswith(b"\x89PNG")
+
+
+def test_what_is_drawn_at_the_end_is_given_up(monkeypatch):
+    """Not handed to a new process, for which an interrupted command waited seconds."""
+    asked, killed = Event(), Event()
+
+    class Drawing:
+        def ask(self, _):
+            asked.set()
+            killed.wait()
+            raise EOFError
+
+        def kill(self):
+            killed.set()
+
+        def end(self):
+            return ""
+
+    monkeypatch.setattr(images, "_artist", Drawing)
+    artists = images.Artists()
+    artists.begin([small_figure()], (images.Image("png"),))
+    asked.wait()
+    artists.end()
+    assert len(artists.processes) == 1
 
 
 def test_unknown_format_is_refused(tmp_path):

@@ -33,11 +33,11 @@ export function draw(place, figures, tell = {}) {
       box.children[1].textContent = plain(figure.caption);
     }
     place.append(box);
+    box.classList.remove("stale"); // not once it is drawn: the machine may have changed by then
     const plotted = box.querySelector(".plot");
     plotted.style.height = `${figure.layout.height}px`;
     plotted.due = () => {
       delete plotted.due;
-      box.classList.remove("stale");
       plot(plotted, figure, tell);
     };
   }

@@ -85,6 +85,7 @@ class Artists:
         self._free = [*self.processes]
         self._threads = ThreadPoolExecutor(MOST, thread_name_prefix="friso-artist")
         self._begun: dict[tuple[int, Image], tuple[Figure, _Job]] = {}
+        self._ended = False
 
     def begin(self, figures: Iterable[Figure], images: tuple[Image, ...]) -> None:
         """Begin to draw images of figures, but for those that were begun."""
@@ -100,7 +101,8 @@ class Artists:
         return begun[1].result().get(wanted) if begun else None
 
     def end(self) -> None:
-        """End everything."""
+        """End everything: what is being drawn is not begun again by another process."""
+        self._ended = True
         self._threads.shutdown(wait=False, cancel_futures=True)
         for artist in self.processes:
             artist.kill()
@@ -121,8 +123,9 @@ class Artists:
         with suppress(IndexError):
             while True:
                 yield self._free.pop()
-        self.processes.append(_artist())
-        yield self.processes[-1]
+        if not self._ended:
+            self.processes.append(_artist())
+            yield self.processes[-1]
 
 
 def _artist() -> HelperProcess:
