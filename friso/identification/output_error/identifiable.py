@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from friso.identification.output_error.coverage import NEAR, Coverage
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
-from friso.identification.output_error.holding import with_force_settled
+from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
 from friso.identification.output_error.parameters import EXPONENT, MASS, RATIO, SHARE, bends
 from friso.identification.output_error.problem import Problem
 from friso.identification.output_error.profile import WORSE, Profile, profile
@@ -109,9 +109,10 @@ def _identifiable_on_log(
     if not hopeful:
         return IdentifiableFit(plain, {}, frozenset())
     numbers = _numbers(names, core | hopeful)
-    full = with_force_settled(fit(follows, numbers, everywhere(follows, numbers, plain.inner)), noise)
+    full = fit(follows, numbers, everywhere(follows, numbers, plain.inner))
+    full = with_force_settled(with_smoothness_settled(full), noise)
     answer = believed(full, core, covered, progress)
-    if full.problem.inputs.held != plain.problem.inputs.held:
+    if full.problem.inputs is not plain.problem.inputs:
         plain = polished(full.problem, plain.free, plain.inner)
     if _pays(full, plain) or answer.shown == hopeful:
         return answer

@@ -44,6 +44,10 @@ FIRST = 10
 REST, STILL = 0.1, 20.0
 """A stage rests where it goes less than so many standard deviations of the position's noise in this time [s]."""
 
+SHARPER = (1, 2, 4, 8)
+"""Times the cut-off frequency of the inverse model's filter at which the position is smoothed that a stage is held to:
+at first, and as long as it explains more."""
+
 SETTLED = 3.0
 """Time constants of the controller that holds a stage to a log, after which it has forgotten where that stood."""
 
@@ -72,7 +76,8 @@ class Problem:
     the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
     own whose target is zero: what it has to add is what the model does not explain. `start` holds position
     [m] and velocity [m/s] at the beginning; `counted`, shape (n,), is 0 at the samples that the fit leaves out.
-    `unsettled` are inputs that the log allows as well as those taken.
+    `unsettled` are inputs that the log allows as well as those taken, and `sharper` positions [m], smoothed less and
+    less, that the stage may be held to instead.
     """
 
     flat: Mapping[str, Any]
@@ -84,6 +89,7 @@ class Problem:
     start: tuple[float, float]
     counted: np.ndarray
     unsettled: tuple[Inputs, ...] = ()
+    sharper: tuple[np.ndarray, ...] = ()
 
     @property
     def kernel(self) -> Kernel:
@@ -98,6 +104,15 @@ class Problem:
         omega = 2 * self.flat[KP] / self.flat[KD]
         return float(min(1.0, np.sqrt(2 * PASSES * omega * self.inputs.sample_time)))
 
+    def held_to(self, level: int) -> Problem:
+        """The same with the stage held to one of the `sharper` positions, by number; the next of them is not
+        settled."""
+        inputs = replace(self.inputs, reference=self.sharper[level])
+        held = tuple(replace(inputs, held=one.held) for one in self.unsettled if one.held != self.inputs.held)
+        sharper = self.sharper[level + 1 :]
+        further = tuple(replace(inputs, reference=reference) for reference in sharper[:1])
+        return replace(self, inputs=inputs, unsettled=(*held, *further), sharper=sharper)
+
     def part(self, samples: slice) -> Problem:
         """The same with a stretch of the samples alone; one that does not begin with the first begins on the reference,
         as a stage does that follows a log."""
@@ -107,7 +122,7 @@ class Problem:
         if samples.start:
             start = float(reference[0]), float((reference[1] - reference[0]) / self.inputs.sample_time)
         target, counted = self.target[samples], self.counted[samples]
-        return replace(self, inputs=inputs, target=target, counted=counted, start=start, unsettled=())
+        return replace(self, inputs=inputs, target=target, counted=counted, start=start, unsettled=(), sharper=())
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
@@ -248,8 +263,8 @@ def tracking(
     neither whether its force is held from sample to sample or follows straight lines, nor how smooth its motion was.
     Raises InputError for a log that never moves for long enough to count."""
     omega = 2 * np.pi * min(bandwidth, SLOW)
-    smooth, sharper = (
-        motion(log["position"][part], log.sample_time, cutoff * bandwidth).position for cutoff in (SMOOTH, 2 * SMOOTH)
+    smooth, *sharper = (
+        motion(log["position"][part], log.sample_time, SMOOTH * times * bandwidth).position for times in SHARPER
     )
     held = abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME  # from each sample to the next
     inputs = Inputs(smooth, log["force"][part], log.sample_time, held)
@@ -270,7 +285,8 @@ def tracking(
         False,
         _start(log, part),
         counted * log.measured(part),
-        (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper)),
+        (replace(inputs, held=not inputs.held), replace(inputs, reference=sharper[0])),
+        tuple(sharper),
     )
 
 

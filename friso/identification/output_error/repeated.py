@@ -80,4 +80,6 @@ def _simulated_logs(
         force = problem.inputs.force + record.force
         signals["force"][part] = force + noise * rng.standard_normal(len(measured))
         like = tracking(problem.flat, replace(log, signals=signals), part, problem.parameters, bandwidth)
+        level = len(like.sharper) - len(problem.sharper)
+        like = like.held_to(level - 1) if level else like
         yield replace(like, inputs=replace(like.inputs, held=problem.inputs.held))
