@@ -357,8 +357,8 @@ def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
         count = len(decided)
         return Attractors(motions, np.array(decided), np.ones(count), (), np.zeros(count, bool), np.ones(count, bool))
 
-    found = surveyed([True, True], Swinging(1, 1e-3, 0.1, 0.1, 1e-3, 2))
-    monkeypatch.setattr(Outward, "surveyed", lambda *_, **__: found)
+    survey_beyond = surveyed([True, True], Swinging(1, 1e-3, 0.1, 0.1, 1e-3, 2))
+    monkeypatch.setattr(Outward, "surveyed", lambda *_, **__: survey_beyond)
     monkeypatch.setattr(Outward, "surveyed_at_once", lambda *_: surveyed([proved]))
     assert Outward(WINDOWED.flat(), 10.0).window_beyond(1.0) == (None, proved)
 

@@ -328,14 +328,14 @@ def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatc
 
     monkeypatch.setattr(module, "MACHINES", 200)
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
-    told: list[tuple[int, int]] = []
+    reported: list[tuple[int, int]] = []
     outcomes = verification(
         stage.replace({"controller.crossover": "9 Hz"}),
         SPEC,
         0.3,
-        lambda done, total, label: told.append((done, total)),
+        lambda done, total, label: reported.append((done, total)),
     )
-    ends = [total for done, total in told if done == total]
+    ends = [total for done, total in reported if done == total]
     assert ends[0] == 200
     assert outcomes.locked.missed <= ends[-1] < 200  # the long runs of those that are not at rest report, too
     assert outcomes.free.tried == outcomes.locked.tried == 200

@@ -13,7 +13,6 @@ from friso.design_method.method import Design
 from friso.design_method.outline import outline
 from friso.design_method.prepare import assumed, by_rules, check_designable
 from friso.design_method.spec import Spec, load_spec, read_spec
-from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.progress import Progress, silent
 from friso.stage import Stage, numeric_keys
 from friso.system import shell_word
@@ -143,6 +142,7 @@ def specification_of(stage: Stage, spec: Spec | str | os.PathLike[str] | None) -
 
 def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
     """Say what neither the stage file nor a specification tells."""
+    from friso.equations.bandwidth import bandwidth
     from friso.views.drawing.prefixes import with_unit
 
     if outlined:
@@ -150,7 +150,7 @@ def _tell_what_is_assumed(stage: Stage, spec: Spec, outlined: bool) -> None:
         LOGGER.warning(f"no specification: one is made from the stage file; {made}")
     rules = by_rules(stage)
     if rules is not stage:
-        hertz = with_unit(rules.flat()[CROSSOVER], "Hz")
+        hertz = with_unit(bandwidth(rules.flat()), "Hz")
         LOGGER.warning(
             f"the design is that of a PID by van Dijk's rules (alpha = 0.1, beta = 2) in the place of the stage file's "
             f"controller, with its bandwidth when the joint is locked, {hertz}; friso export gains lists its gains"
