@@ -1,7 +1,7 @@
 """Stiffness and damping of the bearing's bristles by small motion before it slides, and loops up to break-away.
 
-The loops, of force over displacement, tell friction laws apart. The joint is locked. The thesis has no such experiment, but the bristles decide whether a machine near the boundary of
-hunting hunts.
+The loops, of force over displacement, tell friction laws apart. The joint is locked. The thesis has no such experiment,
+but the bristles decide whether a machine near the boundary of hunting hunts.
 """
 
 from __future__ import annotations
