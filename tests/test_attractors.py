@@ -26,9 +26,9 @@ from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.boundary import KeyRange, Space, diagram
 from friso.hunting.check import check_given
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import GROWS, MAY_GROW, hunting
+from friso.hunting.cycle.hunting import FARTHER_KICKS, GROWS, MAY_GROW, hunting
 from friso.hunting.cycle.rest import bent, stuck, wait
-from friso.hunting.margin import margin, search_bandwidths
+from friso.hunting.margin import NOT_SOUGHT, margin, search_bandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import Motions, run_motions
 from friso.hunting.outward import Beyond, Outward
@@ -597,7 +597,7 @@ def test_a_motion_that_swings_on_by_less_than_what_was_found_to_attract_is_not_a
     flat = VARIANTS["rigid"].replace({"controller.crossover": "8 Hz"}).flat()
     survey = attractors(Ensemble.held(flat, 1))
     larger = replace(survey, motions=tuple(replace(m, amplitude=10 * m.amplitude) for m in survey.motions))
-    still_moving = Motions(np.ones(1, bool), np.zeros(1), np.full(1, np.nan), np.full(1, np.nan))
+    still_moving = Motions(np.ones(1, bool), np.zeros(1, bool), np.zeros(1), np.full(1, np.nan), np.full(1, np.nan))
     assert judge_runs(flat, still_moving, larger, larger.decided, 1e-6).tolist() == ["hunts"]
 
 
@@ -647,7 +647,7 @@ def test_a_motion_that_cannot_be_followed_to_its_end_is_not_decided() -> None:
     flat = VARIANTS["rigid"].replace({"controller.crossover": "14 Hz"}).flat()
     survey = attractors(Ensemble.held(flat, 1))
     assert not survey.attracts[0]
-    moving = Motions(np.ones(1, bool), np.zeros(1), np.full(1, 1e-4), np.full(1, np.nan))
+    moving = Motions(np.ones(1, bool), np.zeros(1, bool), np.zeros(1), np.full(1, 1e-4), np.full(1, np.nan))
     assert judge_runs(flat, moving, survey, survey.decided, 1e-6).tolist() == ["transient"]
     with allowance(1):
         assert judge_runs(flat, moving, survey, survey.decided, 1e-6).tolist() == ["failed"]
@@ -758,11 +758,14 @@ def test_a_swing_that_grows_without_bound_has_no_size() -> None:
     assert not hunting(stage.replace({"controller.anti_windup": "clamp"})).passing
 
 
+UNWINDING = {"controller.anti_windup": "none", "controller.crossover": "20 Hz"}
+
+
 def test_many_stages_are_judged_no_more_surely_than_one() -> None:
-    """At 5 kN no motion that is tried reaches the limit for long, but farther ones do, and may grow."""
-    limit = {"controller.force_limit": "5 kN", "controller.anti_windup": "none", "controller.crossover": "20 Hz"}
-    stage = VARIANTS["rigid"].replace(limit)
-    assert not hunting(stage).certain
+    """At 500 kN no motion that is tried reaches the limit for long, but farther ones do, and may grow."""
+    stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "500 kN"})
+    result = hunting(stage)
+    assert (result.certain, result.reason) == (False, FARTHER_KICKS)
     assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["failed"]
     clamped = stage.replace({"controller.anti_windup": "clamp"})
     assert judge_many(clamped.flat(), 1, 1e-6).tolist() == ["settles"]
@@ -771,6 +774,20 @@ def test_many_stages_are_judged_no_more_surely_than_one() -> None:
         traced = diagram(Space.of(either, [KeyRange("controller.crossover", 20.0, 21.0)]), seeds=2)
         assert runs.attractor.values.tolist() == [word]
         assert place_verdicts(traced) == [REPELS if word == "nothing" else UNKNOWN] * 2
+
+
+def test_a_stage_that_large_motions_run_away_of_settles_for_certain_from_smaller_ones() -> None:
+    """At 50 N they do: every start that is tried comes to rest or runs away, and the farthest all run away."""
+    stage = VARIANTS["rigid"].replace({**UNWINDING, "controller.force_limit": "50 N"})
+    with patched({verdict: {"search_bandwidths": lambda *_: NOT_SOUGHT}}):
+        case = check_given(stage)
+    assert (case.verdict, case.judgement.hunting.certain) == ("settles", True)
+    assert judge_many(stage.flat(), 1, 1e-6).tolist() == ["settles"]
+    away = case.judgement.running_away
+    assert away is not None
+    edge, flat = away.windows[0][0], stage.replace({"motion.duration": "200 s"}).flat()
+    kicked = {**flat, "motion.displacement": edge * np.array([0.98, 1.02])}
+    assert run_motions(kicked, 2, measuring_options(1e-8)).away.tolist() == [False, True]
 
 
 def test_a_large_swing_that_dies_out_slowly_does_not_attract() -> None:

@@ -299,7 +299,7 @@ def growing(lower_gains: LowerGains, verdict: Verdict) -> Judgement:
 def said_by_name() -> dict[str, str]:
     """What is said of stages that differ in one respect."""
     free = {"free": replace(fake_case(), judgement=settles())}
-    none = Kick((), (1e-5, 0.1))
+    none, away = Kick((), (1e-5, 0.1)), Kick(((6.22e-4, 0.03),), (3e-6, 0.03))
     repels = fake_hunting(fake_cycle(multiplier=-1.0112))
     uncertain = fake_hunting(reason="no orbit could be closed", certain=False)
     faster, slower = Margin(1.22, None, True, 1.227), Margin(0.5, None, True, 0.5025)
@@ -323,9 +323,11 @@ def said_by_name() -> dict[str, str]:
         "bistable, may grow": sentence(growing("unknown", "bistable")),
         "bistable, may die out": sentence(growing("stable", "bistable")),
         "settles, may run away": sentence(growing("unstable", "settles")),
+        "settles, runs away": sentence(replace(growing("unstable", "settles"), running_away=away)),
         "settles, not known whether it may": sentence(growing("unknown", "settles")),
         "transient": sentence(transient, peak_to_peak=6.9e-4, period=1.33),
         "transient, at rest": sentence(still, peak_to_peak=1e-7),
+        "transient, runs away": sentence(replace(still, followed=None, runs_away=True, running_away=away)),
         "transient, longer run given up": sentence(replace(still, followed=None), peak_to_peak=1e-7),
         "transient, cannot hunt": sentence(cannot_hunt("transient"), peak_to_peak=0.383, period=6.36),
         "settles": sentence(settles()),
@@ -356,6 +358,8 @@ def test_sentences(snapshots: Snapshots) -> None:
         ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
         ("hunts, grows", ["was stopped", "may run away", "controller.anti_windup"]),
+        ("settles, runs away", ["622 µm or more", "controller.anti_windup"]),
+        ("transient, runs away", ["runs away from its reference", "622 µm or more"]),
         ("settles, not known whether it may", ["not known", 'controller.anti_windup, which is "none"']),
         ("bistable, may grow", ["may last", "not known", "11.8 Hz"]),
     ],

@@ -18,8 +18,9 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.frequency.friction import steady_force
+from friso.hunting.attractors import Attractors
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import small_cycles_possible
+from friso.hunting.cycle.hunting import NARROW_PLAY, beyond_the_survey, small_cycles_possible
 from friso.stage.tables import FRICTION
 
 LAWS = Path(friso.__file__).parent / "equations" / "friction"
@@ -57,6 +58,17 @@ def test_cycles_too_small_to_be_looked_for_are_possible_with_any_law_that_falls_
 ) -> None:
     flat = stage(release(), friction=maxwell(share, viscous="0 N*s/m"), controller=van_dijk()).flat()
     assert small_cycles_possible(Ensemble.held(flat, 1)) == possible
+
+
+@pytest.mark.parametrize(("play", "why"), [("200 um", ""), ("20 um", ""), ("100 nm", NARROW_PLAY)])
+def test_what_a_backlash_deflects_the_loop_by_is_no_friction_that_falls(play: str, why: str) -> None:
+    """Beside friction that falls by two thirds, over speeds far above those of small swings; in a backlash of less than
+    a thousandth of the deflection of the loop cycles may be smaller than the search covers."""
+    screw = {"mass": "2 kg", "stiffness": "20 N/um", "damping": "400 N*s/m", "backlash": play}
+    tables = {"transmission": screw, "encoder": {"position": "load", "velocity": "load"}}
+    stages = Ensemble.held(VARIANTS["rigid"].replace(tables).flat(), 1)
+    quiet = np.zeros(1, bool)
+    assert beyond_the_survey(stages, Attractors((), ~quiet, np.ones(1), (), quiet, ~quiet, quiet)).tolist() == [why]
 
 
 def run(changes: dict[str, Any], rtol: float = 1e-8, interval: float = 1e-3) -> Results:

@@ -83,7 +83,7 @@ def test_kicks_of_which_none_is_completed_are_unknown() -> None:
 
 def surveyed(complete: bool) -> Attractors:
     yes, no = np.ones(1, bool), np.zeros(1, bool)
-    return Attractors((), yes, np.ones(1), (), no, np.array([complete]))
+    return Attractors((), yes, np.ones(1), (), no, np.array([complete]), no)
 
 
 def run_to(settling: float, swing: float = 0.0) -> Any:

@@ -14,14 +14,15 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import CRUISE, last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
-from friso.hunting.attractors.rounds import TIGHT
+from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble, without_motion
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.measures import swing_of
-from friso.hunting.motions import some_of
+from friso.hunting.motions import run_motions, some_of
 from friso.shares import share_interval
 from friso.stage import Stage
+from friso.stage.controllers import FORCE_LIMIT
 
 LAST = 1.5
 """Periods at the end of a run by which it is judged."""
@@ -41,6 +42,9 @@ RANGE, POINTS = (1 / 30, 300.0), 128
 
 EDGE = 0.01
 """Share to which the edges of the windows are found."""
+
+RUNS_AWAY = 200.0
+"""Typical periods in which a motion runs away that ever does."""
 
 BETWEEN = 7
 """Kicks between two that enclose an edge: as many runs take hardly longer than one."""
@@ -180,6 +184,20 @@ def displacements_that_hunt(stage: Stage, target: Target, widest: float = np.inf
         return _caught({**flat, "motion.displacement": kicks}, len(kicks), target, widest)
 
     return _kick(hunts, target.amplitude)
+
+
+def displacements_that_run_away(stage: Stage) -> Kick:
+    """The displacements after which a stage whose force is limited, without anti-windup, runs away from its reference
+    for good, in the same way."""
+    flat, stages = {**without_motion(stage.flat()), "motion.kind": "release"}, Ensemble.held(stage.flat(), 1)
+    end = RUNS_AWAY * float(typical_period(stages)[0])
+
+    def runs_away(kicks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        options = RunOptions(rtol=RTOL, record_from=np.inf, least_swing=np.inf)
+        motions = run_motions({**flat, "motion.displacement": kicks, "motion.duration": end}, len(kicks), options)
+        return motions.away, motions.away | motions.completed
+
+    return _kick(runs_away, flat[FORCE_LIMIT] / float(stages.number("stiffness")[0]))
 
 
 def pushes_that_hunt(stage: Stage, target: Target, widest: float = np.inf) -> Kick:

@@ -27,7 +27,7 @@ from friso.hunting.verdict import ATTRACTION, FEEDING, PARTS, ROOM, WORK, Judgem
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-from friso.stage.transmission import BACKLASH, leading_friction
+from friso.stage.transmission import leading_friction
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -214,8 +214,7 @@ def _breakaway(flat: Mapping[str, Any]) -> float:
         return 0.0
     uneven = abs(flat.get("friction.asymmetry") or 0.0)
     stages = Ensemble.held(flat, 1)
-    play = float(stages.number("stiffness")[0]) * flat.get(BACKLASH, 0.0) / 2  # no force that moves anything
-    least = (float(stages.number("breakaway")[0]) - play) * (1 - uneven) / (1 + uneven)
+    least = float(stages.friction_at_rest[0]) * (1 - uneven) / (1 + uneven)
     return max(least - sum(abs(value) for key, value in flat.items() if key.startswith("bias.") and value), 0.0)
 
 

@@ -44,6 +44,12 @@ def may_run_away(stages: Ensemble) -> np.ndarray:
     return np.zeros(stages.count, bool) if far is None else far != "stable"
 
 
+def surely_run_away(stages: Ensemble) -> np.ndarray:
+    """Which stages such swings do grow of, shape (count,)."""
+    far = far_beyond_a_limit(stages)
+    return np.zeros(stages.count, bool) if far is None else far == "unstable"
+
+
 @np.errstate(all="ignore")
 def at_lower_gains(stages: Ensemble) -> np.ndarray:
     """Whether the loops of sliding stages are stable at their own gain and at all lower ones, by the viscous friction

@@ -31,11 +31,12 @@ STEADY = 0.01
 
 @dataclass(frozen=True)
 class Motions:
-    """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, the thesis's `peaks`,
-    peak to peak of the last quarter, `swing` [m], and the time from the last corner of the reference until they stay
-    within 10 um, `settling` [s] (NaN: not within the run)."""
+    """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, or ran `away` from the
+    reference, the thesis's `peaks`, peak to peak of the last quarter, `swing` [m], and the time from the last corner of
+    the reference until they stay within 10 um, `settling` [s] (NaN: not within the run)."""
 
     completed: np.ndarray
+    away: np.ndarray
     peaks: np.ndarray
     swing: np.ndarray
     settling: np.ndarray
@@ -43,20 +44,24 @@ class Motions:
     @classmethod
     def of(cls, measures: Measures) -> Motions:
         """The motions of runs that were measured."""
-        completed = np.equal(measures.status, Status.DONE)
-        return cls(completed, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
+        completed, away = (np.equal(measures.status, status) for status in (Status.DONE, Status.DIVERGED))
+        return cls(completed, away, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
+
+    @property
+    def _arrays(self) -> tuple[np.ndarray, ...]:
+        return self.completed, self.away, self.peaks, self.swing, self.settling
 
     def take(self, numbers: np.ndarray) -> Motions:
         """Those of the stages with these numbers."""
-        return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
+        return Motions(*(array[numbers] for array in self._arrays))
 
 
 def run_motions(flat: Mapping[str, Any], count: int, run_options: RunOptions) -> Motions:
     """The motions of stages of one structure, run and measured."""
-    columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
+    columns = [*(np.zeros(count, bool) for _ in range(2)), *(np.full(count, np.nan) for _ in range(3))]
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, run_options):
         part = Motions.of(measure_runs(runs.part(flat), runs))
-        for column, values in zip(columns, (part.completed, part.peaks, part.swing, part.settling), strict=True):
+        for column, values in zip(columns, part._arrays, strict=True):
             column[runs.numbers] = values
     return Motions(*columns)
 
@@ -67,7 +72,8 @@ class FollowedMotions:
     their end, within 10 um of the reference; which are still `moving`, as they have not, or swing within that; the time
     [s] after which they rest, if they are followed for long (NaN: not then either, or unknown); whether they swing on
     `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer than their end, or
-    not to the end of the longer run); and peak to peak of the last quarter of that, `swing` [m]."""
+    not to the end of the longer run); peak to peak of the last quarter of that, `swing` [m]; and whether they run
+    `away` from the reference in it."""
 
     rests: np.ndarray
     moving: np.ndarray
@@ -75,6 +81,7 @@ class FollowedMotions:
     steady: np.ndarray
     followed: np.ndarray
     swing: np.ndarray
+    away: np.ndarray
 
     @property
     def unknown(self) -> np.ndarray:
@@ -96,7 +103,7 @@ class FollowedMotions:
             self.steady[which[swinging]] = half.completed & lasts(
                 swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY)
             )
-        self.followed[which] = np.where(done, lasts_for, np.nan)
+        self.followed[which], self.away[which] = np.where(done, lasts_for, np.nan), last.away
         after = np.where(self.rests[which], self.after[which], last.settling)
         self.after[which], self.swing[which] = np.where(done, after, np.nan), last.swing
 
@@ -107,8 +114,8 @@ def followed_motions(
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
     its end, or still swings there, is followed, as far as an allowance reaches."""
     rests, still = np.isfinite(motions.settling), np.zeros(count, bool)
-    steady, followed = np.zeros(count, bool), np.full(count, np.nan)
-    rest = FollowedMotions(rests, still, motions.settling.copy(), steady, followed, motions.swing.copy())
+    steady, away, followed = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
+    rest = FollowedMotions(rests, still, motions.settling.copy(), steady, followed, motions.swing.copy(), away)
     if not possible:
         idle = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
         return replace(rest, rests=rests | idle)

@@ -21,6 +21,7 @@ from friso.hunting.basin import (
     Kick,
     MoveShare,
     displacements_that_hunt,
+    displacements_that_run_away,
     ends_in,
     moves_that_hunt,
     pushes_that_hunt,
@@ -118,6 +119,8 @@ class Judgement:
     followed: float | None = None
     observed: bool = False
     lasting: float | None = None
+    runs_away: bool = False
+    running_away: Kick | None = None
     given_up: tuple[str, ...] = ()
 
     @property
@@ -168,9 +171,11 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         rest = followed_motions(
             stage.flat(), motions, 1, replace(measuring_options(rtol), room=ROOM), possible=attraction.possible
         )
-    if attraction.possible and attraction.certain and rest.unknown[0]:
+    leaves = attraction.surveyed is not None and bool(attraction.surveyed.runs_away[0])
+    runs_away, doubtful = leaves and bool(rest.away[0]), attraction.possible and attraction.certain
+    if doubtful and not runs_away and rest.unknown[0]:
         attraction = replace(attraction, certain=False, reason=UNFOLLOWED)
-    elif attraction.possible and attraction.certain and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
+    elif doubtful and not runs_away and rest.moving[0] and rest.swing[0] > resting(stage.flat())[0]:
         attraction = replace(attraction, certain=False, reason=STILL_SWINGS)
     observed = bool(rest.steady[0])
     sought, given_up = NOT_SOUGHT, ()
@@ -190,6 +195,8 @@ def _without_a_target(stage: Stage, motions: Motions, rtol: float, attraction: H
         followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
         observed=observed,
         lasting=float(rest.swing[0]) if observed else None,
+        runs_away=runs_away,
+        running_away=displacements_that_run_away(stage) if leaves else None,
         given_up=given_up,
     )
 

@@ -251,7 +251,8 @@ class _Table:
     def motions(self, cells: np.ndarray) -> Motions:
         """How the motions of the cells went."""
         columns = (self.columns[name][cells] for name in ("peaks", "peak_to_peak", "settling_time_10um"))
-        return Motions(self.columns["outcome"][cells] != run_outcome.FAILED, *columns)
+        away = self.columns["status"][cells] == Status.DIVERGED.text
+        return Motions(self.columns["outcome"][cells] != run_outcome.FAILED, away, *columns)
 
     def write(self, which: np.ndarray, measures: Measures, runs: Runs) -> None:
         """Write the measures of the cells that were run."""

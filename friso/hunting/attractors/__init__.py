@@ -13,6 +13,7 @@ from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, families
+from friso.hunting.loop import surely_run_away
 
 PERIODS, CONSTANTS = (60.0, 600.0), 8.0
 """Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
@@ -59,7 +60,8 @@ class Attractors:
     `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period); and of which
     stages simulations at different tolerances tell different things, `flips`, shape (count,): the tighter hold.
     `complete`, shape (count,): every motion was followed to what attracts it, so that a thorough survey has missed none
-    of these."""
+    of these. `runs_away`, shape (count,): the motions that begin farthest run away, for want of anti-windup, and so
+    does what begins beyond them."""
 
     motions: tuple[Swinging, ...]
     decided: np.ndarray
@@ -67,6 +69,7 @@ class Attractors:
     families: tuple[Cycles, ...]
     flips: np.ndarray
     complete: np.ndarray
+    runs_away: np.ndarray
 
     @property
     def attracts(self) -> np.ndarray:
@@ -99,7 +102,7 @@ class Attractors:
             motions_of.setdefault(motion.stage, []).append(motion)
         motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in motions_of.get(n, ()))
         suggested = tuple(cycles.take(numbers) for cycles in self.families)
-        columns = (array[numbers] for array in (self.flips, self.complete))
+        columns = (array[numbers] for array in (self.flips, self.complete, self.runs_away))
         return Attractors(tuple(motions), self.decided[numbers], self.typical[numbers], suggested, *columns)
 
 
@@ -122,7 +125,7 @@ def attractors(
     none could be closed, these are as many as those of a thorough survey. A thorough survey whose allowance is used up
     tells what it has found by then, which is decided where an orbit was closed; others raise Exhausted."""
     at_once = thorough or bool(suggested)
-    survey = Survey(stages.count, thorough, rtol, prove=cycles, decides=at_once)
+    survey = Survey(surely_run_away(stages), thorough, rtol, prove=cycles, decides=at_once)
     numbers = np.arange(stages.count)
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
     try:
@@ -140,14 +143,15 @@ def attractors(
         if cycles and not at_once:
             _try_cycles(starts, survey, rtol)
         decided = survey.attracted | ~survey.unknown
-        surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, nothing, ~survey.unknown)
+        columns = (nothing, ~survey.unknown, survey.runs_away)
+        surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, *columns)
         return _tried_again(stages, surveyed, rtol) if thorough else surveyed
     except Exhausted:
         if not thorough:
             raise
         proved = np.zeros(stages.count, bool)
         proved[[motion.stage for motion in survey.attracting if motion.cycles is not None]] = True
-        return Attractors(tuple(survey.attracting), proved, typical, suggested, nothing, complete=nothing)
+        return Attractors(tuple(survey.attracting), proved, typical, suggested, nothing, nothing, nothing)
 
 
 def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:
@@ -188,7 +192,7 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
     if not which.size:
         return first
-    survey = Survey(stages.count, False, rtol, decides=True)
+    survey = Survey(surely_run_away(stages), False, rtol, decides=True)
     survey.attracting += [motion for motion in first.motions if motion.stage in proved]
     starts = Starts(stages, TIGHT)
     starts.spread(thorough=False)
@@ -210,4 +214,5 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     confirmed_twice = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
     confirmed = [motion for motion in observed if not flips[motion.stage]]
     decided = first.decided & resolved & ~flips
-    return replace(first, motions=(*confirmed_twice, *confirmed), decided=decided, flips=flips)
+    away = first.runs_away & survey.runs_away
+    return replace(first, motions=(*confirmed_twice, *confirmed), decided=decided, flips=flips, runs_away=away)

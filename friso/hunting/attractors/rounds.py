@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.engine.arrays import STATISTICS
+from friso.engine.arrays import STATISTICS, Status
 from friso.engine.batch import CAPACITY
 from friso.hunting.attractors.recurrence import Recurrence, recurrence
 from friso.hunting.cycle.ensemble import Ensemble, done
@@ -82,12 +82,13 @@ class Pending:
 
 @dataclass(frozen=True)
 class Ends:
-    """How a round ended, arrays of shape (runs,): in what `states`, (runs, kept), which runs were `completed`, which of
-    them surely `rest`, the `steps` that they took, and how their last swings repeat, with where these turn [m] and when
-    [s], (runs, swings)."""
+    """How a round ended, arrays of shape (runs,): in what `states`, (runs, kept), which runs were `completed`, which
+    ran `away` from their reference instead, which surely `rest`, the `steps` that they took, and how their last swings
+    repeat, with where these turn [m] and when [s], (runs, swings)."""
 
     states: np.ndarray
     completed: np.ndarray
+    away: np.ndarray
     rest: np.ndarray
     steps: np.ndarray
     repeats: Recurrence
@@ -102,7 +103,7 @@ class Ends:
     def take(self, numbers: np.ndarray) -> Ends:
         """Those of the runs with these numbers."""
         arrays = (self.values[numbers], self.times[numbers])
-        flags = (self.completed[numbers], self.rest[numbers], self.steps[numbers])
+        flags = (self.completed[numbers], self.away[numbers], self.rest[numbers], self.steps[numbers])
         return Ends(self.states[numbers], *flags, self.repeats.take(numbers), *arrays)
 
 
@@ -137,7 +138,7 @@ def one_round(runs: Pending, budget: float = BUDGET) -> tuple[Pending, Ends]:
         room=max(CAPACITY, min(MOST_SWINGS, ROOM // count)),
         budget=int(min(budget, BUDGET)),
     )
-    completed = done(results)
+    completed, away = done(results), np.equal(results.statuses, Status.DIVERGED)
     high, low, steps = (
         results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min", "attempted")
     )
@@ -145,7 +146,7 @@ def one_round(runs: Pending, budget: float = BUDGET) -> tuple[Pending, Ends]:
     standing = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
     rest = completed & standing & (repeats.swings == 0)  # one that repeats itself may do so about home for ever
-    ends = Ends(results.ends, completed, rest, steps, repeats, values, times)
+    ends = Ends(results.ends, completed, away, rest, steps, repeats, values, times)
     return replace(runs, states=results.ends), ends
 
 

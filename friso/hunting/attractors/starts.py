@@ -12,6 +12,7 @@ from friso.hunting.attractors.rounds import PERIODS, RTOL, Pending, loose_from, 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import bent, pushed, stuck
+from friso.stage.controllers import FORCE_LIMIT
 
 THOROUGH_DISTANCES = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
 """Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: from the
@@ -23,6 +24,12 @@ DISTANCES = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geoms
 LIMITED = np.geomspace(500.0, 30000.0, 8)
 """Distances beyond these, in the same units, for stages with a force limit: cycles that it drives are as large as the
 limit moves the masses in the time in which the integrator unwinds."""
+
+WOUND_UP, FARTHEST = (np.geomspace(0.1, 100.0, 24), (0.0, 1.0, 10.0)), 1e5
+"""Distances at which stages without anti-windup are let go as well, in units of the deflection of the loop by the limit
+of its force, and how far their integrators are wound up then, as a move at that limit winds them: so many times what
+relaxes a stage stuck there, to the other side. The farthest distance in units of the deflection by the break-away
+force: a tenth of that at which a run is stopped that runs away."""
 
 OUTER = -10.0, -1.0, 1.0, 10.0
 """How far integrals of outer loops have wound up at first, where there are several: times for which they have
@@ -63,7 +70,8 @@ class Starts:
     def spread(self, thorough: np.ndarray | bool) -> None:
         """Stuck at distances on both sides (on one of symmetric stages); those stages that are `thorough`, (count,) or
         all, at twice as many, and pushed as well."""
-        limited = (controller := self.stages.structure.controller) is not None and controller.anti_windup is not None
+        controller = self.stages.structure.controller
+        limited = controller is not None and controller.anti_windup is not None
         for side, more in product((1.0, -1.0), (False, True)):
             spread = THOROUGH_DISTANCES if more else DISTANCES
             units = np.concatenate([*spread, *([LIMITED] if limited else [])])
@@ -75,11 +83,24 @@ class Starts:
                 self._add(owners, stuck(stages, distances))
                 for wound in OUTER if stages.outer_integrals else ():
                     self._add(owners, stuck(stages, distances, wound / stages.number("rate")))
+                if controller is not None and controller.anti_windup == "none":
+                    self._wound_up(which, side)
                 if more:
                     owners = np.repeat(which, len(PUSHES))
                     stages = self.stages.take(owners)
                     speeds = np.tile(PUSHES, which.size) * stages.length * stages.number("rate")
                     self._add(owners, pushed(stages, side * speeds))
+
+    def _wound_up(self, which: np.ndarray, side: float) -> None:
+        """Let go at distances on one side, their integrators wound up."""
+        distances, times = WOUND_UP
+        stages = self.stages.take(np.repeat(which, len(distances)))
+        limit = stages.flat[FORCE_LIMIT] / stages.number("stiffness")
+        begin = side * np.minimum(np.tile(distances, which.size) * limit, FARTHEST * stages.length)
+        for wound in times:
+            states = stages.displaced(begin)
+            states[:, stages.integral] -= wound * stages.relaxed * begin
+            self._add(np.repeat(which, len(distances)), states)
 
     def remembering(self, thorough: bool) -> None:
         """With several bristles, bent in ways in which motions leave them: let go at a distance, the controller being

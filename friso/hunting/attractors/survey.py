@@ -134,12 +134,13 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
 @dataclass
 class Survey:
     """What has been learned of stages so far, by a `thorough` survey, or by one that has to `prove` what attracts, or
-    takes motions that have converged for attracted; one that `decides` may take more steps. The motions that attract;
-    and of which stages that is `unknown`, because a run failed or had to be given up, the time constant of the cycle
-    that repels most slowly, `slowest` [s] (0: none), and the steps that its runs may take still, `left`, all of shape
-    (count,)."""
+    takes motions that have converged for attracted; one that `decides` may take more steps. Of the stages that are
+    `unbounded`, (count,), motions that run away from their reference have not failed. The motions that attract; and of
+    which stages that is `unknown`, because a run failed or had to be given up, the time constant of the cycle that
+    repels most slowly, `slowest` [s] (0: none), the steps that its runs may take still, `left`, and the farthest
+    distances [m] from which runs came to rest, `rested`, and ran `away` (0: none), all of shape (count,)."""
 
-    count: int
+    unbounded: np.ndarray
     thorough: bool
     rtol: float
     prove: bool = True
@@ -148,13 +149,21 @@ class Survey:
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
     left: np.ndarray = field(init=False)
+    rested: np.ndarray = field(init=False)
+    away: np.ndarray = field(init=False)
     _attracting_kinds: list[_Kind] = field(default_factory=list)
     _closed: list[_Kind] = field(default_factory=list)
     _unclosed: list[_Kind] = field(default_factory=list)
 
+    @property
+    def count(self) -> int:
+        """How many stages there are."""
+        return len(self.unbounded)
+
     def __post_init__(self) -> None:
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
         self.left = np.full(self.count, float(STEPS if self.decides else FEWER))
+        self.rested, self.away = np.zeros(self.count), np.zeros(self.count)
 
     @property
     def attracted(self) -> np.ndarray:
@@ -162,6 +171,11 @@ class Survey:
         attracted = np.zeros(self.count, bool)
         attracted[[motion.stage for motion in self.attracting]] = True
         return attracted
+
+    @property
+    def runs_away(self) -> np.ndarray:
+        """Which stages run away from the farthest distances tried, shape (count,): so does what begins beyond them."""
+        return self.unbounded & (self.away > self.rested)
 
     def add(self, motions: list[Swinging]) -> None:
         """Add motions that attract, but those that are there already."""
@@ -180,7 +194,7 @@ class Survey:
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
         """Follow runs, each of the stage with the number `owners`, (runs,), to what attracts them."""
-        before = np.full(len(owners), np.nan)
+        before, begun = np.full(len(owners), np.nan), np.abs(runs.states[:, runs.stages.sticking])
         for number in range(ROUNDS):
             enough = ENOUGH if self.thorough else 0
             dropped = self.attracted[owners] & (number >= enough)
@@ -188,9 +202,11 @@ class Survey:
             keep = np.flatnonzero(~dropped)
             if not keep.size:
                 return
-            owners, before = owners[keep], before[keep]
+            owners, before, begun = owners[keep], before[keep], begun[keep]
             most = self.left[owners].max()
             runs, ends = one_round(runs.take(keep), most if self.prove else min(most, UNPROVED))
+            for farthest, which in ((self.rested, ends.rest), (self.away, ends.away)):
+                np.maximum.at(farthest, owners[which], begun[which])
             swinging = self._still_swinging(runs, owners, ends, early=number < PATIENCE)
             swinging = self._within_budget(swinging, owners, ends)
             if not swinging.size:
@@ -209,13 +225,13 @@ class Survey:
             swinging = swinging[~regular]
             if not swinging.size:
                 return
-            before, owners = ends.repeats.mean[swinging], owners[swinging]
+            before, owners, begun = ends.repeats.mean[swinging], owners[swinging], begun[swinging]
             runs = lengthened(runs.take(swinging), ends.swing[swinging])
 
     def _still_swinging(self, runs: Pending, owners: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
         from those alone that repeat themselves well, and unlike any cycle that is known to repel."""
-        self.unknown[owners[~ends.completed]] = True
+        self.unknown[owners[~ends.completed & ~(ends.away & self.unbounded[owners])]] = True
         swinging = ends.completed & ~ends.rest & ~self._known_to_attract(owners, ends)
         ready = swinging & (ends.repeats.swings > 0)
         if early:

@@ -14,6 +14,7 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, columns, kernel
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
+from friso.stage.transmission import BACKLASH
 
 WITHOUT_FRICTION = 1e-6
 """Size of the motion [m] from which magnitudes follow where no friction deflects the loop: such a stage is linear."""
@@ -90,6 +91,17 @@ class Ensemble:
         proportional one of the loop."""
         (value,) = getattr(self.kernel.module, name)(self.values)
         return np.broadcast_to(np.asarray(value, dtype=float), (self.count,))
+
+    @property
+    def backlash(self) -> np.ndarray:
+        """Width of the backlash [m], shape (count,); 0 without one."""
+        return np.broadcast_to(np.asarray(self.flat[BACKLASH] if self.structure.plays else 0.0), (self.count,))
+
+    @property
+    def friction_at_rest(self) -> np.ndarray:
+        """The largest friction force at rest [N], shape (count,), the mean of both directions: that of break-away, but
+        for what the controller exerts half a backlash off its reference, which moves nothing."""
+        return self.number("breakaway") - self.number("stiffness") * self.backlash / 2
 
     @cached_property
     def length(self) -> np.ndarray:

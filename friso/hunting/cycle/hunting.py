@@ -92,6 +92,9 @@ SMALL_CYCLES = (
 )
 """The same of small swings."""
 
+NARROW_PLAY = "the backlash is so narrow that cycles of its size may be smaller than the search covers"
+"""The same of swings within a backlash."""
+
 AT_ONCE = 64
 """Stages whose friction is looked at together, at hundreds of speeds each."""
 
@@ -264,18 +267,20 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
             if motion.cycles is None:
                 why[motion.stage] = PASSING[far[motion.stage]]
     if (free := np.flatnonzero(~survey.attracts)).size:
-        why[free] = _beyond_the_search(stages.take(free))
+        why[free] = _beyond_the_search(stages.take(free), survey.runs_away[free])
     return why
 
 
-def _beyond_the_search(stages: Ensemble) -> np.ndarray:
-    """Why something may attract stages that a survey does not reach, words of shape (count,)."""
+def _beyond_the_search(stages: Ensemble, run_away: np.ndarray) -> np.ndarray:
+    """Why something may attract stages that a survey does not reach, words of shape (count,); farther off than it
+    reaches some are known to `run_away`, (count,)."""
     if stages.outer_integrals:
         why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
     else:
         why = np.where(small_cycles_possible(stages), SMALL_CYCLES, "").astype(object)
+        why[(stages.backlash > 0) & (stages.backlash < SMALL_SWING * stages.length)] = NARROW_PLAY
     why[(dead_band(stages.flat) >= WIDE_BAND * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
-    why[may_run_away(stages)] = FARTHER_KICKS
+    why[may_run_away(stages) & ~run_away] = FARTHER_KICKS
     return why
 
 
@@ -301,7 +306,8 @@ def _small_cycles_possible(stages: Ensemble) -> np.ndarray:
         return np.ones(stages.count, bool)
     force = np.abs(friction).reshape(stages.count, 2, -1)  # forward, and back
     slowest, sticks = force[:, :, :1], bool(stages.kernel.having(Role.BRISTLE))  # other laws creep before they slide
-    at_rest = breakaway[:, None] * slowest / slowest.max(axis=1, keepdims=True) if sticks else 0.0
+    mean = slowest.mean(axis=1, keepdims=True)
+    at_rest = stages.friction_at_rest[:, None, None] * slowest / mean if sticks else 0.0
     falls = (np.maximum.accumulate(np.maximum(force, at_rest), axis=2) - force) / breakaway[:, None]
     deepest, fed = falls.max(axis=2), falls[:, :, : sizes.size] / sizes
     last, most = fed[:, :, -1], fed.max(axis=2)

@@ -83,6 +83,7 @@ def _case(case: Case) -> dict[str, Any]:
         "windows": [{"low": _end(window.low), "high": _end(window.high)} for window in judgement.windows],
         "settles_below": _end(judgement.lower),
         "kick": _kick(judgement),
+        "displacements_that_run_away_m": judgement.running_away.windows if judgement.running_away else None,
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
         "given_up": judgement.given_up,

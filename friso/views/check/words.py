@@ -140,7 +140,9 @@ def _transient(case: Case) -> str:
     says = [f"transient: {attracts}, but this motion has not settled at its end ({end}).", *_held(case)]
     if judgement.cycle:
         says.append(f"Transients decay or grow by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
-    if judgement.settled_after is None and judgement.followed is None:
+    if judgement.runs_away:
+        says.append("Afterwards it runs away from its reference.")
+    elif judgement.settled_after is None and judgement.followed is None:
         says.append(f"{_too_much('How long it takes to settle')}.")
     elif judgement.settled_after is None:
         says.append(
@@ -211,14 +213,22 @@ def _doubts(case: Case) -> list[str]:
 
 
 def _running_away(case: Case) -> list[str]:
-    """That large motions may grow without bound, or that this is not known, and what keeps them from it."""
+    """That large motions grow without bound, or may, or that this is not known, and what keeps them from it."""
     cause = 'set controller.anti_windup, which is "none", to "clamp".'
+    if (away := case.judgement.running_away) and away.windows:
+        least = with_unit(away.windows[0][0], "m")
+        return [f"It runs away after a displacement of {least}{_or_more(away)}: {cause}"]
     return {
         None: [],
         "stable": [],
         "unstable": [f"Large motions may run away: {cause}"],
         "unknown": [f"It is not known whether large motions run away: {cause}"],
     }[case.judgement.hunting.lower_gains]
+
+
+def _or_more(kick: Kick) -> str:
+    """That all larger kicks do the same, as far as was searched, if they do."""
+    return " or more" if kick.windows == ((kick.windows[0][0], kick.searched[1]),) else ""
 
 
 def _outlook(case: Case) -> list[str]:
