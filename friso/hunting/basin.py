@@ -14,7 +14,7 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import CRUISE, last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Target
-from friso.hunting.attractors.rounds import TIGHT, typical_period
+from friso.hunting.attractors.rounds import RTOL, TIGHT, typical_period
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble, without_motion
 from friso.hunting.cycle.rest import pushed
@@ -30,9 +30,6 @@ LAST = 1.5
 CAUGHT = 0.003
 """Share by which the swing of a run that is looked at early may differ from that which attracts it: then it need not be
 followed for as long as the slowest."""
-
-RTOL = 1e-6
-"""Relative tolerance of these runs where a closed orbit attracts; where swings were observed it is `TIGHT`."""
 
 OBSERVED = 0.5
 """Share of a run at its end for which a motion stands still that has come to rest where swings were observed."""
