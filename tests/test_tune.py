@@ -159,7 +159,7 @@ def test_what_attracts_is_looked_for_down_to_the_distance(rigid: Stage, machines
     anti-windup farther motions may grow: nothing found to attract is not certain."""
     near, far = (rigid.replace({"controller.crossover": f"{hertz} Hz"}) for hertz in (11, 14))
     one = machines.take(np.array([0]))
-    limited = far.replace({"controller.force_limit": "5 kN", "controller.anti_windup": "none"})
+    limited = far.replace({"controller.force_limit": "500 kN", "controller.anti_windup": "none"})
     results = [attraction(Remedy.settled_on("", stage), np.zeros((1, 0)), one, goal) for stage in (near, far, limited)]
     assert [result.clear[0, 0] for result in results] == [False, True, True]
     assert [result.surely_clear[0, 0] for result in results] == [False, True, False]
