@@ -355,7 +355,8 @@ def test_a_window_that_is_neither_proved_nor_refuted_leaves_an_edge_uncertain(
 ) -> None:
     def surveyed(decided: list[bool], *motions: Swinging) -> Attractors:
         count = len(decided)
-        return Attractors(motions, np.array(decided), np.ones(count), (), np.zeros(count, bool), np.ones(count, bool))
+        no, yes = np.zeros(count, bool), np.ones(count, bool)
+        return Attractors(motions, np.array(decided), np.ones(count), (), no, yes, no)
 
     survey_beyond = surveyed([True, True], Swinging(1, 1e-3, 0.1, 0.1, 1e-3, 2))
     monkeypatch.setattr(Outward, "surveyed", lambda *_, **__: survey_beyond)
