@@ -30,12 +30,20 @@ FAST = 1e3
 LOWER = np.geomspace(1e-6, 1.0, 37)
 """Shares of its gain at which the stability of a loop is looked at."""
 
+AT_ONCE = 256
+"""Stages whose loops are looked at together, at all of these: of a map at once they took 0.1 MB each."""
+
+
+def winds_up_at_a_limit(stages: Ensemble) -> bool:
+    """Whether stages have a force limit without anti-windup."""
+    controller = stages.structure.controller
+    return bool(controller and controller.anti_windup == "none")
+
 
 def far_beyond_a_limit(stages: Ensemble) -> np.ndarray | None:
     """The loops of stages as swings far beyond a force limit without anti-windup see them, words of shape (count,):
     where they are unstable these grow, where they are stable these shrink. None: there is no such limit."""
-    controller = stages.structure.controller
-    return at_lower_gains(stages) if controller and controller.anti_windup == "none" else None
+    return at_lower_gains(stages) if winds_up_at_a_limit(stages) else None
 
 
 def may_run_away(stages: Ensemble) -> np.ndarray:
@@ -62,10 +70,17 @@ def at_lower_gains(stages: Ensemble) -> np.ndarray:
     the force limit and the viscous friction alone: of a mass m with viscous friction b they shrink where
     b k_p > m k_i, which is Hurwitz's criterion for the same loop at any gain, and grow where it is less.
     """
-    controller, form = controller_of(stages.flat), stages.structure
-    settings = form.controller.settings if form.controller else NO_SETTINGS
+    controller, form = controller_of(stages.flat), stages.structure.controller
+    settings = form.settings if form else NO_SETTINGS
     if not controller.loop_gain or settings.deadband or settings.dead_zone or settings.gains or settings.push:
         return np.full(stages.count, "unknown", dtype=object)
+    parts = np.split(np.arange(stages.count), range(AT_ONCE, stages.count, AT_ONCE))
+    return np.concatenate([_at_lower_gains(stages.take(part)) for part in parts])
+
+
+def _at_lower_gains(stages: Ensemble) -> np.ndarray:
+    """The same of not too many stages, whose controller tells which keys its gain is."""
+    controller, form = controller_of(stages.flat), stages.structure
     flat = stages.take(np.repeat(np.arange(stages.count), len(LOWER))).flat
     gains = {key: flat[key] * np.tile(LOWER, stages.count) for key in map(controller.key, controller.loop_gain)}
     slower = Ensemble.held({**flat, **gains}, stages.count * len(LOWER), form=form)

@@ -39,7 +39,7 @@ from friso.hunting.cycle.hunting import (
     surely_surveyed,
     why_not,
 )
-from friso.hunting.loop import far_beyond_a_limit, may_run_away
+from friso.hunting.loop import may_run_away, winds_up_at_a_limit
 from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import FollowedMotions, Motions, followed_motions, resting, run_motions, some_of
@@ -386,7 +386,7 @@ def judge_runs(
             some_of(flat, attracted), attracted.size, target, threads=threads, cancel=cancel
         )
         completed &= ~swings_seldom(target, ends, swing)
-        if far_beyond_a_limit(stages) is not None:
+        if winds_up_at_a_limit(stages):
             completed &= ~(ends & (swing > RUNNING_AWAY * 2 * target.amplitude))
         in_cycle[attracted], decided[attracted] = ends, completed
         settled = np.isfinite(motions.settling[attracted]) & (swing <= resting(flat, count)[attracted])

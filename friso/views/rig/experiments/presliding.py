@@ -61,7 +61,7 @@ def _loops(bristles: Bristles, outcome: Outcome) -> Figure:
         line = Series(displacement, log.logged["force"], "", BLUE, width=1.0)
         title = f"To {percent(share)} of static friction"
         panels.append(Panel(title, Axis("Displacement", "m"), Axis("Force", "N"), (line,)))
-    caption = "Commanded force over displacement at one place, four turns each. A loop of millimetres broke away."
+    caption = "Commanded force over displacement at one place, four turns each. One far wider than others broke away."
     columns = len(LOOPS) // ROWS
     return Figure(
         "rig_presliding_loops", "Loops before sliding", caption, tuple(panels), columns, subject=outcome.stage.name
