@@ -14,7 +14,9 @@ from friso.errors import InputError
 from friso.identification.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identification.readings.at_bearing import machine_between
 from friso.progress import Progress
+from friso.quantities import percent
 from friso.stage import Stage
+from friso.stage.controllers import FORCE_LIMIT
 from friso.stage.tables import friction_law
 from friso.studies.rig.excitation import Excitation, excite
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log
@@ -71,8 +73,11 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     contact = machine_between(as_built_keys(stage))
     results = tuple(bristles_from_presliding(log.log, contact) for log in logs)
     shown = Bristles(results, measured.stiffness, measured.damping, tuple(loops))
-    notes = ("the joint is held by its limiter, as an engineer would clamp it",) if stage.joint else ()
-    return Outcome("presliding", stage, seed, (*logs, *loops), shown, notes)
+    notes = ["the joint is held by its limiter, as an engineer would clamp it"] if stage.joint else []
+    reach = flat.get(FORCE_LIMIT, np.inf) / friction(stage)
+    if reach < LOOPS[-1]:
+        notes.append(f"the force limit is {percent(reach)} of static friction: larger loops are cut off there")
+    return Outcome("presliding", stage, seed, (*logs, *loops), shown, tuple(notes))
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
@@ -88,5 +93,5 @@ def loop_log(stage: Stage, name: str, place: float, seed: int, share: float) -> 
     turn = share * friction(stage) * np.sin(2 * np.pi * np.arange(samples) / samples)
     task = standing(place, TURNS * samples * step)
     task = replace(task, injected=np.tile(turn, TURNS), injected_each=step)
-    (recorded,) = run(stage, task, [seed], interval(stage, min(LONGEST, 1 / (SAMPLES * pace(stage)))))
+    (recorded,) = run(stage, task, [seed], interval(stage, 1 / (SAMPLES * pace(stage))))
     return rig_log(recorded, 0, name, "presliding", stage, seed)
