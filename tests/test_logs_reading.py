@@ -489,6 +489,13 @@ def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
     assert clipped_share(values[3]) == 0
 
 
+def test_amperes_rms_are_told_from_those_of_peak(tmp_path: Path, wording: Wording) -> None:
+    """A motor constant per ampere of peak would put mass and friction off by a factor of 1.41."""
+    names = [name.replace("[N]", "[Arms]") if "[N]" in name else name for name in NAMES]
+    assert names != NAMES
+    wording("\n".join(log_of(tmp_path, names, columns(), from_options(scales=["force=12 N/A"])).warnings))
+
+
 def test_values_held(tmp_path: Path, wording: Wording) -> None:
     assert samples_held(np.repeat(M["position"][:200], 4)) == 4
     assert samples_held(M["position"]) == 1

@@ -17,7 +17,7 @@ from friso.identification.logs.mapping import Mapping, option
 from friso.identification.logs.preamble import RATES, STEPS
 from friso.identification.logs.roles import AssignedRole, find, is_clock, words
 from friso.identification.logs.text import with_times
-from friso.identification.logs.units import FOREIGN, in_si, is_unit, likely_unit, read_scale, unit_factor
+from friso.identification.logs.units import FOREIGN, RMS, in_si, is_unit, likely_unit, read_scale, unit_factor
 from friso.quantities import quoted
 
 TURNS = f"--axis {ROTARY.name}"
@@ -85,6 +85,11 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
         notes.warnings.append(f"{role}: {channel.name} treated as a {bits}-bit counter that overflows: unwrapped")
     scale = reading.mapping.scales.get(role)
     unit = channel.unit
+    if unit in RMS:
+        notes.warnings.append(
+            f"{role}: {channel.name} is in amperes RMS, and so is what is told per ampere; a motor constant per ampere "
+            "of peak is 0.707 times that per ampere RMS"
+        )
     if scale is not None:
         value, implied = _scaled(role, scale, unit, reading)
         line = f"{scale}" + ("" if unit else f", its values taken to be in {implied} as the scale implies")

@@ -12,6 +12,10 @@ from friso.errors import InputError, LogError
 from friso.identification.logs.log import ROLES
 from friso.quantities import Quantity, any_sign, quoted
 
+RMS = ("Arms", "Aeff", "A_rms", "A(rms)")
+"""How amperes of a drive are written that are root mean squares of its phases: peaks are the square root of 2 times as
+large."""
+
 COUNTS = frozenset({"count", "counts", "cnt", "cnts", "inc", "incs", "increments", "lsb", "digit", "digits", "ticks"})
 """Texts that mean the steps of a sensor."""
 OTHERS = {
@@ -75,7 +79,7 @@ _SPELLINGS = {
     "oz-in": "ozf*in",
     "KN": "kN",
     "g": "g_0",
-    **dict.fromkeys(("Arms", "Aeff", "A_rms", "A(rms)"), "A"),
+    **dict.fromkeys(RMS, "A"),
 }
 """How people write units. Grad is the German degree, and neither a gon nor 1e9 rad; g is that
 of an accelerometer, as no log is in grams."""
