@@ -34,6 +34,7 @@ from friso.hunting.margin import search_bandwidths
 from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS
 from friso.remedies import method
+from friso.remedies import search as search_module
 from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
@@ -475,6 +476,26 @@ def test_ctrl_c_leaves_the_best_so_far(tuning: Advice, wording: Wording) -> None
     wording(answer(tuning)[0])
     with pytest.raises(KeyboardInterrupt):  # status 130, whatever was found
         show(TuneAnswer(tuning), ())
+
+
+def test_a_search_that_is_cut_says_so_and_not_that_nothing_works(
+    rigid: Stage, machines: Fleet, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goal = Goal(margin=0.9, joint=False)
+    for work, certainty in ((search_module.WORK, "does not work"), (1e5, "given up")):
+        monkeypatch.setattr(search_module, "WORK", work)
+        search = Search(remedies(rigid, goal)[0], goal, machines, machines, rigid, TINY, lambda label: None)
+        search.optimise()
+        tried = search.points if search.tried else None
+        outcome = RemedyOutcome(search.remedy, None, None, None, (), (), tried, cut=search.cut)
+        assert outcome.certainty == certainty
+
+
+def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice, wording: Wording) -> None:
+    (outcome,) = (one for one in tuning.outcomes if one.remedy.name == "gains")
+    points = tuning.outcomes[0].points  # of another remedy
+    cut = replace(outcome, stage=None, measured=None, interrupted=False, points=points, cut=True)
+    wording("\n".join(failing(replace(tuning, outcomes=(cut,)))))
 
 
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:

@@ -313,7 +313,7 @@ class _Session:
             if tries == TRIES:
                 break
         tried = search.points if search.tried else None
-        none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted)
+        none = RemedyOutcome(search.remedy, None, None, None, (), (), tried, search.attracted, cut=search.cut)
         self.outcomes[-1] = unsure or none
         self.report.after(_steps(search.remedy, self.budget))
         last = self.outcomes[-1]

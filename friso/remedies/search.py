@@ -7,7 +7,6 @@ Storn, Price 1997 (doi:10.1023/A:1008202821328), as SciPy has it.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -128,7 +127,8 @@ def _excess(values: np.ndarray, limit: float | None) -> np.ndarray:
 @dataclass
 class Search:
     """The search for the best points of a remedy on `machines`, those that it takes having to do on `fresh` ones too:
-    what was `tried` so far, and of how many points that were surveyed something `attracted` the machines, or may have.
+    what was `tried` so far, of how many points that were surveyed something `attracted` the machines, or may have, and
+    whether it was `cut`.
     """
 
     remedy: Remedy
@@ -140,6 +140,7 @@ class Search:
     report: Callable[[str], None]
     tried: list[TriedPoints] = field(default_factory=list)
     attracted: int = 0
+    cut: bool = False
 
     @property
     def points(self) -> TriedPoints:
@@ -151,11 +152,14 @@ class Search:
     def optimise(
         self, wanted: Callable[[np.ndarray], np.ndarray] | None = None, start: np.ndarray | None = None
     ) -> None:
-        """Try points until they get no better, or until that takes too much work: the settling time, or what is
+        """Try points until they get no better, or until that takes too much work (`cut`): the settling time, or what is
         `wanted` small, from points (points, variables) to numbers (points,). A search of several variables begins with
         the points `start`, if any."""
-        with suppress(Exhausted), allowance(WORK):
-            self._optimise(wanted, start)
+        try:
+            with allowance(WORK):
+                self._optimise(wanted, start)
+        except Exhausted:
+            self.cut = True
 
     def _optimise(self, wanted: Callable[[np.ndarray], np.ndarray] | None, start: np.ndarray | None) -> None:
         variables = len(self.remedy.variables)

@@ -27,7 +27,7 @@ from friso.studies.compare.statistics import quantile_interval
 ONE = np.zeros((1, 0))
 """The shares of the one point of a remedy without variables."""
 
-Certainty = Literal["works", "unsure", "does not work"]
+Certainty = Literal["works", "unsure", "given up", "does not work"]
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ class RemedyOutcome:
     """A remedy's best `stage` (None: none was found), measured, and checked by its cycles unless machines miss the goal
     as it is; the reasons why that is not sure to work, or does not (empty: it works); the `windows` of its numbers; and
     all points that were tried, of which `attracted` were given up because something attracted machines with them.
-    `shares` are where in the remedy's ranges it lies.
+    `shares` are where in the remedy's ranges it lies. The search may have been `cut`, since it took too much work.
     """
 
     remedy: Remedy
@@ -102,14 +102,16 @@ class RemedyOutcome:
     attracted: int = 0
     interrupted: bool = False
     shares: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    cut: bool = False
 
     @property
     def certainty(self) -> Certainty:
-        """Whether it works: all was verified, or not."""
+        """Whether it works: all was verified, or not; or nothing that works was found, in a whole search or one that
+        was given up."""
         if self.interrupted:
             return "unsure"
         if self.stage is None:
-            return "does not work"
+            return "given up" if self.cut or self.points is None else "does not work"
         return "unsure" if self.doubts else "works"
 
     def least_cost(self, goal: Goal) -> float:

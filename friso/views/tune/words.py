@@ -31,9 +31,6 @@ from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, share
 from friso.views.loop_words import unstable_loop
 from friso.views.machine_words import spread_sentences
 
-GIVEN_UP = "given up"
-"""What stands for a remedy of which no setting could be tried within its work."""
-
 DOUBTS = {
     "verdict": "friso check does not say that it settles",
     "certain": "friso check is not certain that nothing attracts it",
@@ -229,7 +226,8 @@ def _verified(made: RemedyOutcome, tuning: Advice) -> str:
         return f"With them, {share_with_interval(made.measured.share(tuning.goal))} of the machines meet the goal."
     if made.certainty == "unsure":
         return f"With them, it is not sure to work: {unsure_why(made)}."
-    return f"With them, it does not work. {why_unmet(made, tuning)}"
+    result = "the search was given up" if made.certainty == "given up" else "it does not work"
+    return f"With them, {result}. {why_unmet(made, tuning)}"
 
 
 def size_words(size: ChangeSize) -> str:
@@ -327,9 +325,8 @@ def failing(tuning: Advice) -> list[str]:
     """What cannot work, and why; and what is not sure to."""
     lines = []
     for outcome in tuning.outcomes:
-        if outcome.certainty == "does not work":
-            verdict = GIVEN_UP if outcome.points is None else "does not work"
-            lines.append(f"{outcome.remedy.name}: {verdict}. {why_unmet(outcome, tuning)}")
+        if outcome.stage is None and not outcome.interrupted:
+            lines.append(f"{outcome.remedy.name}: {outcome.certainty}. {why_unmet(outcome, tuning)}")
         elif outcome.certainty == "unsure" and tuning.working:
             lines.append(f"{outcome.remedy.name}: not sure to work: {unsure_why(outcome)}.")
     return lines
@@ -341,7 +338,9 @@ def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
         return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
     sentence = next(_reasons(points, outcome, goal))
-    return f"{sentence}{_edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ''}"
+    edges = _edges(tuning) if [v.name for v in outcome.remedy.variables] == [BANDWIDTH] else ""
+    cut = " The search was given up there, as it takes too much computing: others may work." if outcome.cut else ""
+    return f"{sentence}{edges}{cut}"
 
 
 def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterator[str]:
@@ -397,11 +396,10 @@ def _edges(tuning: Advice) -> str:
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     """The remedies side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
-    words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
+    words = {"works": "yes", "unsure": "not sure", "does not work": "no", "given up": "given up"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
     for outcome in tuning.outcomes:
-        untried = outcome.certainty == "does not work" and outcome.points is None
-        works = GIVEN_UP if untried else words[outcome.certainty]
+        works = words[outcome.certainty]
         cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
         if outcome.measured is not None:
             cells = _row(outcome.measured, tuning, works)
