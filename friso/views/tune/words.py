@@ -365,8 +365,8 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         if not left.any():
             yield sentence
     yield (
-        f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal, but something attracts machines, or "
-        f"may, with each of those surveyed ({outcome.attracted})."
+        f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search, but on "
+        f"fresh machines they do not, or something attracts machines with them, or may ({outcome.attracted} surveyed)."
     )
 
 
@@ -386,8 +386,10 @@ def _edges(tuning: Advice) -> str:
         ends, needed = (with_unit(float(hertz), "Hz") for hertz in bandwidths_at(stage, factors))
         parts.append(f"hunting ends at {ends}, so that {needed} is needed")
     if comfortable is not None and np.isfinite(comfortable) and comfortable < tuning.limits.searched[1]:
-        (hertz,) = bandwidths_at(stage, [comfortable / (bandwidth(stage.flat()) or 1.0)])
-        parts.append(f"the margin is kept up to {with_unit(float(hertz), 'Hz')}")
+        again = [low for low, _ in tuning.limits.comfortable if low > comfortable][:1]
+        own = bandwidth(stage.flat()) or 1.0
+        hertz = [with_unit(float(at), "Hz") for at in bandwidths_at(stage, np.array([comfortable, *again]) / own)]
+        parts.append(f"the margin is kept up to {' and again from '.join(hertz)}{' on' * len(again)}")
     if tuning.goal.bandwidth_limit is not None:
         parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")
     return f" In bandwidth (where the loop last crosses 0 dB) {listed(parts, 'and')}." if parts else ""
