@@ -46,7 +46,7 @@ from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
 from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
-from friso.remedies.variables import of_key
+from friso.remedies.variables import BANDWIDTH, of_key
 from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals
 from friso.remedies.window import HALVINGS, POINTS, windows
 from friso.stage.controllers import as_tuned, controller_of
@@ -496,6 +496,17 @@ def test_a_cut_search_is_told_with_what_it_tried(tuning: Advice, wording: Wordin
     points = tuning.outcomes[0].points  # of another remedy
     cut = replace(outcome, stage=None, measured=None, interrupted=False, points=points, cut=True)
     wording("\n".join(failing(replace(tuning, outcomes=(cut,)))))
+
+
+def test_what_another_option_found_is_not_said_not_to_work(tuning: Advice) -> None:
+    """A bandwidth that works, found by the search for the least change, where that for the fastest found none."""
+    works = next(outcome for outcome in tuning.working if outcome.stage is not None)
+    assert [variable.name for variable in works.remedy.variables] == [BANDWIDTH]
+    missed = replace(works, stage=None, measured=None)
+    least = replace(works, remedy=replace(works.remedy, name="gains: the least change"))
+    assert "does not work" in failing(replace(tuning, outcomes=(missed,)))[0]
+    (line,) = failing(replace(tuning, outcomes=(missed, least)))
+    assert "does not work" not in line
 
 
 def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) -> None:

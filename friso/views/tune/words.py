@@ -326,14 +326,35 @@ def failing(tuning: Advice) -> list[str]:
     lines = []
     for outcome in tuning.outcomes:
         if outcome.stage is None and not outcome.interrupted:
-            lines.append(f"{outcome.remedy.name}: {outcome.certainty}. {why_unmet(outcome, tuning)}")
+            lines.append(f"{outcome.remedy.name}: {_verdict(outcome, tuning)}. {why_unmet(outcome, tuning)}")
         elif outcome.certainty == "unsure" and tuning.working:
             lines.append(f"{outcome.remedy.name}: not sure to work: {unsure_why(outcome)}.")
     return lines
 
 
+def _met_by_another(outcome: RemedyOutcome, tuning: Advice) -> bool:
+    """Whether no setting of the bandwidth was found that works, although another remedy that works changes nothing
+    else."""
+    key = tuning.stage.controller.bandwidth_key
+    if outcome.stage is not None or key is None or [v.name for v in outcome.remedy.variables] != [BANDWIDTH]:
+        return False
+    before, stages = tuning.stage.flat(), (one.stage.flat() for one in tuning.working if one.stage is not None)
+    return any(after.keys() == before.keys() and _differing(before, after) == [key] for after in stages)
+
+
+def _verdict(outcome: RemedyOutcome, tuning: Advice) -> str:
+    """Whether a remedy works, in a word or two."""
+    return "see the others" if _met_by_another(outcome, tuning) else outcome.certainty
+
+
+def _differing(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+    return [key for key, value in before.items() if not np.array_equal(after[key], value)]
+
+
 def why_unmet(outcome: RemedyOutcome, tuning: Advice) -> str:
     """Why no setting of a remedy meets the goal."""
+    if _met_by_another(outcome, tuning):
+        return "Its own search found no setting, but that of another option did, which changes the bandwidth alone."
     if outcome.points is None:
         return "Its motions take too much computing."
     points, goal = outcome.points, tuning.goal
@@ -398,10 +419,10 @@ def _edges(tuning: Advice) -> str:
 def rows(tuning: Advice) -> list[tuple[str, list[str]]]:
     """The remedies side by side, the stage as it is first."""
     shown = [("as it is", tuning.present, "no" if tuning.needed else "yes")]
-    words = {"works": "yes", "unsure": "not sure", "does not work": "no", "given up": "given up"}
+    words = {"works": "yes", "unsure": "not sure", "does not work": "no"}
     table = [(name, _row(measured, tuning, works)) for name, measured, works in shown]
     for outcome in tuning.outcomes:
-        works = words[outcome.certainty]
+        works = words.get(verdict := _verdict(outcome, tuning), verdict)
         cells = [works, *[NOTHING] * (len(COLUMNS) - 1)]
         if outcome.measured is not None:
             cells = _row(outcome.measured, tuning, works)
