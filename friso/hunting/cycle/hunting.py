@@ -20,7 +20,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import COARSE_RTOL, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.loop import LowerGains, far_beyond_a_limit, may_run_away, surely_calm
+from friso.hunting.loop import LowerGains, far_beyond_a_limit, surely_calm
 from friso.stage import Stage
 from friso.stage.standstill import dead_band
 
@@ -261,26 +261,27 @@ def beyond_the_survey(stages: Ensemble, survey: Attractors) -> np.ndarray:
     """Why it is not certain what attracts stages, whatever a survey of them decided: words of shape (count,), "" where
     there is no such reason."""
     why = np.full(stages.count, "", dtype=object)
-    far = far_beyond_a_limit(stages)
+    far, farther = far_beyond_a_limit(stages), np.zeros(stages.count, bool)
     if far is not None:
+        farther = (far != "stable") & ~survey.runs_away
         for motion in survey.motions:
             if motion.cycles is None:
                 why[motion.stage] = PASSING[far[motion.stage]]
     if (free := np.flatnonzero(~survey.attracts)).size:
-        why[free] = _beyond_the_search(stages.take(free), survey.runs_away[free])
+        why[free] = _beyond_the_search(stages.take(free), farther[free])
     return why
 
 
-def _beyond_the_search(stages: Ensemble, run_away: np.ndarray) -> np.ndarray:
-    """Why something may attract stages that a survey does not reach, words of shape (count,); farther off than it
-    reaches some are known to `run_away`, (count,)."""
+def _beyond_the_search(stages: Ensemble, farther: np.ndarray) -> np.ndarray:
+    """Why something may attract stages that a survey does not reach, words of shape (count,): motions from `farther`
+    off, (count,), for instance, which may swing on for all that is known."""
     if stages.outer_integrals:
         why = np.full(stages.count, OUTER_INTEGRALS, dtype=object)
     else:
         why = np.where(small_cycles_possible(stages), SMALL_CYCLES, "").astype(object)
         why[(stages.backlash > 0) & (stages.backlash < SMALL_SWING * stages.length)] = NARROW_PLAY
     why[(dead_band(stages.flat) >= WIDE_BAND * stages.length) & (stages.length > 0)] = MOSTLY_WITHIN
-    why[may_run_away(stages) & ~run_away] = FARTHER_KICKS
+    why[farther] = FARTHER_KICKS
     return why
 
 

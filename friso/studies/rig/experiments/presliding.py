@@ -31,7 +31,6 @@ GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
 """A twentieth of static friction, RMS, up to 96 Hz on the thesis's rig, logged every 0.75 ms; longest time [s] from
 sample to sample on slower ones."""
 
-
 LOOPS = np.linspace(0.2, 0.9, 8)
 """Shares of static friction up to which the force of a loop swings: along the rail some break away."""
 
