@@ -154,6 +154,14 @@ def test_digits_count_as_noise() -> None:
     assert noise_of(force) >= 1 / math.sqrt(12)
 
 
+def test_digits_count_as_noise_between_instants_and_beside_rounding() -> None:
+    steps = np.round(20 * np.sin(np.arange(20_000) / 2000)) * 0.25
+    instants = np.arange(20_000) + np.random.default_rng(1).uniform(-0.3, 0.3, 20_000)
+    resampled = np.interp(np.arange(1, 19_999), instants, steps)
+    for force in (steps, steps * (1 + 1e-15 * np.cos(np.arange(20_000))), resampled):
+        assert noise_of(force) == pytest.approx(0.25 / math.sqrt(12), rel=1e-6)
+
+
 def test_a_stage_explains_what_its_own_inverse_model_does() -> None:
     log = axis()
     inverse = inverse_model(log, 5.0)

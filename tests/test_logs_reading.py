@@ -1,5 +1,6 @@
 """From a file to a log: roles, units, scales, one time base, and what is refused or told."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -40,7 +41,7 @@ def log_of(
     return read_log(log_files.write_text(tmp_path / "a.csv", names, values), mapping, strict)
 
 
-def recognised(lines: tuple[str, ...], text: str) -> bool:
+def recognised(lines: Sequence[str], text: str) -> bool:
     return any(text in line for line in lines)
 
 
@@ -466,6 +467,30 @@ def test_jitter_is_interpolated_and_told(tmp_path: Path, wording: Wording) -> No
     assert log.sample_time == pytest.approx(period, rel=1e-3)
 
 
+@settings(max_examples=200, deadline=None)
+@given(
+    st.floats(3, 40) | st.floats(1.4, 3),
+    st.floats(0, 1),
+    st.lists(st.integers(50, 1950), max_size=8),
+)
+def test_stamps_with_few_digits_are_those_of_a_uniform_clock(period: float, begin: float, lost: list[int]) -> None:
+    few = lost if period >= 3 else []  # a step of coarser stamps may hide a lost sample
+    clock = np.delete(period * np.arange(2000) + begin, few)
+    values = np.sin(0.01 * clock)
+    read = track("position", np.round(clock) * 1e-4, values)
+    assert not read.warnings
+    assert read.period == pytest.approx(period * 1e-4, rel=1e-3)
+    measured = ~read.bridged
+    assert np.array_equal(read.values[measured], values)  # not interpolated
+    assert np.abs(read.time[measured] - clock * 1e-4).max() < 1.01e-4
+
+
+def test_a_random_walk_of_whole_digits_is_no_uniform_clock() -> None:
+    steps = np.random.default_rng(1).choice([2e-3, 3e-3], 2000)
+    read = track("position", np.cumsum(steps), np.arange(2000.0))
+    assert recognised(read.warnings, "interpolated")
+
+
 @pytest.mark.parametrize(
     ("column", "said"), [(1, "position\n  given:    a constant signal, 0.003"), (3, "constant signal, 3.0")]
 )
@@ -805,4 +830,6 @@ def test_of_a_long_log_the_part_that_moves_most_is_taken() -> None:
     assert part.time[0] <= 4.0
     assert part.time[-1] >= 5.0
     assert np.array_equal(part["force"], part.time)
+    assert part.is_excerpt
     assert log.excerpt(10_000) is log
+    assert not log.is_excerpt

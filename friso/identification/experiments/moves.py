@@ -89,7 +89,7 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     loops = [result for result in results if result.loop] if stage is not None else []
     reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
-    long = [result.log for result in results if len(result.log.time) == MOST]
+    long = [result.log for result in results if result.log.is_excerpt]
     return [
         *(sentence for sentence in dict.fromkeys(reasons) if sentence),
         *([WITHOUT_CONTROLLER] if followed else []),
@@ -98,7 +98,8 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
 
 
 def _span(log: Log) -> str:
-    return f"{log.time[0]:.6g} to {log.time[-1]:.6g} s"
+    start, end = (round(float(log.time[k]), 9) + 0.0 for k in (0, -1))  # not -2e-16 s
+    return f"{start:.6g} to {end:.6g} s"
 
 
 def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:

@@ -36,7 +36,8 @@ class Log:
     instead of a length), the unit in which it stands. `scalars` are single numbers that stood in the file, by name.
     `read` lists line by line what was read and how, `warnings` what the engineer should know before believing it.
     `setup` are keys of the stage file that were otherwise while this log was taken ({"joint.stroke": "8 mm"}).
-    `bridged`, shape (n,), is true at samples that were lost and are interpolated; None where none was.
+    `bridged`, shape (n,), is true at samples that were lost and are interpolated; None where none was. `is_excerpt`
+    tells that the log is a part of a longer one.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Log:
     setup: Mapping[str, str] = field(default_factory=dict)
     axis: AxisKind = LINEAR
     bridged: np.ndarray | None = None
+    is_excerpt: bool = False
 
     def __contains__(self, role: str) -> bool:
         return role in self.signals
@@ -78,7 +80,8 @@ class Log:
         chosen = slice(first, first + count)
         signals = {role: values[chosen] for role, values in self.signals.items()}
         bridged = None if self.bridged is None else self.bridged[chosen]
-        return replace(self, time=self.time[chosen], signals=signals, segments=(slice(0, count),), bridged=bridged)
+        part = (slice(0, count),)
+        return replace(self, time=self.time[chosen], signals=signals, segments=part, bridged=bridged, is_excerpt=True)
 
     def per_unit_of_force(self) -> Log:
         """The log on an axis with forces in the unit of its own, where that is none of the axis."""

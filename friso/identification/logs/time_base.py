@@ -23,6 +23,8 @@ MOST_GAPS = 0.1
 EVEN = 0.01
 """Time stamps that scatter (rms) by less than this share of a sample time are taken as even: interpolation would change
 a signal by less than 1 % of what it changes per sample."""
+AVERAGED = 5
+"""Steps in a row whose mean is the usual step: one of stamps with few digits is longer or shorter than that."""
 CLEAR = 0.25
 """Share of a sample time by which it may be off at most: more is no whole number of samples."""
 SCATTER = 4.0
@@ -82,7 +84,9 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 def _gaps(steps: np.ndarray) -> np.ndarray:
     """Which steps of time, shape (n,), are gaps: the samples behind one stay late, while a step that only scatter made
     long has short ones beside it."""
-    usual = np.median(steps)
+    usual = float(np.median(steps))
+    if steps.size >= AVERAGED:
+        usual = float(np.median(np.convolve(steps, np.ones(AVERAGED), "valid"))) / AVERAGED
     beside = np.pad(np.minimum(steps, GAP * usual), 1, constant_values=usual)
     return (steps > GAP * usual) & (beside[:-2] + steps + beside[2:] > (GAP + 2) * usual)
 
@@ -113,17 +117,24 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 
 
 def _evened(name: str, raw: Track) -> Track:
-    """The track on even instants: its own where the stamps scatter little, else interpolated, which the notes say."""
-    time, scatter = np.empty_like(raw.time), 0.0
+    """The track on even instants: its own where the stamps scatter little, or no more than their digits make them, else
+    interpolated, which the notes say."""
+    order, about = np.empty_like(raw.time), np.empty_like(raw.time)
     for part in raw.segments:
-        steps = raw.period * np.arange(part.stop - part.start)
-        time[part] = steps + np.mean(raw.time[part] - steps)
-        scatter += float(np.sum((raw.time[part] - time[part]) ** 2))
+        count = part.stop - part.start
+        order[part] = np.arange(count) - (count - 1) / 2
+        about[part] = np.mean(raw.time[part])
+    raw.period = float(order @ (raw.time - about) / (order @ order))
+    time = about + raw.period * order
+    scatter = float(np.sum((raw.time - time) ** 2))
     jitter = np.sqrt(scatter / time.size) / raw.period
     raw.read.append(
         f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps even to {percent(jitter)} of a step"
     )
-    if jitter <= EVEN:
+    rounded = _rounded(raw, time) if jitter > EVEN else 0.0
+    if rounded:
+        raw.read.append(f"{name}: time stamps are rounded to {rounded * 1e3:.4g} ms: taken as uniform")
+    if rounded or jitter <= EVEN:
         raw.time = time
         return raw
     raw.warnings.append(
@@ -142,6 +153,26 @@ def _evened(name: str, raw: Track) -> Track:
     raw.time, raw.values, raw.bridged = (np.concatenate(arrays) for arrays in (times, values, filled))
     raw.segments = segments
     return raw
+
+
+def _rounded(raw: Track, even: np.ndarray) -> float:
+    """The digit [s] to which stamps of an `even` clock, shape (n,) [s], seem rounded; 0 where they scatter otherwise.
+
+    Between neighbours such a clock has one of two whole numbers of digits, and no stamp is further from it than a
+    digit, half of which is the clock's own offset and rate, which are read off the same stamps.
+    """
+    bridges = raw.bridged[1:] | raw.bridged[:-1]
+    inside = np.ones(raw.time.size - 1, bool)
+    inside[[part.start - 1 for part in raw.segments[1:]]] = False
+    steps = np.diff(raw.time)[inside & ~bridges]
+    short = steps < raw.period
+    if short.all() or not short.any():
+        return 0.0
+    lower, upper = float(np.median(steps[short])), float(np.median(steps[~short]))
+    digit = upper - lower
+    of_two = np.minimum(np.abs(steps - lower), np.abs(steps - upper)) <= EVEN * digit
+    near = np.abs(raw.time - even) <= (1 + EVEN) * digit
+    return digit if of_two.all() and near[~raw.bridged].all() else 0.0
 
 
 def resample_tracks(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:

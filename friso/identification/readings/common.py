@@ -29,6 +29,13 @@ LINEARITY = 1e-3
 """Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
 amplifiers."""
 
+DUST = 1e-12
+"""Steps of a signal below this share of it are rounding of numbers, no digit of a sensor."""
+
+LEVELS, OFF_DIGIT = 8, 0.1
+"""Levels at which a signal stays, from which on these show its digit, and the share of a digit by which they may be off
+it."""
+
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
 
@@ -128,11 +135,25 @@ def robust(values: np.ndarray) -> float:
 def noise_of(signal: np.ndarray) -> float:
     """Standard deviation of the noise of a force [N] or a position [m], shape (n,): of what neighbouring samples do not
     share, as its third differences show it, or of its digits."""
-    steps = np.abs(np.diff(signal))
-    digit = steps[steps > 0].min() / np.sqrt(12) if (steps > 0).any() else 0.0
     rough = np.diff(signal, 3)
     white = NORMAL_MAD * float(np.median(np.abs(rough))) / np.sqrt(20) if rough.size else 0.0
-    return max(white, float(digit))
+    return max(white, digit_of(signal) / np.sqrt(12))
+
+
+def digit_of(signal: np.ndarray) -> float:
+    """The digit of a signal, shape (n,): that of the levels at which it stays, where these are whole numbers of digits
+    apart, which an interpolation between instants leaves as they are; else the smallest step."""
+    steps = np.abs(np.diff(signal))
+    dust = DUST * np.abs(signal).max(initial=0.0)
+    stays = np.sort(signal[1:][steps <= dust])
+    apart = np.diff(stays)
+    apart = apart[apart > dust]
+    if apart.size >= LEVELS:
+        digits = apart / apart.min()
+        if np.abs(digits - np.round(digits)).max() <= OFF_DIGIT:
+            return float(apart.min())
+    real = steps[steps > dust]
+    return float(real.min()) if real.size else 0.0
 
 
 def turns_of(position: np.ndarray, swing: float) -> np.ndarray:
