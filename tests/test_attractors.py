@@ -14,6 +14,7 @@ import friso
 import friso.hunting.attractors
 import friso.hunting.cycle.hunting
 import friso.hunting.loop
+from benchmarks.truth.draws import draw
 from friso.engine.allowance import allowance
 from friso.engine.arrays import STATISTICS
 from friso.equations.roles import Role
@@ -31,7 +32,7 @@ from friso.hunting.cycle.rest import bent, stuck, wait
 from friso.hunting.margin import NOT_SOUGHT, margin, search_bandwidths
 from friso.hunting.measures import measuring_options
 from friso.hunting.motions import Motions, run_motions
-from friso.hunting.outward import Beyond, Outward
+from friso.hunting.outward import ALONG, BRACKET, PRECISE, Beyond, Outward
 from friso.hunting.verdict import STILL_SWINGS, WORK, judge_many, judge_runs, own_motion
 from friso.stage import Stage
 from friso.studies.boundary_lines import REPELS, UNKNOWN, place_verdicts
@@ -298,6 +299,29 @@ def test_an_orbit_that_is_lost_while_it_attracts_well_is_certain_to_a_thousandth
     assert end.outside == pytest.approx(1.01 * end.inside)
     if end.certain:
         assert end.reserve == pytest.approx(1e-3, rel=0.01)
+
+
+@pytest.mark.parametrize(("number", "series", "at"), [(30, "axes", 0.1), (42, "stages", 2.0)])
+def test_an_end_that_no_orbit_can_be_followed_to_is_certain_between_two_bandwidths(
+    number: int, series: str, at: float
+) -> None:
+    """One orbit is lost at its limiter, of a multiplier near -1; beyond the other irregular swings last a little
+    farther. Refuted by none of the starts of `benchmarks.truth --seed 2901`."""
+    flat = draw(2901, number, series).flat()
+    outward, place = Outward(flat, 10.0), np.array([at])
+    observed = outward.surveyed(place, cycles=False).motions
+    motions = outward.surveyed_at_once(place, np.outer([m.distance for m in observed], ALONG).ravel()).motions
+    end = outward.end(at, motions, 1.12 * at)
+    assert end.certain
+    assert PRECISE < end.reserve <= BRACKET
+    assert end.outside == pytest.approx(end.inside * (1 + end.reserve))
+    inside, outside = (
+        attractors(outward._stages(np.array([factor])), thorough=True)
+        for factor in (0.995 * end.inside, 1.002 * end.outside)
+    )
+    assert inside.attracts[0]
+    assert outside.decided[0]
+    assert not outside.attracts[0]
 
 
 WINDOWED = Stage(

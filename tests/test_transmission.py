@@ -321,13 +321,15 @@ def test_a_backlash_that_hunts_without_friction_feeds_it(backlash_alone: Stage, 
     wording(" ".join(feeding_sentences(result)))
 
 
-def test_what_feeds_it_is_computed(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A belt with play and little friction: without friction it swings on, without play it rests."""
-    monkeypatch.setattr(hunting_feeding, "SHARES", np.array([0.001]))
+@pytest.mark.parametrize(("share", "certain"), [(0.01, True), (0.001, False)])
+def test_what_feeds_it_is_computed(share: float, certain: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A belt with play and little friction: without friction it swings on, with less play it rests, unless that is so
+    little that swings may be smaller than is looked for."""
+    monkeypatch.setattr(hunting_feeding, "SHARES", np.array([share]))
     keys = {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2}
     little = {**LUGRE, "static": "3 N", "coulomb": "2 N"}
     result = feeding(machine(transmission=BELT, friction=little, motor_friction=None, controller=keys))
-    assert result == Feeding(Decline(0.001, None, True), Decline(1.0, 0.001, True))
+    assert result == Feeding(Decline(share, None, True), Decline(1.0, share, certain))
 
 
 def test_what_feeds_it_is_told(wording: Wording) -> None:

@@ -199,10 +199,10 @@ def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
     benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
     swings = _swings(benches[0], seed)
     beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], edge**-0.5) if edge * factor < 1]
-    for factor in (factor for factor in beyond if factor > nearest):
+    for factor in (nearest * factor for factor in beyond):
         bench = Bench(at(claim, edge * factor))
         trial = bench.starts(*FEW, seed)
-        if factor <= JUST and len(swings):
+        if factor <= nearest * JUST and len(swings):
             trial = trial.and_more(swings, "just below the edge, by")
         if why := swinging(bench, trial):
             place = f"at {factor:.4g} times the edge{_crossover(bench.flat)}"

@@ -16,6 +16,7 @@ import numpy as np
 from friso.equations.structure import structure
 from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.loop import unstable
 from friso.stage import Stage
 from friso.stage.stage import declared_keys
@@ -82,12 +83,13 @@ def dry_friction(flat: Mapping[str, Any]) -> tuple[str, ...]:
 def _decline(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Decline:
     """What becomes of hunting with some keys at all shares."""
     scaled = {**flat, **{key: flat[key] * SHARES for key in keys}}
-    survey = attractors(Ensemble.held(scaled, len(SHARES), form=structure(flat)))
+    stages = Ensemble.held(scaled, len(SHARES), form=structure(flat))
+    survey = attractors(stages)
     attracts = survey.attracts
     gone = np.flatnonzero(~attracts)
     first = int(gone[0]) if gone.size else len(SHARES)
     return Decline(
         lasts=float(SHARES[first - 1]) if first else 1.0,
         gone=float(SHARES[first]) if gone.size else None,
-        certain=bool(survey.decided[: first + 1].all()),
+        certain=bool(surely_surveyed(stages, survey)[: first + 1].all()),
     )

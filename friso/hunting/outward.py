@@ -72,6 +72,10 @@ ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 
 AHEAD = np.array([0.04, 0.1, 0.2, 0.4, 0.7, 1.0, 2.0, 4.0])
 """Where it is looked for the end of what could not be followed to it, in units of the scale."""
 
+BRACKET = 0.02
+"""Widest share of a bandwidth between a proved attractor and the first bandwidth at which nothing attracts, for an edge
+that no orbit was followed to."""
+
 FINER = 4
 """Bandwidths between the two that enclose the end at which is simulated where no orbit can be followed."""
 
@@ -80,8 +84,9 @@ FINER = 4
 class AttractionEnd:
     """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
     orbit was followed to its end at `inside`, and simulations at `outside` all settled; or where it was lost at
-    `inside`, while it attracted well, and simulations about it at factors in between all settled as well. That end is
-    known up to a share of it, the `reserve`: of an orbit that was lost to the first of these."""
+    `inside`, while it attracted well, and simulations about it at factors in between all settled as well; or where both
+    are close together and something was proved to attract at `inside`. That end is known up to a share of it, the
+    `reserve`: of an orbit that was lost to the first of these, or as far as `outside`."""
 
     inside: float
     outside: float
@@ -91,12 +96,13 @@ class AttractionEnd:
 
 @dataclass
 class _Place:
-    """What is known on the way to an end: motions that attract at a factor, `at`, and the one `outside` at which
-    nothing does."""
+    """What is known on the way to an end: motions that attract at a factor, `at`; the one `outside` at which nothing
+    does; and the last one up to which an orbit was followed that attracts, `proved`."""
 
     at: float
     motions: tuple[Swinging, ...]
     outside: float
+    proved: float | None = None
 
 
 @dataclass(frozen=True)
@@ -153,7 +159,8 @@ class Outward:
             orbit = next((motion for motion in place.motions if motion.cycles is not None), None)
             if orbit is None:
                 place.at, place.motions, place.outside = self._simulated(at, place.motions, outside)
-                if place.outside / place.at < beyond and place.at / place.outside < beyond:
+                closed = any(motion.cycles is not None for motion in place.motions)
+                if not closed and max(place.outside / place.at, place.at / place.outside) < beyond:
                     break
                 continue
             flip = self._flip(at, self._still_ahead(at, outside)) if self._chatters and _is_simple(orbit) else None
@@ -161,35 +168,36 @@ class Outward:
                 (place.at, reserve), distance, end = flip, orbit.distance, FOUND
             else:
                 place.at, distance, end, reserve = self.followed(at, orbit)
-            at = place.at
+            place.proved = at = place.at
             next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
-            suggested = self._suggested(at, next_to, reserve)
+            suggested = self._suggested(self._towards(at, next_to, reserve))
             starts = np.append(ALONG * distance, suggested.held[-1])
             survey = self.surveyed(np.array([next_to]), starts, suggested=suggested.of(np.array([-1])))
             if survey.attracts[0]:
                 place.at, place.motions = next_to, survey.motions
                 continue
-            mapped = {FOUND: suggested.like(orbit), LOST: False, UNCLEAR: True}[end]
+            mapped = False if end == LOST else suggested.like(orbit)
             closer, decided = self._between(suggested, ALONG * distance, mapped)
             if closer is None:
                 window, quiet = self.window_beyond(at)
                 if window is not None:
                     place.at, place.motions = window
                     continue
-                if end == LOST:
-                    reserve = max(reserve, abs(float(suggested.factors[0]) / at - 1))
-                certain = end != UNCLEAR and decided and bool(survey.decided[0]) and quiet
-                inside = at if certain or end == LOST else at * (1 + reserve) ** -self._ahead(at)
-                return AttractionEnd(inside, next_to, certain, reserve)
+                if end != FOUND:
+                    reserve = max(reserve, _apart(float(suggested.factors[0 if end == LOST else -1]), at))
+                return AttractionEnd(at, next_to, decided and bool(survey.decided[0]) and quiet, reserve)
             (place.at, place.motions), place.outside = closer, next_to
-        return self._quiet_from(place.at, place.motions)
+        return self._quiet_from(place)
 
-    def _suggested(self, at: float, next_to: float, reserve: float) -> _Suggested:
-        """What the return maps suggest from the end of an orbit, known up to a share of it, to a factor next to it."""
+    def _towards(self, at: float, next_to: float, reserve: float) -> np.ndarray:
+        """Factors from the end of an orbit, known up to a share of it, to the one next to it."""
         factors = np.append(at * (next_to / at) ** BETWEEN, next_to)
-        factors = factors[np.abs(np.log(factors / at)) > reserve]
+        return factors[np.abs(np.log(factors / at)) > reserve]
+
+    def _suggested(self, factors: np.ndarray) -> _Suggested:
+        """What the return maps suggest at some factors."""
         stages = self._stages(factors)
         cycles = families(stages)
         motions = [m for family in cycles for m in of_cycles(np.arange(factors.size), family, stages.sticking)]
@@ -239,16 +247,42 @@ class Outward:
             decided[number] = proved.decided[0]
         return None, bool(decided.all())
 
-    def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
-        """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""
-        factors = at * np.exp(self._ahead(at) * SCALE * AHEAD)
-        factors = factors[self._ahead(at) * (self.farthest - factors) >= 0]
-        distances = np.outer([motion.distance for motion in motions], ALONG).ravel()
-        attracts = self.surveyed(factors, distances).attracts if factors.size else np.ones(0, bool)
-        last = int(np.flatnonzero(attracts)[-1]) if attracts.any() else -1
-        if last + 1 >= len(factors):
+    def _quiet_from(self, place: _Place) -> AttractionEnd:
+        """The first of a few factors ahead of a place from which on nothing was found to attract, by simulations alone
+        and by all that the return maps suggest there; certain where that is close to what is proved to attract."""
+        at, ahead = place.at, self._ahead(place.at)
+        factors = at * np.exp(ahead * SCALE * AHEAD)
+        factors = factors[ahead * (self.farthest - factors) >= 0]
+        distances = np.outer([motion.distance for motion in place.motions], ALONG).ravel()
+        if not factors.size:
             raise Beyond
-        return AttractionEnd(at if last < 0 else float(factors[last]), float(factors[last + 1]), False)
+        survey = self.surveyed(factors, distances)
+        attracts, decided = survey.attracts, survey.decided
+        for number in range(int(np.flatnonzero(np.append(True, attracts))[-1]), len(factors)):
+            outside = factors[number : number + 1]
+            suggested = self._suggested(outside)
+            confirmed = self.surveyed(
+                outside, np.append(distances, suggested.held[0]), suggested=suggested.of(np.zeros(1, np.int64))
+            )
+            if not confirmed.attracts[0]:
+                break
+        else:
+            raise Beyond
+        inside = float(factors[number - 1]) if number else at
+        end = AttractionEnd(inside, float(outside[0]), False)
+        sure = bool(confirmed.decided[0] and decided[number:].all())
+        return self._proved(end, place.proved, distances) if sure else end
+
+    def _proved(self, end: AttractionEnd, proved: float | None, distances: np.ndarray) -> AttractionEnd:
+        """An end that simulations tell, certain if it is close to an orbit that was followed, at a factor, or to what a
+        thorough survey, from distances [m] as well, shows to attract."""
+        if proved is None or _apart(end.outside, proved) > BRACKET:
+            proved = end.inside
+            survey = attractors(self._stages(np.array([proved])), thorough=True, distances=distances[None, :])
+            if not (survey.attracts[0] and survey.decided[0]):
+                return end
+        apart = _apart(end.outside, proved)
+        return AttractionEnd(proved, end.outside, True, apart) if apart <= BRACKET else end
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def surveyed(
@@ -383,6 +417,11 @@ class Outward:
         if ahead * (beyond - self.farthest) > 0:
             raise Beyond
         return float(factors[last]), survey.take(attract[-1:]).motions, beyond
+
+
+def _apart(factor: float, other: float) -> float:
+    """By what share of the other a factor differs from it."""
+    return abs(factor / other - 1)
 
 
 def _excess(cycles: Cycles) -> np.ndarray:

@@ -35,4 +35,8 @@ def _course(name: str, decline: Decline) -> str:
 
 def _doubt(*declines: Decline) -> list[str]:
     certain = all(decline.certain for decline in declines)
-    return [] if certain else ["That is not certain: some simulations had to be given up."]
+    return (
+        []
+        if certain
+        else ["That is not certain: some simulations were given up, or do not show all swings that may last."]
+    )
