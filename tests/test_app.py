@@ -41,7 +41,7 @@ from friso.app.serve import Server, listening
 from friso.app.server import application
 from friso.app.work import Work, Workshop
 from friso.axis import LINEAR
-from friso.engine.overtaken import Overtaken, ended_by, go_on
+from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first, is_first
 from friso.errors import InputError, LogError
 from friso.identification.logs.mapping import sidecar
 from friso.studies.execute import local_crew
@@ -451,10 +451,12 @@ def test_a_key_added_on_the_page_can_be_taken_away_again() -> None:
 
 
 def test_a_run_is_that_of_friso(served: Served) -> None:
-    part = served.ask("run", STICK_SLIP)[-1]
+    """The picture comes before it is measured for its sentence."""
+    part, words = (part for part in served.ask("run", STICK_SLIP) if part["kind"] != "message")
     answer = friso.simulate(STICK_SLIP)
-    assert part["sentences"] == [*answer.sentences()]
-    assert part["command"] == "friso simulate lugre_stick_slip.toml"
+    assert (part["kind"], part["sentences"]) == ("partly", [])
+    assert words["sentences"] == [*answer.sentences()]
+    assert part["command"] == words["command"] == "friso simulate lugre_stick_slip.toml"
     lines = [trace for trace in part["figures"][0]["data"] if trace["name"] == "position"]
     assert lines[0]["y"].dtype == np.float32
     expected = drawable(answer.figures()[0]).panels[0].series[1].y
@@ -501,7 +503,8 @@ def test_a_map_stays_where_there_is_no_edge(served: Served) -> None:
 
 
 def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Last, for it takes as long again; `friso.boundary` itself takes too long here."""
+    """Last, for it takes as long again; `friso.boundary` itself takes too long here, and a coarse map is there before,
+    unless the edge is kept."""
     asked = []
 
     class Edge:
@@ -520,13 +523,27 @@ def test_a_boundary_has_the_pinned_one_s_behind_it(served: Served, monkeypatch: 
 
     monkeypatch.setattr(friso, "boundary", lambda stage, **_: Edge(stage))
     axes = {"x": "friction.coulomb=1 N..2 N", "y": "friction.static=6 N..12 N"}
-    for _ in range(2):
+    for pictures in (["map-verdict", "boundary", "boundary"], ["boundary", "boundary"]):
         parts = served.ask("boundary", STICK_SLIP, {"friction.static": "9 N"}, pinned=True, **axes)
-        first, last = (part["figures"][0]["data"] for part in parts if "figures" in part)
+        drawn = [part["figures"][0] for part in parts if "figures" in part]
+        assert [figure["name"] for figure in drawn] == pictures
+        first, last = (figure["data"] for figure in drawn[-2:])
         assert {trace.get("name") for trace in last} >= {"flip", "pinned", "this machine"}
         assert parts[-1]["notes"] == ["static friction of 9 N"]
         assert len(last) > len(first)
     assert len(asked) == 2  # both are kept
+
+
+def test_where_there_is_no_edge_the_coarse_map_stays(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(stage: friso.Stage, **_: Any) -> None:
+        raise InputError("controller", "no integral action", "a stage that can hunt")
+
+    monkeypatch.setattr(friso, "boundary", refused)
+    axes = {"x": "friction.coulomb=1 N..2 N", "y": "friction.static=6 N..13 N"}
+    first, last = (part for part in served.ask("boundary", STICK_SLIP, **axes) if "figures" in part)
+    assert (first["kind"], last["kind"]) == ("partly", "answer")
+    assert "no integral action" in last["sentences"][0]
+    assert [figure["name"] for figure in last["figures"]] == ["map-verdict"]
 
 
 @pytest.mark.parametrize(
@@ -656,8 +673,8 @@ def test_an_answer_is_there_at_once_for_whoever_comes_back_with_what_was_noted()
 
 def test_an_unstable_loop_is_mentioned_while_its_answer_is_computed(served: Served) -> None:
     """Before that, whose sentences say it; the words of a slider do not, and have it as a note."""
-    first, *_, last = served.ask("check", RIG, UNSTABLE)
-    assert (first["kind"], first["lasts"]) == ("message", True)
+    *said, last = served.ask("check", RIG, UNSTABLE)
+    first = next(part for part in said if part.get("lasts"))  # a kernel may be compiled before
     assert "unstable while" in first["text"]
     assert "unstable while" in last["sentences"][0]
     assert last["notes"] == []
@@ -798,6 +815,48 @@ def test_work_that_is_overtaken_ends_at_the_next_batch_and_leaves_nothing() -> N
         with pytest.raises(Overtaken):
             go_on()
     assert np.array_equal(friso.simulate(STICK_SLIP)["position"].values, before)
+
+
+def test_all_other_work_waits_at_its_next_batch_while_something_goes_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its own threads do not, and nobody waits for what takes long."""
+    monkeypatch.setattr("friso.engine.overtaken.AHEAD", 60.0)
+    order = []
+
+    def other() -> None:
+        begun.set()
+        go_on()
+        order.append("other")
+
+    begun = threading.Event()
+    with going_first(), local_crew() as crew:
+        thread = threading.Thread(target=other)
+        thread.start()
+        begun.wait(60)
+        crew.executor.submit(go_on).result(10)
+        go_on()
+        order.append("first")
+    thread.join()
+    assert order == ["first", "other"]
+    monkeypatch.setattr("friso.engine.overtaken.AHEAD", 0.0)
+    with going_first():
+        thread = threading.Thread(target=other)
+        thread.start()
+        thread.join()
+    assert order == ["first", "other", "other"]
+
+
+def test_a_question_goes_first_until_its_picture_is_there() -> None:
+    """What it computes after that waits for the picture of another one, as all work does."""
+    firsts: list[bool] = []
+
+    def job(_: Work) -> Iterator[dict[str, Any]]:
+        for kind in ("partly", "answer"):
+            firsts.append(is_first())
+            yield {"kind": kind}
+
+    for first in (True, False):
+        Work(lambda _: None, first=first).run(job)
+    assert firsts == [True, False, False, False]
 
 
 def test_a_sweep_whose_blocks_are_in_flight_is_overtaken() -> None:

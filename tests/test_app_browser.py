@@ -335,6 +335,29 @@ def test_arrows_home_and_end_lead_along_the_tabs_of_which_tab_reaches_one(browse
     assert stops == [names[1]]
 
 
+def test_machines_are_closed_by_keys_and_the_last_one_stays(browsed: Browsed) -> None:
+    """The tabs own nothing but tabs, with which axe and screen readers agree; the one that follows has the focus."""
+    page = browsed.page
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    assert page.is_disabled("#close")
+    for name in ("second.toml", "third.toml"):
+        page.evaluate(
+            "async ([name, text]) => (await import('/state.js')).add(name, text)", [name, RIG.read_text("utf-8")]
+        )
+    assert page.eval_on_selector_all("#machines > *", "all => all.map(one => one.role)") == ["tab"] * 3
+    page.wait_for_selector("#keys h2")
+    violations = axe.run(page).response["violations"]
+    assert [(item["id"], [node["html"] for node in item["nodes"]]) for item in violations] == []
+    page.focus("#machine-1")
+    page.keyboard.press("Delete")
+    assert page.inner_text("#machines").split() == ["thesis_rig", "third"]
+    page.focus("#close")
+    page.keyboard.press("Enter")
+    assert page.evaluate("document.activeElement.textContent") == "thesis_rig"
+    page.keyboard.press("Delete")
+    assert page.locator("#machines [role=tab]").count() == 1
+
+
 def test_an_earlier_answer_leads_back_to_its_machine(browsed: Browsed) -> None:
     """With the keys of that time and no others, and in its tab."""
     page = browsed.page
@@ -373,7 +396,7 @@ def test_what_was_typed_for_one_machine_is_not_set_in_another(browsed: Browsed, 
     page.wait_for_function(f"() => document.querySelector('{FIELD}').value.startsWith('15')")
     page.keyboard.press("Enter")
     assert browsed.changes() == {}
-    page.click("[aria-label='Close another.toml']")
+    page.click("#close")
     page.wait_for_function(f"() => document.querySelector('{FIELD}').value === '8 Hz'")
     assert browsed.changes() == {}
 

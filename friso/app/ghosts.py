@@ -56,8 +56,8 @@ def with_places(figure: Figure, stands: Sequence[tuple[str, Stage]], keys: Seque
     for label, stage in stands:
         right, up = (stage.flat().get(key) for key in keys)
         if isinstance(right, float) and isinstance(up, float):
-            style = (GREY, "cross") if label == "pinned" else (INK, "target")
-            markers.append(Markers(np.array([right]), np.array([up]), label, *style))
+            colour = GREY if label == "pinned" else INK
+            markers.append(Markers(np.array([right]), np.array([up]), label, colour, "target"))
     panels = tuple(replace(panel, markers=(*panel.markers, *markers)) for panel in figure.panels)
     return replace(figure, panels=panels)
 

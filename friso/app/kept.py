@@ -30,7 +30,7 @@ class KeptAnswers:
     ) -> Any:
         """The answer of a function about a machine: the one that is kept, whose notes the work has then, too, or a new
         one. Raises whatever the function raises."""
-        place = machine, json.dumps(options or {}, sort_keys=True)
+        place = _place(machine, options)
         with self._turn:
             kept = self._kept.setdefault(function, OrderedDict())
             if there := kept.get(place):
@@ -44,3 +44,14 @@ class KeptAnswers:
             while len(kept) > MOST:
                 kept.popitem(last=False)
         return answer
+
+    def holds(
+        self, function: Callable[..., Answer], machine: Machine, options: Mapping[str, Any] | None = None
+    ) -> bool:
+        """Whether the answer of a function about a machine is kept."""
+        with self._turn:
+            return _place(machine, options) in self._kept.get(function, ())
+
+
+def _place(machine: Machine, options: Mapping[str, Any] | None) -> tuple[Machine, str]:
+    return machine, json.dumps(options or {}, sort_keys=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -98,10 +98,12 @@ def machine(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 
 def run(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """What the run does."""
+    """What the run does: the figure, and then the sentence, for which it is measured."""
     asked.chosen()
     ghosts = _ghosts(asked, work, friso.simulate)
-    yield parts_of(friso.simulate(asked.machine.stage), ghosts, **_lines("simulate", asked))
+    answer, lines = friso.simulate(asked.machine.stage), _lines("simulate", asked)
+    yield {**figures_of(answer, ghosts), **lines, "kind": "partly"}
+    yield {**words_of(answer), **lines}
 
 
 def cell(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
@@ -187,7 +189,6 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     axes = {name: str(options.get(name, "")) for name in ("x", "y")}
     keys = {name: text.partition("=")[0].strip() for name, text in axes.items()}
     shown = {"metric": options.get("metric", "outcome"), "log": options.get("log", False)}
-    stands = _stands(asked)
 
     def ranges(count: int) -> dict[str, Any]:
         return {name: f"{text}:{count}" for name, text in axes.items()}
@@ -197,8 +198,7 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
     def part(answer: SweepAnswer, count: int, edge: Answer | None = None) -> AnswerPart:
         def drawn(figure: Figure) -> Figure:
-            said = replace(figure, note="")  # the sentences below it say the same
-            return with_edge(with_places(said, stands, [*keys.values()]), edge)
+            return with_edge(_on_map(figure, asked, [*keys.values()]), edge)
 
         places = {name: answer.data[key].values.tolist() for name, key in keys.items()}
         more = {"axes": keys, "places": places, **_lines("map", asked, {**ranges(count), **shown}, "sweep")}
@@ -220,12 +220,31 @@ def map_study(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     yield whole
 
 
+def _on_map(figure: Figure, asked: PageRequest, keys: Sequence[str]) -> Figure:
+    """The figure of a map over two keys as the page shows it: with the places of the machines, and without its note,
+    for the sentences below it say the same."""
+    return with_places(replace(figure, note=""), _stands(asked), keys)
+
+
 def boundary(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """Where hunting ends, over one key or in the plane of two."""
+    """Where hunting ends, over one key or in the plane of two; there a coarse map of verdicts comes first, for to
+    follow the edge may take minutes, and stays where there is none."""
     options = asked.chosen(*OPTIONS["boundary"])
     keys = [str(options[name]).partition("=")[0].strip() for name in ("x", "y") if name in options]
-    lines = _lines("boundary", asked, options)
-    answer = KEPT.answer(friso.boundary, asked.machine, work, options)
+    lines, rough = _lines("boundary", asked, options), None
+    if len(keys) == 2 and not KEPT.holds(friso.boundary, asked.machine, options):
+        ranges = {name: f"{options[name]}:{COARSE_TO_FINE[0]}" for name in ("x", "y")}
+        coarse = {**ranges, "log": options.get("log", False), "metric": "verdict"}
+        verdicts = KEPT.answer(friso.sweep, asked.machine, work, coarse)
+        rough = {**parts_of(verdicts, lambda figure: _on_map(figure, asked, keys)), **lines}
+        yield {**rough, "kind": "partly"}
+    try:
+        answer = KEPT.answer(friso.boundary, asked.machine, work, options)
+    except InputError as error:  # such as a stage that cannot hunt
+        if rough is None:
+            raise
+        yield {**rough, "sentences": [str(error)]}
+        return
 
     def part(ghosts: Callable[[Figure], Figure]) -> AnswerPart:
         def drawn(figure: Figure) -> Figure:
@@ -348,6 +367,9 @@ QUESTIONS: Mapping[str, Callable[[PageRequest, Work], Iterator[AnswerPart]]] = {
 
 QUICK = frozenset({"machine"})
 """The questions that compute nothing."""
+
+PICTURES = frozenset({"run", "cell", "loops", "bode", "flexure", "map"})
+"""The questions whose first part is a picture that somebody waits for, and soon there: all others wait for it."""
 
 
 def _answered(function: Callable[..., Answer], command: str) -> Callable[[PageRequest, Work], Answer]:

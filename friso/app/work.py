@@ -8,7 +8,7 @@ import time
 import traceback
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from contextvars import ContextVar, copy_context
 from dataclasses import dataclass, field
 from typing import Any
@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from friso.app.frames import frame
-from friso.engine.overtaken import Overtaken, ended_by, go_on
+from friso.engine.overtaken import Overtaken, ended_by, go_on, going_first
 from friso.errors import InputError
 
 Job = Callable[["Work"], Iterator[dict[str, Any]]]
@@ -35,6 +35,8 @@ class Work:
 
     put: Callable[[dict[str, Any] | None], object]
     number: int = 0
+    first: bool = False
+    """Whether all other work waits until the first part of its answer is there."""
     flag: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     last: float = 0.0
     notes: list[str] = field(default_factory=list)
@@ -54,14 +56,20 @@ class Work:
             self.last = now
             self.put({"kind": "progress", "done": done, "total": total, "label": label})
 
+    def _put_part(self, part: dict[str, Any]) -> None:
+        self.put({**part, "notes": [*dict.fromkeys(self.notes)]})
+
     def run(self, job: Job) -> None:
         """Do the job, in this thread, and put what comes of it; None is put last."""
         token = _AT_WORK.set(self)
         try:
             with ended_by(self.flag):
                 go_on()
-                for part in job(self):
-                    self.put({**part, "notes": [*dict.fromkeys(self.notes)]})
+                parts = job(self)
+                with going_first() if self.first else nullcontext():
+                    self._put_part(next(parts))
+                for part in parts:
+                    self._put_part(part)
         except Overtaken:
             self.put({"kind": "overtaken"})
         except InputError as error:
@@ -108,16 +116,18 @@ class Workshop:
         self.quick = ThreadPoolExecutor(2, thread_name_prefix="friso-app-quick")
         self.lanes: dict[tuple[str, str], Work] = {}
 
-    async def answer(self, page: str, lane: str, number: int, job: Job, quick: bool = False) -> AsyncIterator[bytes]:
+    async def answer(
+        self, page: str, lane: str, number: int, job: Job, quick: bool = False, first: bool = False
+    ) -> AsyncIterator[bytes]:
         """The frames of an answer, as they come. Whoever stops reading ends the work. A `quick` question computes
-        nothing, and does not wait for those that do."""
+        nothing, and does not wait for those that do; these wait for the first part of one that goes `first`."""
         loop, parts = asyncio.get_running_loop(), asyncio.Queue[dict[str, Any] | None]()
 
         def put(part: dict[str, Any] | None) -> None:
             if not loop.is_closed():
                 loop.call_soon_threadsafe(parts.put_nowait, part)
 
-        work, place = Work(put, number), (page, lane)
+        work, place = Work(put, number, first), (page, lane)
         if before := self.lanes.get(place):
             if before.number > number:
                 yield frame({"kind": "overtaken"})

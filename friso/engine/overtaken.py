@@ -1,4 +1,5 @@
-"""Work that nobody waits for any more ends: whoever asks for it has a flag, which another thread sets.
+"""Work that nobody waits for any more ends: whoever asks for it has a flag, which another thread sets. And work that
+takes long waits while something is computed at which somebody looks.
 
 What runs when the flag is set is incomplete; so nothing is made of it, and nothing kept: `Overtaken` is raised at the
 next batch of runs, through everything that handles errors.
@@ -6,9 +7,11 @@ next batch of runs, through everything that handles errors.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from threading import Condition
 
 import numpy as np
 
@@ -37,7 +40,44 @@ def ended_by(flag: np.ndarray) -> Iterator[None]:
 
 
 def go_on() -> None:
-    """Raises Overtaken once the flag is set."""
+    """Give way to what goes first. Raises Overtaken once the flag is set."""
+    if _ahead and not is_first():
+        _give_way()
     flag = _FLAG.get()
     if flag is not None and flag[0]:
         raise Overtaken
+
+
+AHEAD = 0.5
+"""How long [s] something goes first at most: what takes longer, somebody has ceased to look at, and a kernel that has
+to be compiled for it keeps nobody else waiting."""
+
+_FIRST: ContextVar[bool] = ContextVar("first", default=False)
+_ahead: dict[object, float] = {}
+_turn = Condition()
+
+
+@contextmanager
+def going_first() -> Iterator[None]:
+    """Let what is computed within go first: all other work of this process waits at its next batch of runs."""
+    token, own = _FIRST.set(True), object()
+    with _turn:
+        _ahead[own] = time.monotonic() + AHEAD
+    try:
+        yield
+    finally:
+        _FIRST.reset(token)
+        with _turn:
+            del _ahead[own]
+            _turn.notify_all()
+
+
+def is_first() -> bool:
+    """Whether what runs now goes first."""
+    return _FIRST.get()
+
+
+def _give_way() -> None:
+    with _turn:
+        while _ahead and (left := max(_ahead.values()) - time.monotonic()) > 0:
+            _turn.wait(left)

@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
+from contextvars import copy_context
 from dataclasses import dataclass, field
-from typing import Any, Self
+from functools import partial
+from typing import Any, Self, TypeVar
 
 import numpy as np
 
 from friso.engine.overtaken import go_on
 from friso.studies.cells import Columns, run_cells
 from friso.studies.study import CellBlock, Study
+
+_T = TypeVar("_T")
 
 LARGEST_BLOCK = 2048
 """Cells of a block in memory: enough that all lanes are busy nearly to its end."""
@@ -99,6 +103,14 @@ class Crew:
             return self.executor.submit(self.task, *arguments, **self.arguments)
 
 
+class _Threads(ThreadPoolExecutor):
+    """Threads for which holds what holds for whoever asks: whether anybody waits, and whether that goes first."""
+
+    def submit(self, fn: Callable[..., _T], /, *args: Any, **kwargs: Any) -> Future[_T]:
+        """As any executor does."""
+        return super().submit(partial(copy_context().run, fn, *args, **kwargs))
+
+
 def local_crew(threads: int | None = None) -> Crew:
     """The threads of this process, by default one per processor; all of them work on one block.
 
@@ -106,7 +118,7 @@ def local_crew(threads: int | None = None) -> Crew:
     """
     stop = np.zeros(1, np.int64)
     arguments = {"threads": threads, "cancel": stop}
-    return Crew(ThreadPoolExecutor(2, thread_name_prefix="friso"), size=1, shares=1, arguments=arguments, cancel=stop)
+    return Crew(_Threads(2, thread_name_prefix="friso"), size=1, shares=1, arguments=arguments, cancel=stop)
 
 
 def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:

@@ -7,10 +7,9 @@ import { out, save } from "./out.js";
 import { Pictures } from "./pictures.js";
 import * as machines from "./state.js";
 import { tour } from "./tour.js";
-import { ask, end, first, Live, onReach } from "./wire.js";
+import { ask, end, first, Live, OLD_AFTER, onReach } from "./wire.js";
 
 const CHECKED_AFTER = 500;
-const OLD_AFTER = 300;
 let shown = null; // the machine as the server describes it
 let chosen = "controller";
 let wrong = null;
@@ -204,19 +203,20 @@ function choose(part) {
 function bar() {
   const { state } = machines;
   const current = machines.current();
-  const buttons = state.machines.flatMap((machine, k) =>
-    [
-      el("button", { type: "button", role: "tab", id: `machine-${k}`, "aria-selected": String(k === state.shown), "aria-controls": "left", onclick: () => machines.show(k) }, machine.name.replace(/\.toml$/, "")),
-      state.machines.length > 1 ? el("button", { type: "button", class: "close", role: "tab", id: `close-${k}`, "aria-selected": "false", "aria-label": `Close ${machine.name}`, title: "Close", onclick: () => machines.close(k) }, "×") : null,
-    ].filter(Boolean),
+  const buttons = state.machines.map((machine, k) =>
+    el("button", { type: "button", role: "tab", id: `machine-${k}`, "aria-selected": String(k === state.shown), "aria-controls": "left", onclick: () => machines.show(k), onkeydown: (event) => event.key === "Delete" && close(k) }, machine.name.replace(/\.toml$/, "")),
   );
   tabs($("machines"), buttons);
+  if (current) $("left").setAttribute("aria-labelledby", `machine-${state.shown}`);
+  $("close").disabled = state.machines.length < 2;
   $("undo").disabled = !current || current.step === 0;
   $("redo").disabled = !current || current.step === current.steps.length - 1;
   $("pin").setAttribute("aria-pressed", String(Boolean(state.pinned)));
   $("pin").textContent = state.pinned ? "Unpin" : "Pin";
 }
 
+/** The last machine stays. */
+const close = (number) => machines.state.machines.length > 1 && machines.close(number);
 const undo = () => machines.go(machines.current().step - 1);
 const redo = () => machines.go(machines.current().step + 1);
 
@@ -241,6 +241,10 @@ function wire() {
   $("redo").addEventListener("click", redo);
   $("pin").addEventListener("click", () => machines.pin());
   $("open").addEventListener("click", () => $("file").click());
+  $("close").addEventListener("click", () => {
+    close(machines.state.shown);
+    $(`machine-${machines.state.shown}`).focus();
+  });
   $("file").addEventListener("change", () => opened([...$("file").files]));
   $("tour").addEventListener("click", () => tour());
   $("out").addEventListener("click", () => out({ machine: { name: machines.current().name, toml: shown.toml }, answer: given.get(pictures.shown) ?? given.get("check"), link: machines.link, files: report }));

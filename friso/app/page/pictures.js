@@ -5,7 +5,7 @@ import { Beside } from "./beside.js";
 import { Logs } from "./logs.js";
 import { clear, draw, stale } from "./plot.js";
 import { Remedies } from "./remedies.js";
-import { ask, Live } from "./wire.js";
+import { ask, Live, OLD_AFTER } from "./wire.js";
 import { paragraphs, table } from "./tables.js";
 
 const AT_REST = 250;
@@ -34,7 +34,7 @@ export class Pictures {
   follows(question) {
     return new Live(question, "picture", 3000, (answer, then) => {
       this.arrived(answer);
-      if (answer.kind !== "message") this.goOn(then);
+      if (answer.kind !== "message" && answer.kind !== "partly") this.goOn(then);
     });
   }
 
@@ -160,9 +160,15 @@ export class Pictures {
     if (answer.kind !== "partly") this.tell.progress(null);
     this.answer = answer;
     if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) });
+    clearTimeout(this.aging);
+    if (answer.kind === "partly" && !answer.sentences.length) { // its words follow
+      this.aging = setTimeout(() => this.below.querySelectorAll(".note").forEach((item) => item.classList.add("stale")), OLD_AFTER);
+      return this.tell.shown(answer, this.shown);
+    }
     const words = this.shown === "check" ? [] : answer.sentences;
     const drawn = (answer.drawings ?? []).map((item) => this.drawn(item));
-    this.below.replaceChildren(...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
+    const working = answer.kind === "partly" ? [el("progress", { "aria-label": "Progress" })] : [];
+    this.below.replaceChildren(...working, ...paragraphs([...words, ...answer.notes]), ...drawn, ...(this.shown === "run" ? [] : answer.tables.map(table)), ...paragraphs(answer.details));
     this.tell.shown(answer, this.shown);
   }
 

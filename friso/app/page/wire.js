@@ -1,6 +1,9 @@
 // Questions to the server. A newer question on a lane overtakes the one before it; answers come in frames, see frames.py.
 import { token } from "./dom.js";
 
+/** How long [ms] what is of an earlier machine is shown as if it were of the one that is there: what is newer mostly comes before. */
+export const OLD_AFTER = 300;
+
 const page = token();
 const lanes = new Map();
 let asked = 0;
@@ -162,7 +165,7 @@ export class Live {
     this.next = null;
     this.busy = true;
     const begun = (this.begun = performance.now());
-    const answer = await ask(this.question, body, this.lane, (part) => part.kind === "message" && this.done(part, tag));
+    const answer = await ask(this.question, body, this.lane, (part) => (part.kind === "message" || part.kind === "partly") && this.done(part, tag));
     if (begun !== this.begun) return;
     this.busy = false;
     if (answer) this.done(answer, tag);

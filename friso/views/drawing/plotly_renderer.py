@@ -73,7 +73,8 @@ def fragment(figure: Figure) -> str:
 
 def parts_of_both(figure: Figure) -> dict[str, Any]:
     """`parts`, and beside them what is otherwise on a narrow screen: the layout, and the places of the colour bars."""
-    return _on_both(parts(figure), narrow_parts(figure))
+    prepared = drawable(figure)
+    return _on_both(_laid_out(prepared, WIDE), _laid_out(replace(prepared, columns=1), NARROW))
 
 
 def _on_both(wide: dict[str, Any], narrow: dict[str, Any]) -> dict[str, Any]:
@@ -118,7 +119,10 @@ def narrow_parts(figure: Figure) -> dict[str, Any]:
 def parts(figure: Figure, width: int = WIDE) -> dict[str, Any]:
     """What plotly draws, traces and layout, as plain dictionaries that hold NumPy arrays; not checked by plotly, which
     takes ten times as long as to make them. `width`: the least [px] that there is for the axes of all columns."""
-    prepared = drawable(figure)
+    return _laid_out(drawable(figure), width)
+
+
+def _laid_out(prepared: Figure, width: int) -> dict[str, Any]:
     plot = _plot_height(prepared, width)
     heads = [_Head.of(panel, width, prepared.columns) for panel in prepared.panels]
     header = max(head.height for head in heads)

@@ -25,16 +25,16 @@ def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
     bucket = np.zeros(len(x), int)
     bucket[starts[1:]] = 1
     bucket = np.cumsum(bucket)
-    kept = [np.array([0, len(x) - 1])]
+    kept = np.zeros(len(x), bool)
+    kept[[0, -1]] = True
     for values in (x, y):
         finite = np.isfinite(values)
         least = np.minimum.reduceat(np.where(finite, values, np.inf), starts)[bucket]
         greatest = np.maximum.reduceat(np.where(finite, values, -np.inf), starts)[bucket]
         for wanted in (finite & (values == least), finite & (values == greatest), ~finite):
             places = np.flatnonzero(wanted)
-            kept.append(places[np.unique(bucket[places], return_index=True)[1]])
-    chosen = np.unique(np.concatenate(kept))
-    return x[chosen], y[chosen]
+            kept[places[np.diff(bucket[places], prepend=-1) > 0]] = True
+    return x[kept], y[kept]
 
 
 def _starts(x: Array, y: Array, buckets: int) -> np.ndarray:

@@ -45,7 +45,7 @@ def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, f
     return Figure(
         name=f"map-{metric}",
         title=variable(metric),
-        caption=caption or "Every cell is one run.",
+        caption=caption or ("Every cell is one stage." if metric == "verdict" else "Every cell is one run."),
         panels=tuple(panels),
         columns=columns,
         subject=str(runs.attrs.get("name", "")),
