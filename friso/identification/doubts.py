@@ -68,8 +68,9 @@ def quality_of(log: Log, inverse: InverseModel, fit: OutputErrorFit, noise: floa
         doubts.append(f"A mass with friction leaves {percent(inverse.error, 3)} of the force unexplained: {why}")
     elif not rejected and plain.lacks_something:
         doubts.append(
-            f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times the noise of the record: the model "
-            f"lacks something, for which the intervals allow{''.join(f'; {cause.sentence}' for cause in reasons)}"
+            f"The fit leaves {left:.3g} {unit} unexplained, {plain.ratio:.3g} times what the noise of the record would "
+            f"leave: the model lacks something, for which the intervals allow"
+            f"{''.join(f'; {cause.sentence}' for cause in reasons)}"
         )
     doubts += [sentence for sentence in (little_friction(inverse, unit),) if sentence]
     differing = tuple(halves(inverse)) if plain.lacks_something else ()
