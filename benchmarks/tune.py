@@ -177,7 +177,7 @@ def findings() -> None:
     print_table(("joint", "stable [Hz]", "modulus margin of 0.5 [Hz]"), rows)
     size = of_key("motion.size", *SIZES)
     shares = np.linspace(0, 1, STEPS)
-    alone = Fleet({}, {}, np.ones(1), (), {}, 0)
+    alone = Fleet({}, {}, np.ones(1), (), {})
     columns = [size.at(shares)]
     for hertz, (_, stage) in product(CROSSOVERS, stages.items()):
         step = {"kind": "step", "size": "1 mm", "duration": "20 s"}

@@ -2,19 +2,22 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
-from refusals import Wording
+from refusals import Refused, Wording
 from scipy.optimize import brentq
 from variants import maxwell, release, van_dijk
 from variants import stage as variant
 
+import friso
 from friso import Stage, load, loads
 from friso.answers.tune import TuneAnswer
+from friso.app import questions
 from friso.cli.asking import show
 from friso.design_method.isolator import isolated
 from friso.engine.arrays import Results
@@ -40,21 +43,21 @@ from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
 from friso.remedies.least import change_costs, least_remedy
 from friso.remedies.machines import Fleet, draw_fleet
-from friso.remedies.method import Advice, tune
-from friso.remedies.relax import relaxations
+from friso.remedies.method import UNSEEN, Advice, _not_seen, tune
+from friso.remedies.relax import WIDER, _tolerances, relaxations
 from friso.remedies.search import Budget, Search, TriedPoints
 from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
 from friso.remedies.suggestion import suggestion
-from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
+from friso.remedies.trials import LOOSER, Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
 from friso.remedies.variables import BANDWIDTH, of_key
-from friso.remedies.verified import Performance, RemedyOutcome, performance_of, unmet_goals
+from friso.remedies.verified import ONE, Performance, RemedyOutcome, performance_of, unmet_goals
 from friso.remedies.window import HALVINGS, POINTS, windows
 from friso.stage.controllers import as_tuned, controller_of
 from friso.stage.correlations import Correlations
 from friso.views.check.isolator_words import isolator_sentence
 from friso.views.drawing import matplotlib_renderer
 from friso.views.tune.document import tune_document
-from friso.views.tune.figures import figures
+from friso.views.tune.figures import _sensitivity, drawn_stages, figures
 from friso.views.tune.gain_words import gain_lines
 from friso.views.tune.page import tune_files
 from friso.views.tune.sensitivity_words import ranked_sentences
@@ -64,6 +67,7 @@ from friso.views.tune.words import (
     _reasons,
     _without_friction,
     answer,
+    assumptions,
     changes,
     failing,
     price,
@@ -74,6 +78,7 @@ from friso.views.tune.words import (
 )
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
+AS_IS = partial(Remedy.settled_on, "")
 TINY = Budget(points=3, generations=2, refined=1, machines=4, surveyed=2, fresh=6)
 
 
@@ -529,6 +534,79 @@ def test_an_impossible_goal_says_what_to_relax(rigid: Stage, machines: Fleet) ->
     assert three.remedy is search.remedy
 
 
+def test_a_tolerance_is_relaxed_no_more_than_needed(rigid: Stage, machines: Fleet) -> None:
+    """The least of the factors tried with which nearly all machines settle in time."""
+    goal, remedy = Goal(settle=0.3, joint=False), remedies(rigid, Goal(joint=False))[0]
+    shares = np.linspace(0.3, 1.0, 12)[:, None]
+    factors = _tolerances(remedy, shares, goal, machines)
+    assert {1.5, 5.0, LOOSER} == {*factors}
+    for factor in WIDER:
+        moves = moves_of_points(remedy, shares, machines, replace(goal, within=factor * goal.within))
+        in_time = moves.slowest(goal.share) <= 0.3
+        assert in_time[factors == factor].all()
+        assert not in_time[factors > factor].any()
+    assert _tolerances(remedy, shares[:0], goal, machines).size == 0
+
+
+def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
+    """The stage as it is, is measured on the machines on which what works is."""
+    unseen = _not_seen(tuning.stage, Correlations(), TINY.fresh, tuning.seed + UNSEEN)
+    assert (tuning.present.moves.force == moves_of_points(AS_IS(tuning.stage), ONE, unseen, tuning.goal).force).all()
+    (works,) = tuning.working
+    assert works.measured is not None
+    assert works.stage is not None
+    on_the_same = moves_of_points(AS_IS(works.stage), ONE, unseen, tuning.goal)
+    assert np.array_equal(works.measured.moves.settling, on_the_same.settling)
+
+
+def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:
+    assert (_not_seen(rigid, Correlations(), 6, 1).travel < 1).all()
+
+
+DRIVE = {"sample_time": "1 ms", "delay": "3 ms", "current_bandwidth": "40 Hz .. 400 Hz"}
+
+
+def test_what_is_uncertain_of_the_drive_is_the_same_on_all_machines_and_says_so(rigid: Stage) -> None:
+    stage = rigid.replace({"drive": DRIVE, "friction.static": "20 N +/- 2 N"})
+    pair = Correlations(("friction.static", "drive.current_bandwidth"), np.array([[1.0, 0.3], [0.3, 1.0]]))
+    advice = tune(stage, Goal(joint=False), correlations=pair, budget=TINY, chosen=[])
+    assert advice.correlations is pair
+    assert any("drive.current_bandwidth" in line for line in assumptions(advice))
+
+
+def test_sensitivities_and_gains_are_those_behind_the_drive_as_built(tuning: Advice) -> None:
+    stage = tuning.stage.replace({"drive": {**DRIVE, "current_bandwidth": "200 Hz", "travel_per_turn": "10 mm"}})
+    advice = replace(tuning, as_built={"drive": stage.as_written()["drive"]})
+    lines = drawn_stages(advice)
+    panel = _sensitivity(advice, lines)
+    for (own, _, _), series in zip(lines, panel.series, strict=False):
+        alone = draw_fleet(own, Correlations(), 1, 1)
+        margin = modulus_margins(AS_IS(own), ONE, alone, stage)[0, 0]
+        assert 1 / np.nanmax(series.y) == pytest.approx(margin, rel=2e-3)
+    (gains,) = (line for line in gain_lines(advice) if "N*m/rad" in line)
+    assert "bandwidth" in gains
+
+
+def test_a_way_that_the_app_takes_over_keeps_the_machine_as_built(
+    tuning: Advice, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    advice = replace(tuning, as_built={"drive": {"sample_time": "1 ms", "delay": "3 ms"}})
+    monkeypatch.setattr(questions.KEPT, "answer", lambda *question: TuneAnswer(advice))
+    monkeypatch.setattr(questions, "_lines", lambda *question: {})
+    asked: Any = SimpleNamespace(chosen=lambda *names: {}, machine=None)
+    (part,) = questions.tune(asked, cast("Any", None))
+    for way, outcome in zip(part["ways"], advice.working, strict=True):
+        assert outcome.stage is not None
+        assert loads(way["toml"]) == advice.complete(outcome.stage)
+        assert "3 ms" in way["toml"]
+
+
+@pytest.mark.parametrize("margin", ["1.2", "0", "a half", "nan"])
+def test_a_margin_is_between_0_and_1(rigid: Stage, margin: str, refused: Refused) -> None:
+    with refused("margin"):
+        friso.tune(rigid, margin=margin)
+
+
 LIMITER = {"limiter_stiffness": "2e7 N/m", "limiter_damping": "100 N*s/m"}
 
 DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
@@ -539,7 +617,7 @@ def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
     columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
     columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2}
     points = TriedPoints(np.zeros((2, 1)), *(np.array(column) for column in columns.values()))
-    outcome: Any = SimpleNamespace()
+    outcome: Any = SimpleNamespace(cut=False)
     both, one = (next(_reasons(some, outcome, Goal())) for some in (points, points.take(np.array([1]))))
     assert "0.5" in both
     assert "0.5" not in one

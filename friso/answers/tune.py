@@ -7,6 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
+import numpy as np
+
 from friso.answers.answer import Answer, AnswerTable, question
 from friso.answers.inputs import (
     Changes,
@@ -22,7 +24,7 @@ from friso.answers.inputs import (
 )
 from friso.errors import InputError
 from friso.progress import Progress, silent
-from friso.quantities import Bound, Quantity, positive
+from friso.quantities import Bound, Quantity, positive, quoted
 from friso.remedies import Changeable
 from friso.remedies.goal import Goal
 from friso.stage import Stage
@@ -127,6 +129,7 @@ def tune(
     settle: float | str | None = None,
     force_limit: float | str | None = None,
     bandwidth_limit: float | str | None = None,
+    margin: float | str | None = None,
     only: Changeable | None = None,
     keep: Changeable | None = None,
     seed: Whole = 1,
@@ -147,6 +150,8 @@ def tune(
         Largest force of the actuator during the moves, "50 N" or a number [N].
     bandwidth_limit : str or float, optional
         Highest bandwidth that modes missing from the stage file allow, "25 Hz" or a number [Hz].
+    margin : float or str, optional
+        Least modulus margin of 95 % of the machines, between 0 and 1; 0.5 if not given.
     only, keep : str, optional
         The part to change alone, and the part to leave unchanged: "controller" or "joint".
     seed : int
@@ -172,7 +177,7 @@ def tune(
     >>> friso.tune(friso.example("thesis_rig"), only="controller", within="2 um")  # doctest: +SKIP
     """
     chosen = read_stage(stage, set, leaves_out=("rail", "cable", "floor"), uncertain_too=True)
-    goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, only, keep)
+    goal = _goal(chosen, within, settle, force_limit, bandwidth_limit, margin, only, keep)
     whole_number(seed, "seed", 0, MOST_SEED, "1")
     correlations = correlations_of(stage, chosen)
     from friso.remedies.method import tune as tuned
@@ -187,6 +192,7 @@ def _goal(
     settle: float | str | None,
     force_limit: float | str | None,
     bandwidth_limit: float | str | None,
+    margin: float | str | None,
     only: Changeable | None,
     keep: Changeable | None,
 ) -> Goal:
@@ -210,6 +216,18 @@ def _goal(
         settle=read("settle", settle, "s", "0.3 s"),
         force_limit=read("force_limit", force_limit, "N", "50 N"),
         bandwidth_limit=read("bandwidth_limit", bandwidth_limit, "Hz", "25 Hz"),
+        margin=Goal.margin if margin is None else _margin(margin),
         controller=only != "joint" and keep != "controller",
         joint=only != "controller" and keep != "joint",
     )
+
+
+def _margin(number: float | str) -> float:
+    """A modulus margin. Raises InputError."""
+    try:
+        margin = float(number)
+    except ValueError:
+        margin = np.nan
+    if not 0 < margin < 1:
+        raise wrong("margin", quoted(number), "a modulus margin between 0 and 1", "0.5")
+    return margin

@@ -174,7 +174,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = {
     "check": ("draws",),
     "map": ("x", "y", "log", "metric", "edge"),
     "boundary": ("x", "y", "log"),
-    "tune": ("within", "settle", "force_limit", "bandwidth_limit", "only", "keep"),
+    "tune": ("within", "settle", "force_limit", "bandwidth_limit", "margin", "only", "keep"),
 }
 """The options that a page may give a command."""
 
@@ -271,7 +271,10 @@ def tune(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """What stops it: the ways, and the stage of each that works."""
     options = asked.chosen(*OPTIONS["tune"])
     answer = KEPT.answer(friso.tune, asked.machine, work, options)
-    ways = [{"name": outcome.remedy.name, "toml": outcome.stage.to_toml()} for outcome in answer.working]
+    ways = [
+        {"name": outcome.remedy.name, "toml": answer.result.complete(outcome.stage).to_toml()}
+        for outcome in answer.working
+    ]
     yield parts_of(answer, ways=ways, **_lines("tune", asked, options))
 
 

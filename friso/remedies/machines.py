@@ -41,7 +41,6 @@ class Fleet:
     travel: np.ndarray
     from_file: tuple[str, ...]
     spreads: Mapping[str, float]
-    seed: int
     left_out: int = 0
 
     @property
@@ -96,4 +95,4 @@ def draw_fleet(stage: Stage, correlations: Correlations, count: int, seed: int) 
         values[0] = 1.0
     for values in shifts.values():
         values[0] = 0.0
-    return Fleet(ratios, shifts, travel, sample.from_file, dict(sample.spreads), seed, sample.sample.left_out)
+    return Fleet(ratios, shifts, travel, sample.from_file, dict(sample.spreads), sample.sample.left_out)

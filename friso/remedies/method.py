@@ -52,10 +52,11 @@ PAIRS = 2
 """Settings against friction that are tried together with the bandwidth."""
 
 FRESH = 1000
-"""What is added to the seed for the machines that the optimiser does not see."""
+"""What is added to the seed for the machines, not seen by the optimiser, on which its best points are verified."""
 
 UNSEEN = 2000
-"""The same for those on which no choice was made either."""
+"""The same for those on which what is verified has to meet the goal once more, and on which it is measured: no point is
+chosen by them, but one that fails there is given up for the next."""
 
 USUAL, MANY = 3000, 200
 """The same for those that tell how robust machines usually are, and how many of these."""
@@ -156,15 +157,16 @@ def tune(
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
-    fresh = draw_fleet(ideal, correlations, budget.fresh, seed + FRESH)
-    unseen = draw_fleet(ideal, correlations, budget.fresh, seed + UNSEEN)
-    machines = machines_of_search(ideal, correlations, budget, seed, goal, stage)
+    of_ideal = correlations.among(ideal.uncertain())
+    fresh, unseen = (_not_seen(ideal, of_ideal, budget.fresh, seed + further) for further in (FRESH, UNSEEN))
+    machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
     report("the stage as it is")
-    case, present = verified(ideal), performance_of(ideal, fresh, goal, stage)
+    case, present = verified(ideal), performance_of(ideal, unseen, goal, stage)
     if not unmet_goals(case, present, goal):
         listed = []  # nothing has to change
     session = _Session(ideal, stage, goal, machines, fresh, unseen, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
+    sensitivities: Sensitivities | None = None
     interrupted = False
     try:
         own = [remedy for remedy in listed if remedy.stage is ideal]
@@ -180,6 +182,7 @@ def tune(
         if listed and not any(outcome.certainty == "works" for outcome in session.outcomes):
             report("what to relax")
             relaxed = relaxations(session.outcomes, goal, machines.take(np.arange(budget.machines)))
+        sensitivities = edge_sensitivities(ideal, case.judgement.margin)
     except KeyboardInterrupt:
         interrupted = True
         session.interrupted()
@@ -194,11 +197,16 @@ def tune(
         fresh,
         seed,
         interrupted,
-        None if interrupted else edge_sensitivities(ideal, case.judgement.margin),
+        sensitivities,
         {name: table for name, table in stage.as_written().items() if name in AS_BUILT},
         correlations,
         session.unmade,
     )
+
+
+def _not_seen(stage: Stage, correlations: Correlations, count: int, seed: int) -> Fleet:
+    """Machines drawn around a stage, without that of the stage file itself."""
+    return draw_fleet(stage, correlations, count + 1, seed).take(np.arange(1, count + 1))
 
 
 def machines_of_search(

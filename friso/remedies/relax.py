@@ -20,8 +20,9 @@ from friso.stage import Stage
 TRIED, SURVEYED = 3, 4
 """Points whose machines are surveyed, at most, for one relaxation, and how many machines."""
 
-WIDER = (1.5, 2.0, 3.0, 5.0)
-"""Factors of the tolerance that are tried where the moves settle within ten times as much (`LOOSER`)."""
+WIDER, MOST = (1.5, 2.0, 3.0, 5.0), 64
+"""Factors of the tolerance that are tried where the moves settle within ten times as much (`LOOSER`), of so many
+points at most, those that settle so soonest."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,11 @@ def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet)
         tried: dict[tuple[str, ...], int] = {}
         enough = False
         which = np.flatnonzero(possible & (count == parts))
+        loose = which[needed["within"][which] > 1]
+        loose = loose[np.argsort(points.looser[loose], kind="stable")]
+        tolerance = _tolerances(remedy, points.shares[loose], goal, machines)
+        factor[loose] *= tolerance / needed["within"][loose]
+        needed["within"][loose] = tolerance
         for number in which[np.argsort(factor[which], kind="stable")]:
             names = tuple(name for name, values in needed.items() if values[number] > 1)
             tried[names] = tried.get(names, 0) + 1
@@ -69,18 +75,14 @@ def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet)
                 continue
             if attraction(remedy, points.shares[[number]], few, goal).clear.all():
                 tried[names], enough = TRIED, True
-                yield _relaxed_goal(remedy, points.take(np.array([number])), names, goal, machines)
+                within = float(needed["within"][number])
+                yield _relaxed_goal(remedy, points.take(np.array([number])), names, goal, within)
         if enough:
             return
 
 
-def _relaxed_goal(
-    remedy: Remedy, point: TriedPoints, names: tuple[str, ...], goal: Goal, machines: Fleet
-) -> RelaxedGoal:
-    """The goal with parts relaxed for a point. The tolerance is the first of a few with which the machines settle."""
-    within = next(
-        (part for part in WIDER if "within" in names and _settles(remedy, point, goal, part, machines)), LOOSER
-    )
+def _relaxed_goal(remedy: Remedy, point: TriedPoints, names: tuple[str, ...], goal: Goal, within: float) -> RelaxedGoal:
+    """The goal with parts relaxed for a point, the tolerance by the factor `within`."""
     values = {
         "margin": ("modulus margin", float(point.margin[0]), ""),
         "settle": ("settling time", float(_time(point)[0]), "s"),
@@ -97,12 +99,21 @@ def _relaxed_goal(
     return RelaxedGoal(remedy, remedy.tuned(point.shares[0]), tuple(relaxed), float(factor))
 
 
-def _settles(remedy: Remedy, point: TriedPoints, goal: Goal, factor: float, machines: Fleet) -> bool:
-    """Whether the machines settle within so many times the tolerance, in the time of the goal if it has one."""
-    time = moves_of_points(remedy, point.shares, machines, replace(goal, within=factor * goal.within)).slowest(
-        goal.share
-    )[0]
-    return bool(np.isfinite(time) and time <= (np.inf if goal.settle is None else goal.settle))
+def _tolerances(remedy: Remedy, shares: np.ndarray, goal: Goal, machines: Fleet) -> np.ndarray:
+    """By how much the tolerance has to be wider for points, shape (points,): the first of a few factors with which the
+    machines settle, in the time of the goal if it has one."""
+    factors = np.full(len(shares), LOOSER)
+    open_still = np.arange(min(len(shares), MOST))
+    latest = np.inf if goal.settle is None else goal.settle
+    for factor in WIDER:
+        if not open_still.size:
+            break
+        moves = moves_of_points(remedy, shares[open_still], machines, replace(goal, within=factor * goal.within))
+        time = moves.slowest(goal.share)
+        settles = np.isfinite(time) & (time <= latest)
+        factors[open_still[settles]] = factor
+        open_still = open_still[~settles]
+    return factors
 
 
 def _needed(points: TriedPoints, goal: Goal) -> dict[str, np.ndarray]:

@@ -22,6 +22,7 @@ from friso.remedies.trials import Attraction, Moves, attraction, modulus_margins
 from friso.remedies.window import VariableWindow
 from friso.shares import Share, share
 from friso.stage import Stage
+from friso.studies.compare.options import linear_flat
 from friso.studies.compare.statistics import quantile_interval
 
 ONE = np.zeros((1, 0))
@@ -131,7 +132,7 @@ def performance_of(stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> P
         moves_of_points(remedy, ONE, machines, goal),
         modulus_margins(remedy, ONE, machines, drive),
         attraction(remedy, ONE, machines, goal),
-        settled_margin({**flat, **timing(drive)}),
+        settled_margin(linear_flat(drive, {**flat, **timing(drive)})),
         float(stiffness),
     )
 

@@ -30,6 +30,10 @@ BandwidthLimit = Annotated[
         "--bandwidth-limit", metavar="FREQUENCY", help="Highest bandwidth that modes missing from the stage file allow."
     ),
 ]
+MarginOption = Annotated[
+    str | None,
+    typer.Option("--margin", metavar="NUMBER", help="Least modulus margin of 95 % of the machines; 0.5 if not given."),
+]
 _PARTS = f"<{'|'.join(get_args(Changeable))}>"
 OnlyOption = Annotated[str | None, typer.Option("--only", metavar=_PARTS, help="Change this part alone.")]
 KeepOption = Annotated[str | None, typer.Option("--keep", metavar=_PARTS, help="Leave this part unchanged.")]
@@ -45,6 +49,7 @@ def tune(
     settle: Settle = None,
     force_limit: ForceLimitOption = None,
     bandwidth_limit: BandwidthLimit = None,
+    margin: MarginOption = None,
     only: OnlyOption = None,
     keep: KeepOption = None,
     seed: SeedOption = 1,
@@ -61,7 +66,7 @@ def tune(
 
     answers_interrupts()
     options = {"set": overrides, "within": within, "settle": settle, "force_limit": force_limit}
-    options |= {"bandwidth_limit": bandwidth_limit, "only": only, "keep": keep, "seed": seed}
+    options |= {"bandwidth_limit": bandwidth_limit, "margin": margin, "only": only, "keep": keep, "seed": seed}
     shown = {"out": out, "overwrite": overwrite, "as_json": as_json, "details": details}
     ask("tune", question, stage_file, **options, **shown, what="what attracts the stage")
 

@@ -15,6 +15,7 @@ from friso.frequency.members import limit_cases
 from friso.remedies.method import Advice
 from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
+from friso.studies.compare.options import linear_flat
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,
@@ -46,7 +47,7 @@ RTOL = 1e-7
 def figures(tuning: Advice) -> list[Figure]:
     """The response, the settling times and the sensitivities."""
     lines = drawn_stages(tuning)
-    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(lines), *_windows(tuning))
+    panels = (_response(tuning, lines), _settling(tuning, lines), _sensitivity(tuning, lines), *_windows(tuning))
     caption = (
         "Deviation of the stage of the file from its reference after the last corner of its own motion; the share of "
         f"fresh machines in position within {with_unit(tuning.goal.within, 'm')}; the sensitivity of the loop in its "
@@ -138,15 +139,17 @@ def _windows(tuning: Advice) -> list[Panel]:
     return [Panel("Where the least change works", x, Axis("Number", "", y, words=tuple(rows)), series, marks)]
 
 
-def _sensitivity(lines: Lines) -> Panel:
+def _sensitivity(tuning: Advice, lines: Lines) -> Panel:
+    """Of the loops behind the drive as built, up to half its sampling rate, as the margins are computed."""
     omega, series = np.geomspace(1.0, 2e4, 600), []
     for stage, _, line in lines:
-        flat = stage.flat()
-        worst = np.max(
-            [1 / np.abs(1 + response(flat, case, DriveTiming.of(flat))(omega)) for case in limit_cases(flat).values()],
-            axis=0,
-        )
-        series.append(Series(omega / (2 * np.pi), worst, *line))
+        built = tuning.complete(stage)
+        flat = linear_flat(built, built.flat())
+        drive = DriveTiming.of(flat)
+        within = omega[omega <= drive.highest]
+        loops = [response(flat, case, drive)(within) for case in limit_cases(flat).values()]
+        worst = np.max([1 / np.abs(1 + loop) for loop in loops], axis=0)
+        series.append(Series(within / (2 * np.pi), worst, *line))
     limit = Series(np.array([omega[0], omega[-1]]) / (2 * np.pi), np.full(2, 2.0), "margin of 0.5", GREY, "dashed")
     return Panel(
         "Loops: the largest sensitivity of the limit cases",

@@ -14,16 +14,16 @@ def gain_lines(tuning: Advice) -> list[str]:
     return [
         f'The gains to type in for "{outcome.remedy.name}" are {gains} (friso export gains).'
         for number, outcome in enumerate(listed)
-        if outcome not in listed[:number] and (gains := gains_to_type_in(outcome))
+        if outcome not in listed[:number] and (gains := gains_to_type_in(outcome, tuning))
     ]
 
 
 def gain_facts(tuning: Advice) -> list[tuple[str, str]]:
     """Every remedy that works, with its gains."""
-    return [(outcome.remedy.name, gains) for outcome in tuning.working if (gains := gains_to_type_in(outcome))]
+    return [(outcome.remedy.name, gains) for outcome in tuning.working if (gains := gains_to_type_in(outcome, tuning))]
 
 
-def gains_to_type_in(outcome: RemedyOutcome) -> str:
-    """Symbols and values, in all units that drives have for them."""
-    table = rows(gains_of(outcome.stage, {})) if outcome.stage else []
+def gains_to_type_in(outcome: RemedyOutcome, tuning: Advice) -> str:
+    """Symbols and values, in all units that the drive of the machine as built has for them."""
+    table = rows(gains_of(tuning.complete(outcome.stage), {})) if outcome.stage else []
     return ", ".join(f"{symbol} = {value}{f' ({others})' if others else ''}" for _, (symbol, value, others) in table)

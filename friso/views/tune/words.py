@@ -12,6 +12,7 @@ from friso.design_method.geometry import Geometry
 from friso.equations.bandwidth import bandwidth
 from friso.equations.breakaway import breakaway, least_breakaway
 from friso.frequency.bandwidth import bandwidths_at
+from friso.frequency.crossover import WANTED
 from friso.leaf_springs.joint import first_interfering
 from friso.leaf_springs.mechanism import Mechanism
 from friso.quantities import Quantity, percent, positive
@@ -62,6 +63,7 @@ OPTIONS = {
     "settle": "--settle",
     "force_limit": "--force-limit",
     "bandwidth_limit": "--bandwidth-limit",
+    "margin": "--margin",
 }
 """Options that state the parts of a goal."""
 
@@ -386,8 +388,9 @@ def _reasons(points: TriedPoints, outcome: RemedyOutcome, goal: Goal) -> Iterato
         if not left.any():
             yield sentence
     yield (
-        f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search, but on "
-        f"fresh machines they do not, or something attracts machines with them, or may ({outcome.attracted} surveyed)."
+        f"Of {len(left)} settings tried {left.sum()} meet the rest of the goal on the machines of the search; of those "
+        f"looked at further ({outcome.attracted} surveyed) none surely meets it on fresh machines"
+        f"{'' if outcome.cut else ', others may'}."
     )
 
 
@@ -410,7 +413,9 @@ def _edges(tuning: Advice) -> str:
         again = [low for low, _ in tuning.limits.comfortable if low > comfortable][:1]
         own = bandwidth(stage.flat()) or 1.0
         hertz = [with_unit(float(at), "Hz") for at in bandwidths_at(stage, np.array([comfortable, *again]) / own)]
-        parts.append(f"the margin is kept up to {' and again from '.join(hertz)}{' on' * len(again)}")
+        parts.append(
+            f"a modulus margin of {WANTED:g} is kept up to {' and again from '.join(hertz)}{' on' * len(again)}"
+        )
     if tuning.goal.bandwidth_limit is not None:
         parts.append(f"your limit is {with_unit(tuning.goal.bandwidth_limit, 'Hz')}")
     return f" In bandwidth (where the loop last crosses 0 dB) {listed(parts, 'and')}." if parts else ""
@@ -504,6 +509,9 @@ def assumptions(tuning: Advice) -> list[str]:
         "each with a move of a quarter of the travel or more."
     )
     lines += spread_sentences(machines.from_file, machines.spreads)
+    held = [key for key in tuning.complete(stage).uncertain() if key.startswith("drive.")]
+    if held:
+        lines.append(f"In the middle of its range on all machines: {listed(held, 'and')}.")
     if machines.left_out:
         lines.append(f"{machines.left_out} draws that no stage may have were replaced by others.")
     return lines
