@@ -97,6 +97,7 @@ class FakeCase:
     peak_to_peak: float = 2e-10
     period: float | None = None
     settling_time: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})
+    in_the_end: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})
     largest_force: float = 179.4
     solver: Any = field(default_factory=lambda: fake_solver("done"))
     unstable: tuple[str, ...] = ()
@@ -185,6 +186,7 @@ def fake_case(hunting: bool = False, stage: Any = None, kind: str = "there_and_b
         peak_to_peak=1.04e-3,
         period=1.63,
         settling_time={1e-6: None, 1e-5: None},
+        in_the_end={1e-6: None, 1e-5: None},
     )
 
 

@@ -287,6 +287,12 @@ def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None
     return verdict_sentence(ShownCase("given", "As given", "#000000", case), cases or {"given": case})
 
 
+def after(fine: float | None, coarse: float | None) -> dict[str, Any]:
+    """When a case settles to within 1 um and 10 um [s], at both ends alike."""
+    times = {1e-6: fine, 1e-5: coarse}
+    return {"settling_time": times, "in_the_end": times}
+
+
 def growing(lower_gains: LowerGains, verdict: Verdict) -> Judgement:
     """A stage whose force is limited without anti-windup; what attracts it, if anything does, was observed alone."""
     if verdict == "settles":
@@ -334,8 +340,10 @@ def said_by_name() -> dict[str, str]:
         "settles, no margin": sentence(settles(margin=None)),
         "settles, gains": sentence(settles(margin=slower)),
         "settles, cannot hunt": sentence(cannot_hunt()),
-        "settles, coarsely": sentence(settles(), settling_time={1e-6: None, 1e-5: 1.5}),
-        "settles, band not reached": sentence(settles(), settling_time={1e-6: None, 1e-5: None}, peak_to_peak=7e-5),
+        "settles, coarsely": sentence(settles(), **after(None, 1.5)),
+        "settles, band not reached": sentence(settles(), **after(None, None), peak_to_peak=7e-5),
+        "settles, finely at the return alone": sentence(settles(), settling_time={1e-6: None, 1e-5: 1.5}),
+        "settles, at the return alone": sentence(settles(), settling_time={1e-6: None, 1e-5: None}),
         "settles, uncertain": sentence(settles(hunting=uncertain)),
         "failed": sentence(settles(verdict="failed"), solver=fake_solver("failed")),
         "failed, the longer run": sentence(settles(verdict="failed")),
@@ -543,7 +551,7 @@ def test_a_motion_that_does_not_break_the_stage_away_says_so(wording: Wording) -
     wording("\n".join(unmoved))
     moved = [sentence(judgement, largest_force=2.44) for judgement in judgements]
     assert ["2.44 N" in text for text in (*unmoved, *moved)] == [True, True, False, False]
-    still = sentence(settles(), unmoved=True, largest_force=0.0, settling_time={1e-6: 0.0, 1e-5: 0.0})
+    still = sentence(settles(), unmoved=True, largest_force=0.0, **after(0.0, 0.0))
     assert "ends within 1 µm of its reference without breaking away" in still
     assert "0 s" not in still
     hardly = sentence(settles(), unmoved=True, largest_force=2.9996)

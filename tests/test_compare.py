@@ -16,20 +16,21 @@ from refusals import Refused, Wording
 from snapshots import Snapshots
 
 from friso.answers.output_folder import MARKER
+from friso.equations.motion import Stand
 from friso.equations.settings import SETTINGS, settings_named
 from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
-from friso.hunting.criteria import end_of_traces, outcomes
+from friso.hunting.criteria import end_of_traces, outcomes, settling_of_traces
 from friso.shares import share
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
 from friso.stage.lists import element_keys
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import ELEMENTS, SPREADS, TOGETHER_BY, Machines, draw_machines
-from friso.studies.compare.measures import linear_loops, settling_time
+from friso.studies.compare.measures import linear_loops
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median, quantile_interval
 from friso.studies.compare.study import Comparison, OptionResult, compare
@@ -277,10 +278,22 @@ def test_what_dies_out_or_creeps_does_not(frequency: float, size: float, decay: 
 def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> None:
     deviation = factor * np.where(until > TIME, 1.0, 0.5)[None]
     expected = max(TIME[until <= TIME][0] - corner, 0.0)
-    assert settling_time(TIME, deviation, corner, 0.7 * factor)[0] == pytest.approx(expected)
-    assert settling_time(TIME, -deviation, corner, 2.0 * factor)[0] == 0
-    assert settling_time(TIME, deviation, corner, 0.4 * factor)[0] == np.inf
-    assert settling_time(TIME, np.full((1, len(TIME)), np.nan), corner, factor)[0] == np.inf
+    place = [Stand(corner, TIME[-1])]
+    assert settling_of_traces(place, TIME, deviation, 0.7 * factor)[0] == pytest.approx(expected)
+    assert settling_of_traces(place, TIME, -deviation, 2.0 * factor)[0] == 0
+    assert settling_of_traces(place, TIME, deviation, 0.4 * factor)[0] == np.inf
+    assert settling_of_traces(place, TIME, np.full((1, len(TIME)), np.nan), factor)[0] == np.inf
+
+
+def test_there_and_back_the_longer_time_of_both_ends_counts() -> None:
+    """And none where a stage is outside the band when it returns, as one that never leaves."""
+    there, back = Stand(1.0, 6.0), Stand(8.0, TIME[-1])
+    late = np.where((TIME < 4.0) | ((TIME > 6.5) & (TIME < 8.5)), 1.0, 0.0)[None]
+    never_there = np.where(TIME < 8.0, 1.0, 0.0)[None]
+    assert settling_of_traces([there, back], TIME, late, 0.5)[0] == pytest.approx(3.0, abs=1e-2)
+    assert settling_of_traces([back], TIME, late, 0.5)[0] == pytest.approx(0.5, abs=1e-2)
+    assert settling_of_traces([there, back], TIME, never_there, 0.5)[0] == np.inf
+    assert settling_of_traces([back], TIME, never_there, 0.5)[0] == 0
 
 
 @settings(max_examples=40)
@@ -360,7 +373,7 @@ def test_an_integrator_that_starts_anew_does_not_stay(comparison: Comparison) ->
 def test_options_share_their_machines(built: Stage, comparison: Comparison) -> None:
     """The first machines come out the same, to the last digit, on their own and among others; and so does an option
     that changes nothing."""
-    work = study._Work(comparison.machines, study.own_motion(built), study._corner(built), 1e-6, study.silent, 1)
+    work = study._Work(comparison.machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
     base = comparison.results[0]
     again = work.runs(replace(base.option, letter="f"), 0)
     assert np.array_equal(again.in_position, base.measures.in_position)
@@ -371,7 +384,7 @@ def test_options_share_their_machines(built: Stage, comparison: Comparison) -> N
 def test_hardly_any_friction_never_swings(built: Stage) -> None:
     ideal = {"friction.static": "1 mN +/- 1e-6 %", "friction.coulomb": "1 mN +/- 1e-6 %"}
     machines = draw_machines(built.replace(ideal), Correlations(), 20, 1)
-    work = study._Work(machines, study.own_motion(built), study._corner(built), 1e-6, study.silent, 1)
+    work = study._Work(machines, study.own_motion(built), study._places(built), 1e-6, study.silent, 1)
     for letter, variant in (("a", "locked"), ("c", "free")):
         runs = work.runs(Option(letter, machines.stage.variants()[variant]), 0)
         assert runs.done.all()

@@ -20,7 +20,7 @@ from friso.answers.tune import TuneAnswer
 from friso.app import questions
 from friso.cli.asking import show
 from friso.design_method.isolator import isolated
-from friso.engine.arrays import Results
+from friso.engine.arrays import STATISTICS, Results
 from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.engine.simulate import simulate
@@ -31,6 +31,7 @@ from friso.errors import InputError
 from friso.frequency.bandwidth import bandwidths_at, loop_bandwidth, loop_bandwidths, rigid_bandwidth
 from friso.frequency.crossover import settled_margin
 from friso.hunting.check import check_given
+from friso.hunting.criteria import settling_of_runs
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.margin import search_bandwidths
@@ -148,8 +149,10 @@ def test_moves_of_a_machine_are_those_of_its_stage(rigid: Stage, machines: Fleet
     moves = moves_of_points(Remedy.settled_on("", fast), np.zeros((1, 0)), machines, goal)
     alone = measured_run(fast)
     there = moved_there(fast, goal.within)
-    assert moves.settling[0, 0] == pytest.approx(max(alone.settling_time[0][0], there), abs=2e-4)
-    assert moves.looser[0, 0] == pytest.approx(max(alone.settling_time[1][0], moved_there(fast, 1e-5)), abs=2e-4)
+    assert moves.settling[0, 0] == pytest.approx(max(alone.in_the_end[0][0], there), abs=2e-4)
+    assert moves.looser[0, 0] == pytest.approx(max(alone.in_the_end[1][0], moved_there(fast, 1e-5)), abs=2e-4)
+    assert (moves.settling[0, 0], moves.looser[0, 0]) == pytest.approx([time[0] for time in alone.settling_time])
+    assert there > alone.in_the_end[0][0]
     assert moves.force[0, 0] == pytest.approx(alone.largest_force[0], rel=1e-9)
     limited = fast.replace({"controller.force_limit": "60 N"})
     assert moves_of_points(Remedy.settled_on("", limited), np.zeros((1, 0)), machines, goal).force.max() == 60.0
@@ -799,9 +802,9 @@ def test_a_settling_time_may_be_off_by_a_share_of_itself(stepping: dict[str, Any
     """However long before the move the run began: here as long as if it had taken ten times as long."""
     exact = _of_settling(stepping, KEYS[:1], 1e-6)
     assert exact is not None
-    slack = exact.time / 10 / stepping[KEYS[0]]
+    slack, column = exact.time / 10 / stepping[KEYS[0]], STATISTICS.index("inner_exit")
     follows = [
-        _is_smooth(stepping, KEYS[:1], exact.time, exact.time / 10, exact.by + off * SMOOTH * slack, 1e-6)
+        _is_smooth(stepping, KEYS[:1], column, exact.time, exact.time / 10, exact.by + off * SMOOTH * slack, 1e-6)
         for off in (0.5, 2.0)
     ]
     assert follows == [True, False]
@@ -837,10 +840,10 @@ def test_the_motion_is_taken_as_it_is(rigid: Stage) -> None:
 
 
 def settling_times(flat: dict[str, Any], stages: int = 4, within: float = 1e-6) -> np.ndarray:
-    """When some stages are last outside of a band."""
+    """How long some stages take to settle into a band."""
     options = RunOptions(rtol=1e-11, bands=(within, within))
     (runs,) = run_chunks(kernel(shared_structure(flat)), flat, stages, options)
-    return runs.statistic("inner_exit")
+    return settling_of_runs(flat, runs, "inner")
 
 
 def test_an_unknown_key_has_no_derivative(rigid: Stage) -> None:

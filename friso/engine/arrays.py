@@ -84,10 +84,13 @@ STATISTICS = (
     "attempted",
     "rejected",
     "ended",
+    "inner_before",
+    "outer_before",
 )
 """Largest force [N], extremes of the deviation in the window [m], when it last was outside the two bands [s], steps
-attempted and rejected, and the time reached [s]. Extremes and moments are NaN where a drive has a clock: its samples
-tell them."""
+attempted and rejected, the time reached [s], and when, before the reference left the place where it stood, it last was
+outside the two bands [s] (infinite: it still was; 0: the reference does not leave again). Extremes and moments are NaN
+where a drive has a clock: its samples tell them."""
 
 
 class Status(IntEnum):

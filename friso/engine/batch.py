@@ -123,9 +123,11 @@ def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
-    """Pieces of the reference with the window's start and the end of the run among them, and the window's place."""
+    """Pieces of the reference with the window's start and the end of the run among them, and the window's place; of
+    those that begin behind that end, nothing is left."""
     pieces = motion.pieces(flat, runs)
     end = np.broadcast_to(np.asarray(flat["motion.duration"], dtype=float), (runs,))
+    pieces[:, :, 0] = np.minimum(pieces[:, :, 0], end[:, None])
     start = window * end
     rows = np.arange(runs)
     windows = (pieces[:, :, 0] <= start[:, None]).sum(axis=1)

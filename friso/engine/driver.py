@@ -336,7 +336,24 @@ def answer(B, layout, lane, batch, settings, results):
         if at_stop or moment(B, layout, lane, fraction) >= B[ROW.next_sample * layout.lanes + lane]:
             note_samples(B, layout, lane, fraction, settings.interval, results.samples[j])
     if at_stop:
-        enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
+        next_segment(B, layout, lane, j, batch)
+
+
+def next_segment(B, layout, lane, j, batch):
+    """Go on to the next segment; where the reference leaves a place at which it stood, note when the run entered the
+    bands there."""
+    stood, now = stands(B, layout, lane), B[ROW.start * layout.lanes + lane] + B[ROW.time * layout.lanes + lane]
+    enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
+    if stood and not stands(B, layout, lane):
+        inner, outer = B[ROW.inner_exit * layout.lanes + lane], B[ROW.outer_exit * layout.lanes + lane]
+        B[ROW.inner_before * layout.lanes + lane] = inner if inner < now else np.inf
+        B[ROW.outer_before * layout.lanes + lane] = outer if outer < now else np.inf
+
+
+def stands(B, layout, lane):
+    """Whether the reference stands still in the segment that the lane is in."""
+    velocity = (layout.reference + 1) * layout.lanes + lane
+    return B[velocity] == 0.0 and B[velocity + layout.lanes] == 0.0
 
 
 def look_inside(B, layout, lane, fraction, batch, settings, results):
@@ -372,6 +389,9 @@ def hand_over(B, layout, lane, results):
     statistics[FOLLOWED] = B[ROW.attempted * layout.lanes + lane]
     statistics[FOLLOWED + 1] = B[ROW.rejected * layout.lanes + lane]
     statistics[FOLLOWED + 2] = B[ROW.start * layout.lanes + lane] + B[ROW.time * layout.lanes + lane]
+    for i in range(2):
+        before = B[(ROW.inner_before + i) * layout.lanes + lane]
+        statistics[FOLLOWED + 3 + i] = np.nan if layout.clocked else before
 
 
 def refill(B, layout, lane, queue, batch, settings, results):

@@ -39,9 +39,10 @@ corner of the reference, which was at start; trial, longest, taken: step to try 
 fraction: the part of it that was accepted; event: the lane wants attention; turns: number of turning points kept;
 last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
 
-DRIVER = ("run", "segment")
+DRIVER = ("run", "segment", "inner_before", "outer_before")
 """Rows of use to the driver alone: the number of the run in the lane, negative where there is none, and of the piece of
-the reference it is in."""
+the reference it is in; and when, before the reference left a place where it stood, the deviation last was outside the
+two bands."""
 
 CLOCK = ("period", "tick", "due", "ticked", "noted", "left")
 """Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the

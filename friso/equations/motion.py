@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -45,18 +46,12 @@ def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
     ]
 
 
-def _only_there(flat: Mapping[str, Any]) -> list[Piece]:
-    rows = _there_and_back(flat)
-    return rows[: len(rows) // 2]
-
-
 def _constant(position: Any, velocity: Any) -> list[Piece]:
     return [(0.0, position, velocity, 0.0)]
 
 
 _PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
     "there_and_back": _there_and_back,
-    "there": _only_there,
     "release": lambda flat: _constant(0.0, 0.0),
     "step": lambda flat: _constant(flat["motion.size"], 0.0),
     "ramp": lambda flat: _constant(0.0, flat["motion.velocity"]),
@@ -65,7 +60,6 @@ _PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
 
 _SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
     "there_and_back": _there,
-    "there": _there,
     "release": lambda flat: flat["motion.displacement"],
     "step": lambda flat: flat["motion.size"],
     "ramp": lambda flat: flat["motion.velocity"] * flat["motion.duration"],
@@ -100,11 +94,22 @@ def initial_displacement(flat: Mapping[str, Any]) -> Any:
     return flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
 
 
-def way_there(flat: Mapping[str, Any]) -> dict[str, Any] | None:
-    """The same stages moved there, until they return; None for a motion that does not."""
+@dataclass(frozen=True)
+class Stand:
+    """A place where the reference comes to stand: from its `corner` [s] on, `until` [s] it leaves or the run ends."""
+
+    corner: Any
+    until: Any
+
+
+def stands(flat: Mapping[str, Any]) -> list[Stand]:
+    """The places where the reference comes to stand, one after the other: both ends of a motion there and back, and of
+    any other motion where it ends; of one that never stands, from its last corner on."""
+    last = Stand(last_corner(flat), flat["motion.duration"])
     if flat["motion.kind"] != "there_and_back":
-        return None
-    return {**flat, "motion.kind": "there", "motion.duration": flat["motion.return_at"]}
+        return [last]
+    rows = _there_and_back(flat)
+    return [Stand(rows[len(rows) // 2 - 1][0], flat["motion.return_at"]), last]
 
 
 def last_corner(flat: Mapping[str, Any]) -> Any:

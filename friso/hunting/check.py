@@ -53,14 +53,14 @@ class Case:
 
     `judgement` holds the verdict and what it rests on; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
     `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
-    quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
-    `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what sticks, constant
-    forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`; `force_limit` [N] is that
-    of the controller, if that keeps it off its reference (None: it does not); `unstable` tells in which
-    of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`); `feeding`, with a
-    backlash, without what hunting ends (None, too, where that was given up). `trace` holds the time
-    response if asked for.
-    """
+    quarter; `settling_time` maps each band [m] to the time [s] in which the stage settles into it wherever the
+    reference stands (see `friso.hunting.criteria.settling`; None: it does not), `in_the_end` at the last of these
+    places alone; `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what
+    sticks, constant forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`;
+    `force_limit` [N] is that of the controller, if that keeps it off its reference (None: it does not); `unstable`
+    tells in which of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`);
+    `feeding`, with a backlash, without what hunting ends (None, too, where that was given up). `trace` holds the time
+    response if asked for."""
 
     stage: Stage
     judgement: Judgement
@@ -70,6 +70,7 @@ class Case:
     peak_to_peak: float
     period: float | None
     settling_time: dict[float, float | None]
+    in_the_end: dict[float, float | None]
     largest_force: float
     solver: Solver
     breakaway: float = 0.0
@@ -174,6 +175,7 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
         peak_to_peak=float(measures.peak_to_peak[0]),
         period=_finite(measures.period[0]),
         settling_time={band: _finite(time[0]) for band, time in zip(BANDS, measures.settling_time, strict=True)},
+        in_the_end={band: _finite(time[0]) for band, time in zip(BANDS, measures.in_the_end, strict=True)},
         largest_force=float(measures.largest_force[0]),
         solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
         breakaway=breakaway,

@@ -11,9 +11,9 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import BAND, End, outcomes
+from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs
 from friso.hunting.turning import COUNTED_AFTER, DISTINCT, WINDOW
 from friso.hunting.turns import Turns, scan_turning_points
 from friso.stage import Stage
@@ -29,16 +29,18 @@ RESOLVED = DISTINCT / 4
 class Measures:
     """Measures of runs, each of shape (runs,): the thesis's peak count (`peaks`), and that of distinct peaks (see
     `friso.hunting.criteria.peak_count`); peak-to-peak deviation [m] of the last quarter and its period [s] (NaN: none);
-    time [s] from the last corner of the reference until the deviation stays within each of `BANDS` (NaN: not within the
-    run); what the run did at its end (`outcome`, words of `friso.hunting.criteria.run_outcome`); largest actuator force
-    [N]; status, and steps attempted and rejected. `turns` tells which turning points are counted peaks, shape
-    (runs, room)."""
+    time [s] until the deviation stays within each of `BANDS` at every place where the reference stands, and
+    `in_the_end` at the last of them alone (see `friso.hunting.criteria.settling`; NaN: it does not within the run);
+    what the run did at its end (`outcome`, words of `friso.hunting.criteria.run_outcome`); largest actuator force [N];
+    status, and steps attempted and rejected. `turns` tells which turning points are counted peaks, shape (runs,
+    room)."""
 
     peaks: np.ndarray
     distinct_peaks: np.ndarray
     peak_to_peak: np.ndarray
     period: np.ndarray
     settling_time: tuple[np.ndarray, np.ndarray]
+    in_the_end: tuple[np.ndarray, np.ndarray]
     outcome: np.ndarray
     largest_force: np.ndarray
     status: np.ndarray
@@ -90,10 +92,13 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
     """The measures of a chunk of runs of the stages `flat`, arrays of which have one entry per run of the chunk."""
     results = runs.results
     ended, turns = runs.statistic("ended"), turns_of(runs)
-    corner = np.broadcast_to(last_corner(flat), (len(results.statuses),))
     passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
-    exits = (runs.statistic("inner_exit"), runs.statistic("outer_exit"))
-    inner, outer = (np.where(e + passing < ended, np.maximum(e - corner, 0.0), np.nan) for e in exits)
+    in_the_end, settling = [], []
+    for band in ("inner", "outer"):
+        stays = runs.statistic(f"{band}_exit") + passing < ended
+        for column, times in ((in_the_end, settling_in_the_end), (settling, settling_of_runs)):
+            after = times(flat, runs, band)
+            column.append(np.where(stays & np.isfinite(after), after, np.nan))
     done = results.statuses == Status.DONE
 
     def finished(array: np.ndarray) -> np.ndarray:
@@ -104,7 +109,8 @@ def measure_runs(flat: Mapping[str, Any], runs: Runs) -> Measures:
         distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
         peak_to_peak=finished(swing_of(runs)),
         period=finished(turns.period),
-        settling_time=(finished(inner), finished(outer)),
+        settling_time=(finished(settling[0]), finished(settling[1])),
+        in_the_end=(finished(in_the_end[0]), finished(in_the_end[1])),
         outcome=outcomes(run_ends(runs, turns, "outer"), BAND, passing),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,

@@ -45,7 +45,7 @@ class Motions:
     def of(cls, measures: Measures) -> Motions:
         """The motions of runs that were measured."""
         completed, away = (np.equal(measures.status, status) for status in (Status.DONE, Status.DIVERGED))
-        return cls(completed, away, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
+        return cls(completed, away, measures.peaks, measures.peak_to_peak, measures.in_the_end[1])
 
     @property
     def _arrays(self) -> tuple[np.ndarray, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS
 from friso.engine.batch import MOST_TURNS
 from friso.equations.bandwidth import bandwidth, faster
-from friso.equations.motion import initial_displacement, last_corner, pieces, size
+from friso.equations.motion import Stand, initial_displacement, pieces, size, stands
 from friso.equations.roles import Steady
 from friso.equations.structure import decisive_keys
 from friso.equations.variational import along
@@ -322,12 +322,15 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     the speed at which it enters. None where motions beside it do not follow them."""
     if pieces(flat, 1)[0, -1, 2]:
         return None  # the reference never stands still
-    stages, corner = Ensemble(flat, 1), float(last_corner(flat))
+    stages = Ensemble(flat, 1)
     duration = np.array([float(flat["motion.duration"])])
     start = _starts(stages, flat, 1)
     results = stages.run(start, duration, RTOL, bands=(within, within))
-    entered = results.statistics[:, STATISTICS.index("inner_exit")]
-    if not done(results).all() or not corner < entered[0] < duration[0]:
+    if not done(results).all():
+        return None
+    column, place = _longest(flat, results.statistics[0])
+    corner, entered = float(place.corner), results.statistics[:, column]
+    if not corner < entered[0] < place.until:
         return None
     flow = _flow(stages, keys, start, entered)
     if flow is None:
@@ -336,7 +339,7 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     position = stages.kernel.position
     by = -(by_states @ _starts_by(stages, flat, keys) + by_keys)[position] / end[stages.kernel.velocity]
     settling = float(entered[0] - corner)
-    if not _is_smooth(flat, keys, float(entered[0]), settling, by, within):
+    if not _is_smooth(flat, keys, column, float(entered[0]), settling, by, within):
         return None
     results = stages.run(start, duration, RTOL, least_swing=0.0, room=MOST_TURNS)  # once, however many turns there are
     if not done(results).all():
@@ -344,23 +347,38 @@ def _of_settling(flat: Mapping[str, Any], keys: tuple[str, ...], within: float) 
     turns = slice(int(results.turn_counts[0]))
     off, times = np.abs(results.turn_values[0, turns]) / within, results.turn_times[0, turns]
     last = off[(times > corner) & (times <= entered[0])][-1:]
-    jump = np.abs(np.append(last, off[times > entered[0]]) - 1).min(initial=np.inf)
+    jump = np.abs(np.append(last, off[(times > entered[0]) & (times < place.until)]) - 1).min(initial=np.inf)
     return SettlingDerivatives(within, settling, by, float(jump))
 
 
+def _longest(flat: Mapping[str, Any], statistics: np.ndarray) -> tuple[int, Stand]:
+    """The place where the reference stands at which a stage settles last, and the column of its statistics that tells
+    when it entered the band there."""
+    columns = [STATISTICS.index(name) for name in ("inner_before", "inner_exit")]
+    places = stands(flat)
+    listed = [*zip(columns[-len(places) :], places, strict=True)]
+    return max(listed, key=lambda listed_one: statistics[listed_one[0]] - listed_one[1].corner)
+
+
 def _is_smooth(
-    flat: Mapping[str, Any], keys: tuple[str, ...], entered: float, settling: float, by: np.ndarray, within: float
+    flat: Mapping[str, Any],
+    keys: tuple[str, ...],
+    column: int,
+    entered: float,
+    settling: float,
+    by: np.ndarray,
+    within: float,
 ) -> bool:
-    """Whether the stage, which `entered` the band at a time [s], after `settling` [s], enters it when the derivatives
-    say it does with each key a little larger and smaller: not where it bounces on its limiter so often that
-    neighbouring motions part."""
+    """Whether the stage, which `entered` the band at a time [s] (a `column` of its statistics), after `settling` [s],
+    enters it when the derivatives say it does with each key a little larger and smaller: not where it bounces on its
+    limiter so often that neighbouring motions part."""
     step = SMALL * np.array([flat[name] for name in keys])
     changes = np.concatenate([-np.diag(step), np.diag(step)])
-    beside = {name: flat[name] + column for name, column in zip(keys, changes.T, strict=True)}
+    beside = {name: flat[name] + values for name, values in zip(keys, changes.T, strict=True)}
     stages = Ensemble({**flat, **beside}, len(changes))
     durations = np.full(len(changes), float(flat["motion.duration"]))
     results = stages.run(_starts(stages, stages.flat, len(changes)), durations, RTOL, bands=(within, within))
-    moved = results.statistics[:, STATISTICS.index("inner_exit")] - entered
+    moved = results.statistics[:, column] - entered
     expected = np.concatenate([-step * by, step * by])
     allowed = SMOOTH * SMALL * settling + NOISE * entered
     return bool(done(results).all() and np.all(np.abs(moved - expected) <= allowed))

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import RunOptions, part_of, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.bandwidth import faster
-from friso.equations.motion import last_corner, way_there
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import attractors
+from friso.hunting.criteria import settling_of_runs
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import surely_surveyed
 from friso.hunting.verdict import can_hunt
@@ -36,9 +34,8 @@ LOOSER = 10.0
 @dataclass(frozen=True)
 class Moves:
     """Moves of points on machines, all of shape (points, machines): the time of `settling` [s] within the tolerance
-    from the last corner of the reference on, and within the looser one, infinite where the stage is not in position at
-    the end; and the largest `force` [N]. Of a motion there and back it is the longer of the times at both ends: a stage
-    that never leaves is in position once the reference is back."""
+    (see `friso.hunting.criteria.settling`), and within the looser one, infinite where the stage is not in position when
+    the reference leaves or the run ends; and the largest `force` [N]."""
 
     settling: np.ndarray
     looser: np.ndarray
@@ -61,32 +58,17 @@ def moves_of_points(remedy: Remedy, shares: np.ndarray, machines: Fleet, goal: G
     `slower`."""
     count = len(shares) * machines.count
     flat = faster(machines.laid_over(remedy.stage, remedy.changes(shares), len(shares)), 1 / slower)
-    settling, looser, force = _moved(flat, count, goal)
-    there = way_there(flat)
-    back = np.flatnonzero(np.isfinite(looser))
-    if there is not None and back.size:
-        first = _moved(part_of(there, back), back.size, goal)
-        settling[back], looser[back] = np.maximum(settling[back], first[0]), np.maximum(looser[back], first[1])
-    shape = len(shares), machines.count
-    return Moves(settling.reshape(shape), looser.reshape(shape), force.reshape(shape))
-
-
-def _moved(flat: Mapping[str, Any], count: int, goal: Goal) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Settling times within both tolerances [s], and the largest forces [N], of so many stages that are moved."""
     settling, looser, force = (np.full(count, np.inf) for _ in range(3))
     options = RunOptions(rtol=RTOL, bands=(goal.within, LOOSER * goal.within), record_from=np.inf)
-    corner = np.broadcast_to(last_corner(flat), (count,))
     most = np.broadcast_to(flat.get(FORCE_LIMIT, np.inf), (count,))  # what is above is rounding
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, options):
         done = np.equal(runs.results.statuses, Status.DONE)
-        ended = runs.statistic("ended")
-        for column, name in ((settling, "inner_exit"), (looser, "outer_exit")):
-            left = runs.statistic(name)
-            after = np.maximum(left - corner[runs.numbers], 0.0)
-            column[runs.numbers] = np.where(done & (left < ended), after, np.inf)
+        settling[runs.numbers] = np.where(done, settling_of_runs(runs.part(flat), runs, "inner"), np.inf)
+        looser[runs.numbers] = np.where(done, settling_of_runs(runs.part(flat), runs, "outer"), np.inf)
         largest = np.minimum(runs.statistic("force_peak"), most[runs.numbers])
         force[runs.numbers] = np.where(done, largest, np.inf)
-    return settling, looser, force
+    shape = len(shares), machines.count
+    return Moves(settling.reshape(shape), looser.reshape(shape), force.reshape(shape))
 
 
 def timing(drive: Stage) -> dict[str, float]:

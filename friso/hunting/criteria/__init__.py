@@ -1,5 +1,5 @@
 """What words and numbers on hunting mean, all on arrays: the verdict on a stage (`stage_verdict`), what a run did
-(`run_outcome`), and the thesis's peak count of a run (`peak_count`)."""
+(`run_outcome`), when it has settled (`settling`), and the thesis's peak count of a run (`peak_count`)."""
 
 from friso.hunting.criteria.peak_count import (
     COUNTED_ABOVE,
@@ -10,6 +10,7 @@ from friso.hunting.criteria.peak_count import (
     peaks_in_traces,
 )
 from friso.hunting.criteria.run_outcome import BAND, OUTCOMES, End, end_of_traces, lasts, outcomes
+from friso.hunting.criteria.settling import settling_in_the_end, settling_of_runs, settling_of_traces
 from friso.hunting.criteria.stage_verdict import ATTRACTED, VERDICTS, Verdict, verdicts
 
 __all__ = [
@@ -28,5 +29,8 @@ __all__ = [
     "lasts",
     "outcomes",
     "peaks_in_traces",
+    "settling_in_the_end",
+    "settling_of_runs",
+    "settling_of_traces",
     "verdicts",
 ]

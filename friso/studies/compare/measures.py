@@ -9,12 +9,13 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.engine.arrays import Status
+from friso.equations.motion import Stand
 from friso.frequency.drive import DriveTiming
 from friso.frequency.family import stability_by_poles
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
-from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces
-from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS, last_outside
+from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces, settling_of_traces
+from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS
 from friso.hunting.turning import WINDOW
 from friso.stage import Stage
 from friso.virtual_rig.run import RecordedRuns
@@ -28,9 +29,9 @@ the slowest pole; the highest is half that of sampling, or so many times the fas
 class MachineMeasures:
     """Measures of runs, arrays of shape (count,): what each did at its end (`outcome`, words of
     `friso.hunting.criteria.run_outcome`, the band being the tolerance), its distinct peaks `counted`, the time of
-    `settling` [s] from the last corner of the reference until the stage stays in position (infinite: it swings, or
-    creeps), root mean squares of the deviation `in_position`, in the last quarter of the run [m], and of the commanded
-    `force`, over all of it [N]."""
+    `settling` [s] (see `friso.hunting.criteria.settling`; infinite: it swings, creeps, or is not in position at the far
+    end of its motion when it returns), root mean squares of the deviation `in_position`, in the last quarter of the run
+    [m], and of the commanded `force`, over all of it [N]."""
 
     outcome: np.ndarray
     counted: np.ndarray
@@ -48,6 +49,11 @@ class MachineMeasures:
         """Which runs swing at their end, shape (count,)."""
         return self.outcome == SWINGS
 
+    @property
+    def rests(self) -> np.ndarray:
+        """Which runs are in position at their end, shape (count,)."""
+        return self.outcome == RESTS
+
 
 AnyMeasures = TypeVar("AnyMeasures", "MachineMeasures", "Later")
 
@@ -59,15 +65,15 @@ def concatenate_chunks(parts: Sequence[AnyMeasures]) -> AnyMeasures:
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
-def measure_chunk(recorded: RecordedRuns, corner: float, within: float) -> MachineMeasures:
-    """The measures of a chunk of runs whose reference stands from `corner` [s] on; in position is `within` [m]. What
+def measure_chunk(recorded: RecordedRuns, stands: list[Stand], within: float) -> MachineMeasures:
+    """The measures of a chunk of runs whose reference comes to stand at `stands`; in position is `within` [m]. What
     the drive logs counts for the peaks, what really moves for the rest."""
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
     done = recorded.statuses == Status.DONE
     outcome = outcomes(end_of_traces(time, deviation, within, done), within)
     late = deviation[:, time >= WINDOW * time[-1]]
-    settling = np.where(outcome == RESTS, settling_time(time, deviation, corner, within), np.inf)
+    settling = np.where(outcome == RESTS, settling_of_traces(stands, time, deviation, within), np.inf)
     return MachineMeasures(
         outcome=outcome,
         counted=np.where(done, peaks_in_traces(time, recorded.logged["position"] - reference), 0),
@@ -93,14 +99,6 @@ def staying_in_position(recorded: RecordedRuns, within: float) -> Later:
     done = recorded.statuses == Status.DONE
     words = outcomes(end_of_traces(recorded.time, deviation, within, done), within, hold=recorded.time[-1] / 2)
     return Later(done, words == RESTS)
-
-
-def settling_time(time: np.ndarray, deviation: np.ndarray, corner: float, within: float) -> np.ndarray:
-    """Time [s] from the corner on until the deviation [m], shape (runs, n), stays within; infinite where it is not at
-    the end, shape (runs,)."""
-    following = np.searchsorted(time, last_outside(time, deviation, within), side="right")
-    inside = np.append(time, np.inf)[following]
-    return np.maximum(inside - corner, 0.0)
 
 
 def _rms(values: np.ndarray) -> np.ndarray:

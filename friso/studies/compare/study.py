@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.equations.motion import last_corner
+from friso.equations.motion import Stand, last_corner, stands
 from friso.equations.settings import settings_named
 from friso.errors import InputError
 from friso.progress import Progress, silent
@@ -70,7 +70,7 @@ class OptionResult:
     @property
     def settled(self) -> Share:
         """The probability of being in position to stay by the end of the run."""
-        return share(np.isfinite(self.measures.settling), self.measures.done)
+        return share(self.measures.rests, self.measures.done)
 
     @property
     def stays(self) -> Share:
@@ -105,7 +105,7 @@ class OptionResult:
     @property
     def in_position_count(self) -> int:
         """Machines that are in position to stay by the end of the run."""
-        return int(np.isfinite(self.measures.settling).sum())
+        return int(self.measures.rests.sum())
 
     @property
     def rests(self) -> bool:
@@ -187,11 +187,11 @@ def compare(
         raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
     settings = settings_named(also, (ADRC,))
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
-    corner = _corner(machines.stage)
+    places = _places(machines.stage)
     begins()
     progress(0, 1, "how fast the controller may be")
     tried = options(machines, within, settings, bool({ADRC, "all"} & {*also}))
-    work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(tried.options))
+    work = _Work(machines, own_motion(machines.stage), places, within, progress, len(tried.options))
     results: list[OptionResult] = []
     for option in tried.options:
         measures, later = work.runs(option, len(results)), work.longer(option)
@@ -202,8 +202,8 @@ def compare(
     return Comparison(machines, tried, tuple(results), within, seed, notes)
 
 
-def _corner(stage: Stage) -> float:
-    """From when on the reference stands [s]. Raises InputError where that is too late, or never."""
+def _places(stage: Stage) -> list[Stand]:
+    """Where the reference comes to stand. Raises InputError where that is too late, or never."""
     flat = stage.flat()
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
     if flat["motion.kind"] == "ramp":
@@ -212,17 +212,17 @@ def _corner(stage: Stage) -> float:
     if corner > LATEST * duration:
         expected = f"at least {corner / LATEST:g} s: the reference stands by half of it"
         raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
-    return corner
+    return stands(flat)
 
 
 @dataclass(frozen=True)
 class _Work:
-    """What all options share: the machines, their task, from when on its reference stands [s], the tolerance [m], who
+    """What all options share: the machines, their task, the places where its reference stands, the tolerance [m], who
     to which progress is reported, and how many options there are."""
 
     machines: Machines
     task: MoveTask
-    corner: float
+    places: list[Stand]
     within: float
     progress: Progress
     options: int
@@ -233,7 +233,7 @@ class _Work:
         label, total = f"{option.letter} {option.name}", count * self.options
         self.progress(before * count, total, label)
         for recorded in self._recorded(option, self.task, count, 1):
-            parts.append(measure_chunk(recorded, self.corner, self.within))
+            parts.append(measure_chunk(recorded, self.places, self.within))
             self.progress(before * count + int(recorded.numbers[-1]) + 1, total, label)
         return concatenate_chunks(parts)
 

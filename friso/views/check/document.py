@@ -64,6 +64,7 @@ def _feeding(feeding: Feeding) -> dict[str, Any]:
 
 def _case(case: Case) -> dict[str, Any]:
     into_1um, into_10um = case.settling_time.values()
+    last_1um, last_10um = case.in_the_end.values()
     judgement = case.judgement
     return {
         "verdict": case.verdict,
@@ -72,6 +73,8 @@ def _case(case: Case) -> dict[str, Any]:
         "period_s": case.period,
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
+        "settling_time_in_the_end_s": last_1um,
+        "settling_time_10um_in_the_end_s": last_10um,
         "largest_force_n": case.largest_force,
         "breakaway_force_n": case.breakaway,
         "unmoved": case.unmoved,

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 
 BASIS = (
     "The verdict is by everything that attracts the stage; peaks are also counted, as in the thesis (Fix, Univ. of "
-    "Twente, Sec. 3.2.2). Settling times count from the last corner of the reference"
+    "Twente, Sec. 3.2.2). Settling times count from the last corner of the reference; "
+    "there and back, the longer one of both ends"
 )
 
 

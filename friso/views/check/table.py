@@ -136,6 +136,8 @@ def _settled_within(band: float) -> Callable[[Case], str]:
         time = case.settling_time.get(band)
         if time is not None:
             return with_unit(time, "s")
+        if case.in_the_end.get(band) is not None:
+            return f"not before it returns; {with_unit(case.in_the_end[band] or 0.0, 's')} afterwards"
         return "never" if case.verdict == "hunts" else "not in this run"
 
     return text

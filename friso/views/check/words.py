@@ -192,9 +192,17 @@ def _settling_sentence(case: Case) -> str:
     if coarse is not None:
         within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(coarse, 's')}{stuck}"
         swing = _small_swing(case)
-        finer = f"does not stay within {band_text(_MICRON)}{swing}" if swing else f"not to within {band_text(_MICRON)}"
-        return f"{within}, but {finer}."
+        finer = f"not to within {band_text(_MICRON)}{_at_the_far_end(case, _MICRON)}"
+        return f"{within}, but {f'does not stay within {band_text(_MICRON)}{swing}' if swing else finer}."
+    if far := _at_the_far_end(case, _TEN_MICRON):
+        within = f"settles to within {band_text(_TEN_MICRON)} in {with_unit(case.in_the_end[_TEN_MICRON] or 0.0, 's')}"
+        return f"{within}{stuck}, but not{far}."
     return " ".join([f"settles{stuck}, but not to within {band_text(_TEN_MICRON)} ({_end(case)}).", *_held(case)])
+
+
+def _at_the_far_end(case: Case, band: float) -> str:
+    """That it is at the far end alone that a stage does not settle to within a band [m] in time; "" if it is not."""
+    return " at the far end before it returns" if case.in_the_end.get(band) is not None else ""
 
 
 def _small_swing(case: Case) -> str:
@@ -279,7 +287,16 @@ def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 
     value = factor * (crossover or 1.0)
     if up is not None:
         value = (rounded_up if up else rounded_down)(value, digits)
-    return f"{value:.{digits}g} times this bandwidth" if crossover is None else with_unit(value, "Hz", digits)
+    if crossover is None:
+        return f"{value:.{digits}g} times this bandwidth"
+    key = _elsewhere(case)
+    return f"{key} = {with_unit(value, 'Hz', digits)}" if key else with_unit(value, "Hz", digits)
+
+
+def _elsewhere(case: Case) -> str | None:
+    """The key that states a bandwidth [Hz] which is not where the loop crosses 0 dB; None where it is, or without."""
+    controller = case.stage.controller
+    return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
 def _windows(case: Case) -> list[str]:
@@ -332,7 +349,8 @@ def _faster(case: Case, edge: Margin) -> str:
         crossover = edge.crossover / edge.factor
         to = rounded_up(crossover * edge.quiet * apart)
         by = rounded_up(to - crossover)
-        return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}{kept}){doubt}"
+        name = _elsewhere(case) or f"the {controller.bandwidth_name}"
+        return f"raise {name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}{kept}){doubt}"
     factor = rounded_up(edge.quiet * apart)
     powers = controller.speeds_up.items()
     gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]

@@ -75,10 +75,15 @@ def need(design: Design) -> str:
     limit, factor, without = hertz(design.spec.limit), design.spec.safety.hunting, design.without
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
-    least = factor * without.highest
-    bound = f"{hertz(least)} or more" if math.isfinite(least) else "higher than the range searched"
-    where = " in the worst corner of friction and masses" if without.population.count > 1 else ""
-    above = f"{bound}, {factor:g} times the edge of hunting{where}"
+    corners = without.population.count > 1
+    if not math.isfinite(without.highest):
+        where = "in the worst corner of friction and masses, " if corners else ""
+        return (
+            f"An isolator is needed: without one the machine hunts, {where}even at {hertz(without.searched[1])}, the "
+            f"highest crossover tried; it allows {limit}."
+        )
+    where = " in the worst corner of friction and masses" if corners else ""
+    above = f"{hertz(factor * without.highest)} or more, {factor:g} times the edge of hunting{where}"
     if design.needed:
         return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."
     return f"No isolator is needed: without one the crossover must be {above}, and the machine allows {limit}."

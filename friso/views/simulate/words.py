@@ -44,12 +44,19 @@ def _restless(farthest: float, final: float, moved: float, grows: bool) -> str:
 
 
 def _settling(measures: Measures) -> str:
-    """How long after the last corner of the reference the stage stays within the bands."""
-    into_1um, into_10um = (_value(time) for time in measures.settling_time)
-    text = f"within {with_unit(BAND, 'm')} of its reference, {with_unit(into_10um, 's')} after its last corner"
-    return (
-        text if into_1um != into_1um else f"{text}; within {with_unit(BANDS[0], 'm')} after {with_unit(into_1um, 's')}"
+    """How long after the corners of the reference at which it comes to stand the stage stays within the bands."""
+    (fine, coarse), (last_fine, last_coarse) = (
+        tuple(map(_value, times)) for times in (measures.settling_time, measures.in_the_end)
     )
+    text = f"within {with_unit(BAND, 'm')} of its reference, {with_unit(last_coarse, 's')} after its last corner"
+    if not np.isnan(last_fine):
+        text = f"{text}; within {with_unit(BANDS[0], 'm')} after {with_unit(last_fine, 's')}"
+    if np.isnan(coarse):
+        return f"{text}; not within {with_unit(BAND, 'm')} at the far end before it returned"
+    if np.isnan(fine) and not np.isnan(last_fine):
+        return f"{text}; not within {with_unit(BANDS[0], 'm')} at the far end before it returned"
+    far = f"{with_unit(coarse, 's')} and {with_unit(fine, 's')}" if fine > last_fine else with_unit(coarse, "s")
+    return f"{text} (at the far end {far})" if coarse > last_coarse or fine > last_fine else text
 
 
 def _value(array: np.ndarray) -> float:

@@ -289,7 +289,7 @@ def _nothing(tuning: Advice) -> list[str]:
         for outcome in unsure
         if outcome.stage is not None
     ]
-    lines += [_relax(relaxed) for relaxed in tuning.relaxed]
+    lines += [_relax(relaxed, tuning.stage) for relaxed in tuning.relaxed]
     if not (tuning.goal.controller and tuning.goal.joint):
         lines.append(f"Changes of the {'joint' if tuning.goal.controller else 'controller'} were not tried, as told.")
     if not tuning.relaxed and not tuning.interrupted:
@@ -304,15 +304,17 @@ def _no_relaxation(tuning: Advice) -> str:
     return "No relaxation of up to three parts of the goal was found with which an option meets it."
 
 
-def _relax(relaxed: RelaxedGoal) -> str:
+def _relax(relaxed: RelaxedGoal, before: Stage) -> str:
+    """What of the goal to relax, and what would then be set."""
+    crossing = {"bandwidth_limit": ", at which the loop last crosses 0 dB,"}
     parts = [
-        f"{OPTIONS.get(part.key, part.requirement)} of {number(part.needed, part.unit)} instead of "
-        f"{number(part.value, part.unit)}"
+        f"{OPTIONS.get(part.key, part.requirement)} of {number(part.needed, part.unit)}{crossing.get(part.key, '')} "
+        f"instead of {number(part.value, part.unit)}"
         for part in relaxed.relaxations
     ]
     return (
-        f"With a {listed(parts, 'and')}, {relaxed.remedy.name} would work on the machines tried (this was not verified "
-        "by cycles: run friso tune again with it)."
+        f"With a {listed(parts, 'and')}, {relaxed.remedy.name} would work on the machines tried "
+        f"({listed(changes(before, relaxed.stage), 'and')}; not verified by cycles: run friso tune again with it)."
     )
 
 
@@ -398,7 +400,9 @@ def _lowest(points: TriedPoints, goal: Goal) -> str:
     """The lowest bandwidth of the settings that meet all else."""
     others = np.all([~broken for name, broken in points.broken(goal).items() if name != "bandwidth"], axis=0)
     lowest = np.nanmin(points.bandwidth[others], initial=np.inf)
-    return f", the slowest with {with_unit(float(lowest), 'Hz')}" if np.isfinite(lowest) else ""
+    return (
+        f", the slowest of which last crosses 0 dB at {with_unit(float(lowest), 'Hz')}" if np.isfinite(lowest) else ""
+    )
 
 
 def _edges(tuning: Advice) -> str:
