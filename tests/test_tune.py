@@ -46,7 +46,7 @@ from friso.remedies.least import change_costs, least_remedy
 from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import UNSEEN, Advice, _not_seen, tune
 from friso.remedies.relax import WIDER, _tolerances, relaxations
-from friso.remedies.search import Budget, Search, TriedPoints
+from friso.remedies.search import WORST, Budget, Search, TriedPoints, _evolve
 from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
 from friso.remedies.suggestion import suggestion
 from friso.remedies.trials import LOOSER, Attraction, Moves, attraction, modulus_margins, moves_of_points, quantile
@@ -618,13 +618,13 @@ DITHER = {"dither_amplitude": "0.5 N", "dither_frequency": "100 Hz"}
 def test_reasons_say_nothing_of_settings_that_were_left_out_before() -> None:
     """One setting settles without the margin, the other has it and does not settle."""
     columns: dict[str, Any] = {name: [1.0, np.inf] for name in ("settling", "looser", "slower")}
-    columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2}
+    columns |= {"force": [1.0] * 2, "margin": [0.4, 0.6], "bandwidth": [8.0] * 2, "nearness": [1.0, 0.0]}
     points = TriedPoints(np.zeros((2, 1)), *(np.array(column) for column in columns.values()))
     outcome: Any = SimpleNamespace(cut=False)
     both, one = (next(_reasons(some, outcome, Goal())) for some in (points, points.take(np.array([1]))))
     assert "0.5" in both
     assert "0.5" not in one
-    outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((6, 2)))
+    outcome.attracted, kept = 24, TriedPoints(np.zeros((2, 1)), *np.ones((7, 2)))
     assert "2 settings tried 2 meet the rest" in next(_reasons(kept, outcome, Goal()))
 
 
@@ -633,7 +633,7 @@ def test_a_narrow_range_in_which_nothing_attracts_is_found(first: float, machine
     """Of settings that settle the sooner the lower they are, a range of 6 % anywhere; next to those with which
     something attracts, none is surveyed."""
     shares = np.linspace(0, 1, 60)
-    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((5, 60)))
+    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((6, 60)))
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     attracted: list[float] = []
 
@@ -654,7 +654,7 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
     """The settings that settle soonest lie at the edge of the margin: 92 % of fresh machines met the goal with them,
     98 % with a crossover lower by 4 %, and the remedy was said not to be sure."""
     shares = np.linspace(0, 1, 201)
-    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((5, 201)))
+    points = TriedPoints(shares[:, None], 1 + shares, *np.ones((6, 201)))
     search = Search(Remedy.settled_on("", rigid), Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
     search.clear = lambda batch: np.ones(len(batch), bool)  # pyright: ignore[reportAttributeAccessIssue]
     search.share = lambda batch: 0.92 + 0.5 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
@@ -915,11 +915,29 @@ def test_an_edge_that_was_not_searched_to_the_end_is_a_doubt() -> None:
 
 
 def test_costs_order_settings() -> None:
-    """What breaks a constraint costs more than what does not, and the more the further it does."""
-    columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf], "looser": [1.0] * 4, "slower": [1.0] * 4}
-    columns |= {"force": [1.0] * 4, "margin": [0.6, 0.6, 0.4, 0.6], "bandwidth": [8.0] * 4}
-    points = TriedPoints(np.zeros((4, 1)), *(np.array(column) for column in columns.values()))
-    assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3]
+    """What breaks a constraint costs more than what does not, and the more the further it does: where not all machines
+    settle, the more the fewer do."""
+    columns: dict[str, Any] = {"settling": [1.0, 2.0, 1.0, np.inf, np.inf], "looser": [1.0] * 5, "slower": [1.0] * 5}
+    columns |= {"force": [1.0] * 5, "margin": [0.6, 0.6, 0.4, 0.6, 0.6], "bandwidth": [8.0] * 5}
+    columns["nearness"] = [1.0, 1.0, 1.0, 0.75, 0.25]
+    points = TriedPoints(np.zeros((5, 1)), *(np.array(column) for column in columns.values()))
+    assert points.cost(Goal()).argsort().tolist() == [0, 1, 2, 3, 4]
+
+
+def test_a_search_goes_on_while_all_points_are_as_bad() -> None:
+    """Where no point of a generation settled, all cost the same, and the search was taken to have converged."""
+    counts = []
+    for costs in (np.full(10, WORST), np.full(10, 0.5)):
+        tried: list[int] = []
+
+        def cost(shares: np.ndarray, costs: np.ndarray = costs, tried: list[int] = tried) -> np.ndarray:
+            tried.append(shares.shape[1])
+            return costs
+
+        _evolve(cost, np.random.default_rng(1).random((10, 2)), [(0.0, 1.0)] * 2, 6)
+        counts.append(len(tried))
+    assert counts[0] == 6
+    assert counts[1] < 6
 
 
 @pytest.mark.parametrize("motion", ["hold", "ramp"])

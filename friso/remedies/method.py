@@ -26,7 +26,7 @@ from friso.remedies.goal import Goal
 from friso.remedies.least import MORE, candidates, least_remedy, seek_least
 from friso.remedies.machines import TRAVEL, Fleet, draw_fleet
 from friso.remedies.relax import RelaxedGoal, relaxations
-from friso.remedies.search import Budget, Search
+from friso.remedies.search import NEAR, Budget, Search
 from friso.remedies.sensitivities import Sensitivities, edge_sensitivities
 from friso.remedies.trials import modulus_margins
 from friso.remedies.verified import (
@@ -153,7 +153,7 @@ def tune(
     begins()
     ideal = stage.replace({table: None for table in AS_BUILT if getattr(stage, table)})
     listed = [remedy for remedy in remedies(ideal, goal) if chosen is None or remedy.name in chosen]
-    later = (PAIRS + 2) * (budget.generations + budget.refined + 4)  # pairs and the least change, about
+    later = (PAIRS + 2) * (_generations(budget) + 4)  # pairs and the least change, about
     report = _Report(progress, sum(_steps(remedy, budget) for remedy in listed) + later + 2)
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
@@ -382,7 +382,12 @@ def _moves(stage: Stage) -> None:
 
 def _steps(remedy: Remedy, budget: Budget) -> int:
     """How many reports a remedy makes, about."""
-    return (2 if len(remedy.variables) < 2 else budget.generations + budget.refined) + 4
+    return (2 if len(remedy.variables) < 2 else _generations(budget)) + 4
+
+
+def _generations(budget: Budget) -> int:
+    """How many generations a search has at most."""
+    return budget.generations + len(NEAR) * budget.refined
 
 
 class _Report:

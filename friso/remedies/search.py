@@ -39,8 +39,11 @@ WORK = 6e8
 FAR_ABOVE = 1.5
 """Factor of the limit of the bandwidth above which it is far above."""
 
-NEAR = 0.12
-"""Share of the ranges about the best point, to both sides, in which a search goes on."""
+NEAR = (0.12, 0.03)
+"""Shares of the ranges about the best point, to both sides, in which a search goes on, one after the other."""
+
+AGREED = 0.01
+"""Share of their mean by which the costs of a generation differ with which a search ends."""
 
 SPARE = 1e-3
 """Share by which a bandwidth stays below its limit: numbers are rounded, and bandwidths taken from a grid."""
@@ -58,11 +61,11 @@ WIDENED = 1.5
 
 @dataclass(frozen=True)
 class Budget:
-    """Points of a generation for each variable, generations, and those about the best of these; machines in the moves
-    that are tried and in the surveys; fresh machines on which an answer is measured."""
+    """Points of a generation for each variable, generations, and those about the best of these, each time; machines in
+    the moves that are tried and in the surveys; fresh machines on which an answer is measured."""
 
     points: int = 10
-    generations: int = 10
+    generations: int = 16
     refined: int = 8
     machines: int = 12
     surveyed: int = 8
@@ -73,8 +76,9 @@ class Budget:
 class TriedPoints:
     """Points that were tried, one a row: their `shares` of the ranges (n, variables), and, each of shape (n,), the
     settling time of the slowest twentieth [s] and within the looser tolerance, the same with the bandwidth lower by the
-    distance from hunting, the largest force [N] and least modulus margin of all but a twentieth, and the bandwidth [Hz]
-    (see `loop_bandwidth`) of the machine of the stage file."""
+    distance from hunting, the largest force [N] and least modulus margin of all but a twentieth, the bandwidth [Hz]
+    (see `loop_bandwidth`) of the machine of the stage file, and how near all machines are to settling, from 0 to 1 (see
+    `Search.measured`)."""
 
     shares: np.ndarray
     settling: np.ndarray
@@ -83,6 +87,7 @@ class TriedPoints:
     force: np.ndarray
     margin: np.ndarray
     bandwidth: np.ndarray
+    nearness: np.ndarray
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
         """The points with these numbers."""
@@ -108,7 +113,7 @@ class TriedPoints:
         excess = np.maximum(0, goal.margin - self.margin)
         excess += np.where(np.isfinite(self.force), _excess(np.nan_to_num(self.force), goal.force_limit), 3.0)
         excess += np.nan_to_num(_excess(self.bandwidth, goal.bandwidth_limit), nan=3.0)
-        excess += ~np.isfinite(self.settling) * 3.0 + ~np.isfinite(self.slower) * 1.0
+        excess += 4.0 * (1 - self.nearness)
         time = np.where(np.isfinite(self.settling), self.settling, 100.0)
         excess += _excess(time, goal.settle)
         minimised = time if wanted is None else wanted
@@ -188,13 +193,15 @@ class Search:
             few = start[: size // 2]
             drawn[: len(few)] = few
         _evolve(cost, drawn, [(0.0, 1.0)] * variables, self.budget.generations)
-        points = self.points
-        best = points.shares[int(points.cost(self.goal, None if wanted is None else wanted(points.shares)).argmin())]
-        ends = [(max(0.0, at - NEAR), min(1.0, at + NEAR)) for at in best]
-        low, high = np.array(ends).T
-        near = low + (high - low) * drawn
-        near[0] = best
-        _evolve(cost, near, ends, self.budget.refined)
+        for away in NEAR:
+            points = self.points
+            costs = points.cost(self.goal, None if wanted is None else wanted(points.shares))
+            best = points.shares[int(costs.argmin())]
+            ends = [(max(0.0, at - away), min(1.0, at + away)) for at in best]
+            low, high = np.array(ends).T
+            near = low + (high - low) * drawn
+            near[0] = best
+            _evolve(cost, near, ends, self.budget.refined)
 
     def _at_the_limit(self, grid: np.ndarray) -> list[float]:
         """Where between shares of its range a remedy of one variable comes to the limit of the bandwidth from below."""
@@ -217,23 +224,26 @@ class Search:
     def measured(self, shares: np.ndarray) -> TriedPoints:
         """Points on the machines: the moves are run only where the loop is stable and has half of the margin and, of
         remedies that vary more than the bandwidth, this is not far above its limit: such moves chatter and would take
-        most of the work."""
+        most of the work. A point is near to settling in so far as machines settle, within the tolerance, the looser
+        one, and that at the lower bandwidth: where none is in position, the search sees where a few are."""
         goal, count = self.goal, len(shares)
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
         bandwidth = self._bandwidth(shares)
         far = bandwidth > FAR_ABOVE * _most(goal.bandwidth_limit)
         stable = np.flatnonzero((margin > goal.margin / 2) & ~(far & (len(self.remedy.variables) > 1)))
-        columns = [np.full(count, np.inf) for _ in range(4)]
+        columns, nearness = [np.full(count, np.inf) for _ in range(4)], np.zeros(count)
         if stable.size:
             moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal)
-            slower_moves: Moves = moves_of_points(
-                self.remedy, shares[stable], self.machines, goal, slower=goal.distance
-            )
-            values = (moves.settling, moves.looser, slower_moves.looser, moves.force)
+            slower, rests = np.full_like(moves.looser, np.inf), np.flatnonzero(np.isfinite(moves.looser).any(axis=1))
+            if rests.size:  # those that settle nowhere are not asked whether they do at a lower bandwidth
+                some = shares[stable[rests]]
+                slower[rests] = moves_of_points(self.remedy, some, self.machines, goal, slower=goal.distance).looser
+            values = (moves.settling, moves.looser, slower, moves.force)
             for column, value in zip(columns, values, strict=True):
                 column[stable] = quantile(value, goal.share)
+            nearness[stable] = np.mean(np.isfinite(values[:3]), axis=(0, 2))
         settling, looser, slower, force = columns
-        return TriedPoints(shares, settling, looser, slower, force, margin, bandwidth)
+        return TriedPoints(shares, settling, looser, slower, force, margin, bandwidth, nearness)
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
         """With which points (points, variables) nothing attracts the machines, shape (points,)."""
@@ -303,12 +313,21 @@ def _evolve(
         ends,
         maxiter=generations - 1,
         init=start,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
-        tol=0.01,
+        tol=0.0,
+        atol=-1,  # never by itself, not even where all costs are the same
+        callback=_agree,
         rng=SEED,
         polish=False,
         vectorized=True,
         updating="deferred",
     )
+
+
+def _agree(intermediate_result: Any) -> bool:
+    """Whether the points of a generation break no constraint and are as good as each other: before that, they may all
+    be as bad."""
+    costs = intermediate_result.population_energies
+    return bool(costs.max() < WORST and costs.std() <= AGREED * costs.mean())
 
 
 def _apart(shares: np.ndarray, most: int, apart: float) -> np.ndarray:

@@ -17,21 +17,21 @@ from friso.engine.batch import Runs
 from friso.equations.motion import Stand, stands
 from friso.hunting.criteria.run_outcome import last_outside
 
-Band = Literal["inner", "outer"]
+BandName = Literal["inner", "outer"]
 
 
-def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: Band) -> np.ndarray:
+def settling_of_runs(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
     """The settling times [s] of a chunk of runs into one of their bands, shape (runs,); the keys of the stages are
     `flat`, arrays of which have one entry per run of the chunk. Runs that were not completed have one all the same."""
     return _longest(_at_stands(flat, runs, band))
 
 
-def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: Band) -> np.ndarray:
+def settling_in_the_end(flat: Mapping[str, Any], runs: Runs, band: BandName) -> np.ndarray:
     """The same at the last place alone: the verdict on a stage asks no more."""
     return _at_stands(flat, runs, band)[-1]
 
 
-def _at_stands(flat: Mapping[str, Any], runs: Runs, band: Band) -> list[np.ndarray]:
+def _at_stands(flat: Mapping[str, Any], runs: Runs, band: BandName) -> list[np.ndarray]:
     last, before = runs.statistic(f"{band}_exit"), runs.statistic(f"{band}_before")
     outside = [before, np.where(last < runs.statistic("ended"), last, np.inf)]
     places = stands(flat)
