@@ -64,7 +64,7 @@ export class Logs {
         this.look();
       };
       const name = role.replaceAll("_", " ");
-      const measure = el("input", { type: "text", id: `measure-${role}`, class: "measure", "aria-label": `Unit or scale of ${name}`, placeholder: "unit", title: "Unit of the channel (mm), or scale (35.15 N/V), where the file does not say it", value: this.measures.get(role) ?? "", onchange: () => this.measured(role, measure.value) });
+      const measure = el("input", { type: "text", id: `measure-${role}`, class: "measure", "aria-label": `Unit or scale of ${name}`, placeholder: "unit or scale", title: "Unit of the channel (mm), or scale (35.15 N/V), where the file does not say it", value: this.measures.get(role) ?? "", onchange: () => this.measured(role, measure.value) });
       return el("div", { class: "role" }, el("label", {}, name, el("select", { id: `role-${role}`, onchange: choose }, ...options)), measure);
     };
     this.dt = el("input", { type: "text", id: "sample-time", placeholder: "e.g. 1 ms", value: this.dt?.value ?? "", onchange: () => this.look() });
@@ -73,7 +73,7 @@ export class Logs {
     const fields = [
       ...roles.map(choice),
       el("label", {}, "sample time", this.dt),
-      el("label", {}, "the machine shown is what is known", this.assumed),
+      el("label", { class: "tick" }, this.assumed, "The machine shown is what is known"),
       el("button", { type: "button", id: "identify", onclick: start }, "Identify"),
       el("button", { type: "button", onclick: () => this.forget() }, "Other files"),
     ];

@@ -8,7 +8,7 @@ import { Working } from "./working.js";
 /** Ask on a lane, and show progress and answer in a place; resolves to the answer, or null. */
 export async function shownAnswer(place, lane, question, body, tell) {
   const working = new Working();
-  working.show({ kind: "message", text: "…" });
+  working.show({ kind: "progress", label: "begun" });
   const stop = el("button", { type: "button", onclick: () => { end(lane); place.replaceChildren(); } }, "Stop");
   place.replaceChildren(working.place, stop);
   const asked = body();
