@@ -463,6 +463,19 @@ def test_a_run_is_that_of_friso(served: Served) -> None:
     assert np.array_equal(lines[0]["y"], expected.astype(np.float32))
 
 
+def test_the_loops_of_the_limit_cases_come_before_those_of_the_family(served: Served) -> None:
+    """Then how fast the controller may be, which takes longer; all of it is what friso says."""
+    answer = friso.bode(RIG)
+    first, family, words = (part for part in served.ask("bode", RIG) if part["kind"] != "message")
+    drawn = [[figure["name"] for figure in part["figures"]] for part in (first, family)]
+    assert drawn[0] == ["bode_plant", "bode_loop"]
+    assert [*drawn[0], *drawn[1]] == family["names"] == [figure.name for figure in answer.figures()]
+    assert first["names"] is None
+    assert (words["sentences"], "figures" in words) == ([*answer.sentences()], False)
+    *_, last = served.ask("loops", RIG)
+    assert (last["names"], last["sentences"]) == (family["names"], [])
+
+
 def test_a_cell_of_a_map_shows_the_error_of_its_run(served: Served) -> None:
     part = served.ask("cell", STICK_SLIP, {"masses.stage": "1.1 kg"})[-1]
     assert part["sentences"] == [*friso.simulate(STICK_SLIP, set={"masses.stage": "1.1 kg"}).sentences()]

@@ -218,6 +218,30 @@ def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(b
     assert old == [True, True]
 
 
+def test_plots_that_come_in_parts_stay_in_order_and_go_once_it_is_known_that_they_do(browsed: Browsed) -> None:
+    shown = browsed.page.evaluate(
+        """async () => {
+            const { draw } = await import('/plot.js');
+            const layout = { height: 100 };
+            const figure = (name) => ({ name, title: name, caption: '', data: [], bars: [], layout, narrow: layout });
+            const place = document.createElement('div');
+            document.body.append(place);
+            const shown = [];
+            const drawn = (names, all) => {
+                draw(place, names.map(figure), {}, all);
+                shown.push([...place.children].map((box) => box.dataset.name).join(' '));
+            };
+            drawn(['one', 'four']);
+            drawn(['one', 'two'], null);
+            drawn(['three'], ['one', 'two', 'three']);
+            drawn(['one']);
+            place.remove();
+            return shown;
+        }"""
+    )
+    assert shown == ["one four", "one four two", "one two three", "one"]
+
+
 def test_what_is_said_early_stays_until_the_answer_is_there(browsed: Browsed) -> None:
     """Progress does not take its place; the whole answer says itself what is true of the machine."""
     page = browsed.page

@@ -49,6 +49,12 @@ class BodeAnswer(Answer):
 
         return bode_figures(self.result)
 
+    def first_figures(self) -> Sequence[Figure]:
+        """Those of the limit cases, which are there sooner than the others."""
+        from friso.views.bode.figures import first_figures
+
+        return first_figures(self.result)
+
     def document(self) -> dict[str, Any]:
         """Margins and limits."""
         from friso.views.bode.document import bode_document

@@ -73,10 +73,12 @@ def parts_of(answer: Answer, beside: Callable[[Figure], Figure] = lambda figure:
     return {**figures_of(answer, beside), **words_of(answer), **more}
 
 
-def figures_of(answer: Answer, beside: Callable[[Figure], Figure]) -> AnswerPart:
-    """The figures of an answer, without words."""
+def figures_of(
+    answer: Answer, beside: Callable[[Figure], Figure], some: Callable[[], Sequence[Figure]] | None = None
+) -> AnswerPart:
+    """The figures of an answer, or `some` of them, without words."""
     with speaking_of(answer.axis_kind):
-        figures = [figure_on_page(beside(figure)) for figure in answer.figures()]
+        figures = [figure_on_page(beside(figure)) for figure in (some or answer.figures)()]
     return {"kind": "answer", "sentences": [], "tables": [], "details": [], "failure": "", "figures": figures}
 
 
@@ -140,22 +142,22 @@ def check(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
 
 def bode(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
     """The loop in the limit cases: the figures, and then how fast the controller may be, which takes longer."""
-    answer, picture = _loops(asked, work)
     lines = _lines("bode", asked)
-    yield {**picture, **lines, "kind": "partly"}
-    yield {**words_of(answer), **lines}
+    for picture in loops(asked, work):
+        yield {**picture, "kind": "partly"}
+    yield {**words_of(KEPT.answer(friso.bode, asked.machine, work)), **lines}
 
 
 def loops(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:
-    """The same while a slider moves: the figures alone."""
-    yield {**_loops(asked, work)[1], **_lines("bode", asked)}
-
-
-def _loops(asked: PageRequest, work: Work) -> tuple[Answer, AnswerPart]:
+    """The same while a slider moves: the figures alone, first those that need no family of states."""
     asked.chosen()
-    ghosts = _ghosts(asked, work, friso.bode)
+    ghosts, lines = _ghosts(asked, work, friso.bode), _lines("bode", asked)
     answer = KEPT.answer(friso.bode, asked.machine, work)
-    return answer, figures_of(answer, ghosts)
+    first = figures_of(answer, ghosts, answer.first_figures)
+    yield {**first, **lines, "kind": "partly", "names": None}
+    there = [figure["name"] for figure in first["figures"]]
+    others = figures_of(answer, ghosts, lambda: [figure for figure in answer.figures() if figure.name not in there])
+    yield {**others, **lines, "names": [*there, *(figure["name"] for figure in others["figures"])]}
 
 
 def flexure(asked: PageRequest, work: Work) -> Iterator[AnswerPart]:

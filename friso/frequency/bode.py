@@ -72,17 +72,25 @@ class Bode:
     """The linear analysis of a stage.
 
     `omega` (k,) [rad/s], the frequencies of all curves; the limit `cases` by name, among them, if asked for, those with
-    the thesis's formula for a touched limiter ("-series"); the `scan` of the family; the loops at `prescribed` speeds
-    of the cart, the limiter free; and, of a cascade, each of its loops, `cascades` by limit case. What no figure shows
-    is computed once it is asked for.
+    the thesis's formula for a touched limiter ("-series"); and, of a cascade, each of its loops, `cascades` by limit
+    case. All else is computed once it is asked for.
     """
 
     stage: Stage
     omega: np.ndarray
     cases: Mapping[str, BodeCase]
-    scan: Scan
-    prescribed: tuple[Prescribed, ...]
     cascades: Mapping[str, CascadeLoops]
+
+    @cached_property
+    def scan(self) -> Scan:
+        """The stability of the family."""
+        flat = self.stage.flat()
+        return scan_stability(flat, family(flat))
+
+    @cached_property
+    def prescribed(self) -> tuple[Prescribed, ...]:
+        """The loops at prescribed speeds of the cart, the limiter free."""
+        return _prescribed(self.stage.flat(), self.omega)
 
     @property
     def stable(self) -> bool:
@@ -147,8 +155,6 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
             )
             for name, (keys, member) in states.items()
         },
-        scan=scan_stability(flat, family(flat)),
-        prescribed=_prescribed(flat, omega),
         cascades={name: cascade_loops(*state, omega) for name, state in states.items()} if is_cascade(flat) else {},
     )
 

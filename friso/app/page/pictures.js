@@ -159,10 +159,12 @@ export class Pictures {
     }
     if (answer.kind !== "partly") this.tell.progress(null);
     this.answer = answer;
-    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) });
+    if (answer.figures) draw(this.plots, answer.figures, { clicked: (point) => this.clicked(point), hovered: (point) => this.hovered(point) }, answer.names);
     clearTimeout(this.aging);
     if (answer.kind === "partly" && !answer.sentences.length) { // its words follow
-      this.aging = setTimeout(() => this.below.querySelectorAll(".note").forEach((item) => item.classList.add("stale")), OLD_AFTER);
+      const others = answer.names === null ? [...this.plots.children].filter((box) => !answer.figures.some((figure) => figure.name === box.dataset.name)) : [];
+      const old = [...this.below.querySelectorAll(".note"), ...others];
+      this.aging = setTimeout(() => old.forEach((item) => item.classList.add("stale")), OLD_AFTER);
       return this.tell.shown(answer, this.shown);
     }
     const words = this.shown === "check" ? [] : answer.sentences;

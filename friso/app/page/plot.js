@@ -17,22 +17,23 @@ function themed(value) {
 /**
  * Draw figures into a place, keeping the plots that are there: those of the same name are updated, first those that are
  * in sight. `tell` is called with the point that is `clicked`, and with that which the pointer is over (`hovered`), null
- * once it is gone.
+ * once it is gone. `names` are those of all figures that are to be there, null while that is not known: what is there stays.
  */
-export function draw(place, figures, tell = {}) {
-  const there = new Map([...place.children].filter((child) => child.dataset.name).map((child) => [child.dataset.name, child]));
-  for (const [name, child] of there) if (!figures.some((figure) => figure.name === name)) remove(child);
+export function draw(place, figures, tell = {}, names = figures.map((figure) => figure.name)) {
+  const boxes = () => new Map([...place.children].filter((child) => child.dataset.name).map((child) => [child.dataset.name, child]));
+  const there = boxes();
+  if (names) for (const [name, child] of there) if (!names.includes(name)) remove(child);
   for (const figure of figures) {
     let box = there.get(figure.name);
     if (!box) {
       const heading = el("h3", {}, figure.title);
       const caption = el("p", { class: "caption" }, figure.caption);
       box = el("section", { class: "figure", "data-name": figure.name }, heading, caption, el("div", { class: "plot" }));
+      place.append(box);
     } else {
       box.children[0].textContent = plain(figure.title);
       box.children[1].textContent = plain(figure.caption);
     }
-    place.append(box);
     box.classList.remove("stale"); // not once it is drawn: the machine may have changed by then
     const plotted = box.querySelector(".plot");
     plotted.style.height = `${figure.layout.height}px`;
@@ -41,6 +42,8 @@ export function draw(place, figures, tell = {}) {
       plot(plotted, figure, tell);
     };
   }
+  const all = boxes();
+  if (names?.some((name, k) => place.children[k]?.dataset.name !== name)) place.append(...names.map((name) => all.get(name)).filter(Boolean));
   const [seen, below] = [[], []];
   for (const plotted of place.querySelectorAll(".plot")) (inSight(plotted) ? seen : below).push(plotted);
   for (const plotted of seen) plotted.due?.();

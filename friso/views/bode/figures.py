@@ -61,7 +61,15 @@ LOST = "#eeb48f"
 
 def bode_figures(bode: Bode) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
-    figures = (_plant(bode), *_cascade(bode), _loop(bode), _speeds(bode), _nyquist(bode), _sensitivity(bode))
+    return (*first_figures(bode), *_drawn(bode, (_speeds(bode), _nyquist(bode), _sensitivity(bode))))
+
+
+def first_figures(bode: Bode) -> tuple[Figure, ...]:
+    """The first of them, which show the limit cases alone: the others need the family behind these, and take longer."""
+    return _drawn(bode, (_plant(bode), *_cascade(bode), _loop(bode)))
+
+
+def _drawn(bode: Bode, figures: tuple[Figure, ...]) -> tuple[Figure, ...]:
     return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
 
 
