@@ -196,6 +196,18 @@ def test_a_verdict_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browse
     page.wait_for_selector("#answer .case:not(.stale)")
 
 
+def test_a_picture_that_is_of_an_earlier_machine_is_shown_as_one(browsed: Browsed) -> None:
+    """Where the new one takes longer than a moment, or never comes: the server may be gone."""
+    page, held = browsed.page, []
+    page.wait_for_selector("#picture .figure:not(.stale)")
+    page.route("**/ask/run", lambda route: held.append(route))
+    with page.expect_request("**/ask/run"):
+        browsed.type("controller.crossover", "11 Hz")
+    page.wait_for_selector("#picture .figure.stale")
+    held[0].continue_()
+    page.wait_for_selector("#picture .figure:not(.stale)")
+
+
 def test_plots_that_are_drawn_late_do_not_say_that_the_machine_is_still_theirs(browsed: Browsed) -> None:
     """Those below what is in sight are drawn after the others, when the machine may have changed."""
     page = browsed.page
@@ -622,6 +634,8 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
     assert page.locator(".figure:not(.stale) .main-svg").count() > 0
     page.eval_on_selector(slider, "one => one.dispatchEvent(new Event('change'))")
     page.wait_for_function(said)
+    page.wait_for_timeout(500)  # longer than it takes until a picture is shown as an old one
+    assert page.locator(".figure.stale").count() == 0
     page.click("#undo")
     page.click("#tab-run")
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")

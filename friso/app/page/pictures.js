@@ -34,8 +34,17 @@ export class Pictures {
   follows(question) {
     return new Live(question, "picture", 3000, (answer, then) => {
       this.arrived(answer);
-      if (answer.kind !== "message" && answer.kind !== "partly") this.goOn(then);
+      if (answer.kind === "message") return;
+      if (then === this.due) clearTimeout(this.old);
+      else this.age(); // a newer one is due
+      if (answer.kind !== "partly") this.goOn(then);
     });
+  }
+
+  /** Unless a new picture comes soon, the one that is there is shown as that of an earlier machine. */
+  age() {
+    clearTimeout(this.old);
+    this.old = setTimeout(() => stale($("picture")), OLD_AFTER);
   }
 
   has(name) {
@@ -60,6 +69,7 @@ export class Pictures {
   show(id) {
     if (id === this.shown) return;
     this.shown = id;
+    clearTimeout(this.old);
     this.goOn();
     this.live.stop();
     this.loops.stop();
@@ -113,10 +123,16 @@ export class Pictures {
     if (this.shown !== "run") this.goOn();
     if (this.own[this.shown]) return;
     if (!this.plots) this.begin($("picture"));
-    if (this.shown === "run") this.live.ask(this.body(), then);
-    else {
+    if (this.shown === "run") {
+      this.due = then;
+      this.age();
+      this.live.ask(this.body(), then);
+    } else {
       clearTimeout(this.timer);
-      if (dragged && this.shown === "bode") return this.loops.ask(this.body());
+      if (dragged && this.shown === "bode") {
+        this.due = null; // none of them is older than what is there
+        return this.loops.ask(this.body(), null);
+      }
       this.loops.stop(); // what is still on its way is of the machine before
       stale($("picture"));
       if (!dragged) this.timer = setTimeout(() => this.ask(), AT_REST);
@@ -133,7 +149,10 @@ export class Pictures {
   async ask() {
     const { shown } = this;
     if (!this.machine || this.own[shown]) return;
-    if (shown === "run") return this.live.ask(this.body(), this.then);
+    if (shown === "run") {
+      this.due = this.then;
+      return this.live.ask(this.body(), this.then);
+    }
     if (shown === "check") return this.tell.check();
     const options = this.form ? this.form() : {};
     if (options === null) return;
