@@ -17,8 +17,8 @@ from friso.remedies.trials import LOOSER, attraction, moves_of_points
 from friso.remedies.verified import RemedyOutcome
 from friso.stage import Stage
 
-TRIED, SURVEYED = 3, 4
-"""Points whose machines are surveyed, at most, for one relaxation, and how many machines."""
+TRIED, SURVEYED = 3, 8
+"""Points whose machines are surveyed, at most, for one relaxation, and how many machines: those of the search."""
 
 WIDER, MOST = (1.5, 2.0, 3.0, 5.0), 64
 """Factors of the tolerance that are tried where the moves settle within ten times as much (`LOOSER`), of so many
