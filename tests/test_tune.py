@@ -44,7 +44,7 @@ from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
 from friso.remedies.least import change_costs, least_remedy
 from friso.remedies.machines import Fleet, draw_fleet
-from friso.remedies.method import UNSEEN, Advice, _not_seen, tune
+from friso.remedies.method import UNSEEN, Advice, _not_seen, _Session, tune
 from friso.remedies.relax import WIDER, _tolerances, relaxations
 from friso.remedies.search import WORST, Budget, Search, TriedPoints, _evolve
 from friso.remedies.sensitivities import SMOOTH, Sensitivities, _is_smooth, _of_settling, sensitivity
@@ -560,6 +560,25 @@ def test_what_changes_nothing_costs_nothing(tuning: Advice) -> None:
     assert works.stage is not None
     on_the_same = moves_of_points(AS_IS(works.stage), ONE, unseen, tuning.goal)
     assert np.array_equal(works.measured.moves.settling, on_the_same.settling)
+
+
+@pytest.mark.parametrize(("crossover", "taken"), [("20 Hz", True), ("30 Hz", False)])
+def test_the_least_change_of_few_keys_is_sought_among_these_alone(
+    tuning: Advice, monkeypatch: pytest.MonkeyPatch, crossover: str, taken: bool
+) -> None:
+    """A search among three keys left two of them as they were; one of the third alone is taken if it changes less."""
+    (works,) = tuning.working
+    three = Remedy("gains: the least change", tuning.stage, (of_key("controller.crossover", 1, 50, 8),) * 3)
+    of_three = replace(works, remedy=three, stage=tuning.stage.replace({"controller.crossover": "25 Hz"}))
+    alone = replace(of_three, stage=tuning.stage.replace({"controller.crossover": crossover}))
+    coming = [of_three, alone]
+    made: Any = [tuning.stage, None, None, None, None, None, None, None]
+    session = _Session(*made, outcomes=[replace(works, stage=tuning.stage.replace({"controller.crossover": "40 Hz"}))])
+    monkeypatch.setattr(session, "_tries_less_than", lambda outcome: session.outcomes.append(coming.pop(0)) or True)
+    session.tries_less()
+    assert not coming
+    assert len(session.outcomes) == 2
+    assert session.outcomes[1] is (alone if taken else of_three)
 
 
 def test_machines_not_seen_are_drawn_alone(rigid: Stage) -> None:

@@ -14,6 +14,9 @@ from friso.remedies.variables import Variable, of_key
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 
+LEAST = ": the least change"
+"""What is added to the name of a remedy."""
+
 BEYOND = 2.0
 """Factor by which keys may go further than in the settings that the search begins with."""
 
@@ -40,7 +43,8 @@ def least_remedy(before: Stage, tuned: Stage, remedy: Remedy) -> Remedy | None:
     ]
     if not variables:
         return None
-    return Remedy(f"{remedy.name}: the least change", tuned, tuple(variables), remedy.buys_joint)
+    name = f"{remedy.name.removesuffix(LEAST)}{LEAST}"
+    return Remedy(name, tuned, tuple(variables), remedy.buys_joint)
 
 
 def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:

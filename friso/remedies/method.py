@@ -266,17 +266,26 @@ class _Session:
     def tries_less(self) -> None:
         """The least change of the controller as it is, from the remedy of that which works and changes most, and then,
         where that which changes least, however far, changes fewer keys still, from that; where none works, from what
-        changes least of the others. Once."""
+        changes least of the others. Once. Where some of the keys stay as they are, the others have a search of their
+        own, which takes its place if it changes less."""
         working = [outcome for outcome in self.outcomes if outcome.certainty == "works" and outcome.stage]
         own = [outcome for outcome in working if outcome.remedy.stage is self.stage]
         if not working or self.tried_less:
             return
+        first = len(self.outcomes)
         least, *others = sorted(own or working, key=self._size)
         most = others[-1] if own and others else least
         self.tried_less = self._tries_less_than(most)
         works = [outcome for outcome in self.outcomes if outcome.certainty == "works"]
         if least is not most and min(works, key=self._size, default=None) is least:
             self.tried_less |= self._tries_less_than(least)
+        for place in range(first, len(self.outcomes)):
+            outcome = self.outcomes[place]
+            if outcome.certainty == "works" and self._size(outcome).keys < len(outcome.remedy.variables):
+                self._tries_less_than(outcome)
+                fewer = self.outcomes.pop()
+                if fewer.certainty == "works" and self._size(fewer) < self._size(outcome):
+                    self.outcomes[place] = fewer
 
     def _tries_less_than(self, outcome: RemedyOutcome) -> bool:
         """The least change of the keys that a remedy which works changes; whether it has such keys."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -184,8 +185,7 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
     at = {change.low for change in changes}
     errors = {float(line.at[k, 0]): float(line.error[k, 0]) for line in lines(traced) for k in line.special}
-    others = sorted({value for value, _ in followed_changes(traced)} - at)
-    also = [f"Cycles also begin or stop attracting at {listed([key.as_known(v, errors[v]) for v in others], 'and')}."]
+    others = [(value, begins) for value, begins in followed_changes(traced) if value not in at]
     answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({values_tried}{unknown})."
     if changes:
         places = [
@@ -193,7 +193,21 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
             for change in changes
         ]
         answer = f"Hunting {listed(places, 'and')} ({values_tried}{unknown})."
-    return " ".join([answer, *(also if others else [])])
+    return " ".join([answer, *_also_attracting(others, key, errors)])
+
+
+def _also_attracting(turns: Sequence[tuple[float, bool]], key: ShownKey, errors: Mapping[float, float]) -> list[str]:
+    """Ranges, or their ends, in which a cycle attracts between the values that were tried; `turns` are the values at
+    which one begins to (true), or ceases to, in ascending order."""
+    text = {value: key.as_known(value, errors[value]) for value, _ in turns}
+    ranges = [(low, high) for (low, begins), (high, begins_too) in pairwise(turns) if begins and not begins_too]
+    within = {value for ends in ranges for value in ends}
+    others = [text[value] for value, _ in turns if value not in within]
+    spans = [f"from {text[low]} to {text[high]}" for low, high in ranges]
+    return [
+        *([f"Between values tried, a cycle attracts {listed(spans, 'and')} as well."] if spans else []),
+        *([f"Cycles also begin or stop attracting at {listed(list(dict.fromkeys(others)), 'and')}."] if others else []),
+    ]
 
 
 def _if_unstable(traced: Diagram, change: StabilityChange) -> str:
