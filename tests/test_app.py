@@ -64,7 +64,7 @@ class Served:
 
     def request(self, method: str, path: str, body: bytes = b"", **headers: str | None) -> tuple[int, Any, bytes]:
         """Status, headers and body; headers that are None are left out."""
-        host, usual = f"127.0.0.1:{self.port}", {"Cookie": f"{self.access.cookie}={self.access.session}"}
+        host, usual = f"127.0.0.1:{self.port}", {"Authorization": f"Bearer {self.access.session}"}
         sent = {"Host": host, "Content-Type": "application/json", **usual}
         sent |= {name.replace("_", "-"): value for name, value in headers.items()}
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=60)
@@ -128,37 +128,52 @@ def served() -> Iterator[Served]:
 # ---------------------------------------------------------------- who is let in
 
 
-def test_the_token_is_exchanged_for_a_cookie_that_scripts_and_other_sites_never_see(served: Served) -> None:
-    status, headers, _ = served.request("GET", f"/?token={served.access.token}", Cookie=None)
-    assert (status, headers["Location"]) == (303, "/")
-    cookie = headers["Set-Cookie"]
-    assert served.access.session in cookie
-    assert {"HttpOnly", "SameSite=strict", "Path=/"} <= set(cookie.split("; "))
+def test_the_token_is_exchanged_for_a_key_and_for_no_cookie(served: Served) -> None:
+    """A cookie would go to every server of this name, whatever its port."""
+    status, headers, content = served.request("POST", "/enter", Authorization=None, Friso_Token=served.access.token)
+    assert (status, headers["Set-Cookie"], json.loads(content)) == (200, None, {"key": served.access.session})
+    for token in ("", "wrong", "\xe4", None):
+        assert served.request("POST", "/enter", Authorization=None, Friso_Token=token)[0] == 403
 
 
-@pytest.mark.parametrize("path", ["/", "/begin", "/plotly.js", "/main.js", "/?token=", "/?token=wrong", "/nothing"])
-def test_without_token_or_cookie_nothing_is_answered(served: Served, path: str) -> None:
-    assert served.request("GET", path, Cookie=None)[0] == 403
-    assert served.request("GET", path, Cookie=f"{served.access.cookie}=wrong")[0] == 403
+@pytest.mark.parametrize("path", ["/begin", "/enter", "/nothing", "/ask/machine", "/logs/x.csv"])
+@pytest.mark.parametrize("key", [None, "", "Bearer ", "Bearer wrong", "Bearer \xe4"])
+def test_without_a_key_nothing_is_told_and_nothing_is_done(served: Served, path: str, key: str | None) -> None:
+    for method in ("GET", "POST", "DELETE"):
+        assert served.request(method, path, Authorization=key)[0] == 403
+
+
+def test_the_page_itself_is_handed_to_anybody_and_is_the_same_for_all(served: Served) -> None:
+    """A link that holds a machine leads to it from every site."""
+    for path in ("/", "/main.js", f"/?token={served.access.token}"):
+        anybody = served.request("GET", path, Authorization=None, Sec_Fetch_Site=None if "." in path else "cross-site")
+        assert (anybody[0], anybody[2]) == (200, served.request("GET", path)[2])
+
+
+@pytest.mark.parametrize("cookie", ["prefs=a b", 'theme={"dark":true}', "a=1; ;;=", "friso-8741=x"])
+def test_the_cookies_of_other_servers_of_this_name_have_no_say(served: Served, cookie: str) -> None:
+    assert served.request("GET", "/begin", Cookie=cookie)[0] == 200
+    assert served.request("GET", "/begin", Cookie=cookie, Authorization=None)[0] == 403
 
 
 @pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "127.0.0.1:1", "localhost.evil.example", "", None])
 def test_a_rebound_name_is_refused(served: Served, host: str | None) -> None:
-    """Cookie and token are right, the name is not: 403, or 400 where there is none, which HTTP does not allow."""
-    for path in ("/", f"/?token={served.access.token}"):
-        assert served.request("GET", path, Host=host)[0] in (403, 400)
+    """Key and token are right, the name is not: 403, or 400 where there is none, which HTTP does not allow."""
+    for method, path in (("GET", "/"), ("GET", "/begin"), ("POST", "/enter")):
+        assert served.request(method, path, Host=host, Friso_Token=served.access.token)[0] in (403, 400)
 
 
 def test_a_token_for_once_is_taken_once_and_whoever_was_faster_than_the_browser_is_shut_out(
     served: Served, caplog: pytest.LogCaptureFixture
 ) -> None:
-    path = f"/?token={served.access.token_for_once()}"
-    status, headers, _ = served.request("GET", path, Cookie=None)
-    cookie = headers["Set-Cookie"].partition(";")[0]
-    assert (status, served.request("GET", "/begin", Cookie=cookie)[0]) == (303, 200)
-    assert [served.request("GET", path, Cookie=None)[0] for _ in range(2)] == [403, 403]
+    token = served.access.token_for_once()
+    content = served.request("POST", "/enter", Friso_Token=token, Authorization=None)[2]
+    key = f"Bearer {json.loads(content)['key']}"
+    assert served.request("GET", "/begin", Authorization=key)[0] == 200
+    for _ in range(2):
+        assert served.request("POST", "/enter", Friso_Token=token, Authorization=None)[0] == 403
     assert [record.name for record in caplog.records].count("friso") == 1
-    assert [served.request("GET", "/begin", Cookie=value)[0] for value in (cookie, None)] == [403, 403]
+    assert [served.request("GET", "/begin", Authorization=value)[0] for value in (key, None)] == [403, 403]
     assert served.request("GET", "/begin")[0] == 200
 
 
@@ -166,12 +181,12 @@ def test_a_token_for_once_is_taken_soon_or_never_and_the_browser_that_took_it_ma
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     access = Access.at("127.0.0.1", 8000)
-    query = f"token={access.token_for_once()}".encode()
-    cookie = f"{access.cookie}={access.session_of(query)}"
+    token = access.token_for_once()
+    key = access.session_of(token)
     monkeypatch.setattr(gate, "FRESH", 0.0)
-    assert (access.session_of(query, cookie), access.has_cookie(cookie)) == ("", True)  # out of its history
-    assert access.session_of(f"token={access.token_for_once()}".encode()) == ""
-    assert (access.session_of(query), access.has_cookie(cookie)) == ("", False)  # however late another comes
+    assert (access.session_of(token, key), access.has(key)) == ("", True)  # out of its history
+    assert access.session_of(access.token_for_once()) == ""
+    assert (access.session_of(token), access.has(key)) == ("", False)  # however late another comes
 
 
 def test_the_port_takes_connections_before_the_browser_opens_and_is_free_again_at_once() -> None:
@@ -192,10 +207,20 @@ def test_at_the_usual_port_browsers_leave_it_out() -> None:
     assert not Access.at("127.0.0.1", 8741).is_host("localhost")
 
 
+def test_a_name_in_capitals_is_the_same_name() -> None:
+    """Browsers send it in small letters, whatever was typed."""
+    access = Access.at("RIG-PC", 8741)
+    assert access.is_host("rig-pc:8741")
+    assert access.is_host("Rig-PC:8741")
+    assert access.is_origin("http://rig-pc:8741")
+
+
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://127.0.0.1", "http://127.0.0.1:1"])
 def test_a_foreign_page_is_refused(served: Served, origin: str) -> None:
     assert served.request("POST", "/ask/machine", b"{}", Origin=origin)[0] == 403
-    assert served.request("GET", "/begin", Sec_Fetch_Site="cross-site")[0] == 403
+    for site in ("cross-site", "same-site"):  # the same name with another port is the same site
+        assert served.request("GET", "/begin", Sec_Fetch_Site=site)[0] == 403
+        assert served.request("GET", "/main.js", Sec_Fetch_Site=site)[0] == 403
 
 
 def test_a_page_of_its_own_is_let_in(served: Served) -> None:
@@ -203,9 +228,10 @@ def test_a_page_of_its_own_is_let_in(served: Served) -> None:
         assert served.request("GET", "/begin", Origin=origin)[0] == 200
 
 
-@pytest.mark.parametrize("cookie", [None, ""])
-def test_every_response_says_what_a_page_may_load(served: Served, cookie: str | None) -> None:
-    headers = served.request("GET", "/", **({} if cookie is None else {"Cookie": cookie}))[1]
+@pytest.mark.parametrize("path", ["/", "/begin", "/nothing"])
+@pytest.mark.parametrize("more", [{}, {"Authorization": None}])
+def test_every_response_says_what_a_page_may_load(served: Served, path: str, more: dict[str, Any]) -> None:
+    headers = served.request("GET", path, **more)[1]
     rules = dict(rule.split(" ", 1) for rule in headers["Content-Security-Policy"].split("; "))
     assert (rules["default-src"], rules["script-src"], rules["connect-src"]) == ("'none'", "'self'", "'self'")
     assert headers["X-Content-Type-Options"] == "nosniff"
@@ -380,7 +406,7 @@ def test_a_log_that_is_too_large_is_refused_and_not_kept(served: Served, monkeyp
 @pytest.mark.parametrize("path", ["/logs/x.csv", "/ask/machine"])
 def test_a_browser_that_leaves_in_the_middle_of_a_request_is_no_error(path: str) -> None:
     access = Access.at("127.0.0.1", 80)
-    headers = {b"host": b"127.0.0.1", b"cookie": f"{access.cookie}={access.session}".encode()}
+    headers = {b"host": b"127.0.0.1", b"authorization": f"Bearer {access.session}".encode()}
     headers |= {b"content-type": b"application/json"}
     scope = {"type": "http", "method": "POST", "path": path, "headers": [*headers.items()], "query_string": b""}
     messages = [{"type": "http.request", "body": b"{", "more_body": True}, {"type": "http.disconnect"}]
@@ -757,9 +783,8 @@ def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pyte
             while not server.started:
                 await asyncio.sleep(0.001)
             _, writer = await asyncio.open_connection("127.0.0.1", port)
-            cookie = f"{access.cookie}={access.session}"
-            writer.write(f"POST /logs/a.csv HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nCookie: {cookie}\r\n".encode())
-            writer.write(b"Content-Length: 1000\r\n\r\n1,2\n")
+            head = f"Host: 127.0.0.1:{port}\r\nAuthorization: Bearer {access.session}\r\nContent-Length: 1000\r\n\r\n"
+            writer.write(f"POST /logs/a.csv HTTP/1.1\r\n{head}1,2\n".encode())
             while not server.server_state.tasks:
                 await asyncio.sleep(0.001)
             server.should_exit = True

@@ -37,8 +37,8 @@ def written(folder: Path) -> Path:
 class Browsed:
     """The page, and what went wrong in it or left this machine."""
 
-    def __init__(self, page: Any, address: str) -> None:
-        self.page, self.address = page, address
+    def __init__(self, page: Any, token: str, address: str) -> None:
+        self.page, self.token, self.address = page, token, address
         self.wrong: list[str] = []
         self.outside: list[str] = []
         page.on(
@@ -135,9 +135,9 @@ def opened() -> Iterator[Browsed]:
             address = re.search(r"(http://\S+/)\?\S+", server.stdout.readline())
             assert address is not None
             chromium = play.chromium.launch(executable_path=BROWSER, args=["--no-sandbox", "--disable-gpu"])
-            page = chromium.new_page()
+            page = chromium.new_context().new_page()
             page.set_default_timeout(120_000)
-            opened = Browsed(page, address[1])
+            opened = Browsed(page, *address.group(0, 1))
             page.goto(address[0])
             page.wait_for_selector("[data-part=controller]")
             yield opened
@@ -729,6 +729,42 @@ def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> Non
     page.reload()
     page.wait_for_selector("text=linked")
     page.wait_for_selector("[data-part=controller]")
+
+
+def test_a_link_that_is_clicked_on_another_site_is_opened(browsed: Browsed) -> None:
+    """In a tab of its own, of which the server has never heard: the browser is let in, and its machine is shown."""
+    page = browsed.page
+    link = page.evaluate("async () => (await import('/state.js')).link()")
+    other = page.context.new_page()
+    try:
+        mail = f"<a href='{link}'>the rig</a>"
+        other.route("http://mail.example/*", lambda route: route.fulfill(body=mail, content_type="text/html"))
+        other.goto("http://mail.example/")
+        other.click("text=the rig")
+        other.wait_for_selector("[data-part=controller]")
+        assert other.url == browsed.address
+        assert other.evaluate("async () => (await import('/state.js')).current().made") is True
+    finally:
+        other.close()
+
+
+def test_a_browser_that_has_not_opened_the_address_is_told_to(browsed: Browsed) -> None:
+    """And is let in with it, the page that was there as well; the token leaves the address."""
+    context = browsed.page.context.browser.new_context()
+    try:
+        page = context.new_page()
+        page.goto(browsed.address)
+        page.wait_for_selector("#trouble:has-text('open that address')")
+        assert page.locator("[data-part]").count() == 0
+        opened = context.new_page()
+        opened.goto(browsed.token)
+        for one in (opened, page):
+            one.wait_for_selector("[data-part=controller]")
+        page.wait_for_selector("#trouble", state="hidden")
+        assert opened.url == browsed.address
+        assert context.cookies() == []
+    finally:
+        context.close()
 
 
 def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: Browsed) -> None:

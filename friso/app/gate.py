@@ -1,16 +1,15 @@
-"""Who is let in: the browser that was opened with the token, at the address that was printed, and nobody else."""
+"""Who is let in: the browser that opened the address with the token, which has a key since, and nobody else."""
 
 from __future__ import annotations
 
 import logging
 import secrets
 import time
+from collections.abc import Set
 from dataclasses import dataclass, field
-from http.cookies import CookieError, SimpleCookie
-from urllib.parse import parse_qs
 
 from starlette.datastructures import Headers, MutableHeaders
-from starlette.responses import PlainTextResponse, RedirectResponse, Response
+from starlette.responses import JSONResponse, PlainTextResponse, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 POLICY = (
@@ -47,12 +46,22 @@ seconds."""
 LOGGER = logging.getLogger("friso")
 
 
+ENTRY = "/enter"
+"""Where a token is exchanged for a key."""
+
+TOKEN = "friso-token"
+"""The header that has a token."""
+
+BEARER = "Bearer "
+"""What stands before a key in the header `Authorization`. Browsers add none of their own accord, as they do with
+cookies, which also go to every other server of the same name, whatever its port."""
+
+
 @dataclass(frozen=True)
 class Access:
-    """The names by which the server may be addressed, with the port, and the secrets of its token and its cookie."""
+    """The names by which the server may be addressed, with the port, and the secrets of its token and its session."""
 
     hosts: frozenset[str]
-    cookie: str
     token: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     session: str = field(default_factory=lambda: secrets.token_urlsafe(32))
     once: dict[str, tuple[float, str]] = field(default_factory=dict)
@@ -63,10 +72,10 @@ class Access:
     @classmethod
     def at(cls, host: str, port: int) -> Access:
         """The access to a server at this host and port; one on all addresses of the machine has any name."""
-        named = f"[{host}]" if ":" in host else host
+        named = (f"[{host}]" if ":" in host else host).lower()
         names = {named, "localhost", "127.0.0.1", "[::1]"} if host in LOOPBACK else {named}
         hosts = {f"{name}:{port}" for name in names} | (names if port == HTTP else set())
-        return cls(frozenset(hosts), f"friso-{port}")
+        return cls(frozenset(hosts))
 
     def token_for_once(self) -> str:
         """A token that is taken once: commands that are running, and the addresses in them, can be seen by others."""
@@ -75,43 +84,32 @@ class Access:
         return token
 
     def is_host(self, host: str) -> bool:
-        """Whether the server goes by this name: another one was made to lead here."""
-        return host in self.hosts
+        """Whether the server goes by this name: another one was made to lead here. Names are the same in capitals."""
+        return host.lower() in self.hosts
 
     def is_origin(self, origin: str | None) -> bool:
         """Whether a request comes from a page of this server, or from no page at all."""
         return origin is None or (origin.startswith("http://") and self.is_host(origin.removeprefix("http://")))
 
-    def session_of(self, query: bytes, cookies: str = "") -> str:
-        """The session that an address with a token begins, "" without one. A token that is taken once and comes again
-        from another browser than the one with the session that it began, was seen by two: that session is over."""
-        tokens = parse_qs(query.decode("latin-1")).get("token", [])
-        if len(tokens) != 1:
-            return ""
-        for token, (made, session) in self.once.items():
-            if not _same(tokens[0], token):
+    def session_of(self, token: str, key: str = "") -> str:
+        """The session that a token begins, "" for a wrong one. A token that is taken once and comes again from another
+        browser than the one that has the session which it began as its key, was seen by two: that session is over."""
+        for own, (made, session) in self.once.items():
+            if not _same(token, own):
                 continue
             if not session and time.monotonic() - made < FRESH:
                 session = secrets.token_urlsafe(32)
-                self.once[token] = made, session
+                self.once[own] = made, session
                 return session
-            if session and session not in self.ended and not self._has(cookies, {session}):
+            if session and session not in self.ended and not _same(key, session):
                 self.ended.add(session)
                 LOGGER.warning(TWICE)
-        return self.session if _same(tokens[0], self.token) else ""
+        return self.session if _same(token, self.token) else ""
 
-    def has_cookie(self, header: str) -> bool:
-        """Whether a request has the cookie."""
+    def has(self, key: str) -> bool:
+        """Whether a key is that of a session which goes on."""
         begun = {session for _, session in self.once.values() if session}
-        return self._has(header, {self.session, *begun} - self.ended)
-
-    def _has(self, header: str, sessions: set[str]) -> bool:
-        """Whether a header has the cookie of one of these sessions."""
-        try:
-            cookies = SimpleCookie(header)
-        except CookieError:
-            return False
-        return self.cookie in cookies and any(_same(cookies[self.cookie].value, session) for session in sessions)
+        return any(_same(key, session) for session in {self.session, *begun} - self.ended)
 
 
 HTTP = 80
@@ -122,13 +120,14 @@ LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 class Gate:
-    """Lets requests through to an application that have an access, and refuses all others with 403."""
+    """Lets requests through to an application that have a key, and those for what it hands to anybody, `public` by
+    path: the page itself, which holds nothing of the user's. All others are refused with 403."""
 
-    def __init__(self, application: ASGIApp, access: Access) -> None:
-        self.application, self.access = application, access
+    def __init__(self, application: ASGIApp, access: Access, public: Set[str]) -> None:
+        self.application, self.access, self.public = application, access, public
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Answer a request: let it in, hand it a cookie for its token, or refuse it."""
+        """Answer a request: let it in, hand it a key for its token, or refuse it."""
         if scope["type"] == "lifespan":
             await self.application(scope, receive, send)
             return
@@ -138,21 +137,25 @@ class Gate:
                 MutableHeaders(scope=message).update(HEADERS)
             await send(message)
 
-        refusal = self._refusal(scope) if scope["type"] == "http" else PlainTextResponse(REFUSED, 403)
-        await (refusal or self.application)(scope, receive, guarded)
+        own = self._own(scope) if scope["type"] == "http" else _refused()
+        await (own or self.application)(scope, receive, guarded)
 
-    def _refusal(self, scope: Scope) -> Response | None:
-        headers, access = Headers(scope=scope), self.access
+    def _own(self, scope: Scope) -> Response | None:
+        """The answer of the gate's own, None for what is let in."""
+        headers, access, path = Headers(scope=scope), self.access, scope["path"]
         if not access.is_host(headers.get("host", "")) or not access.is_origin(headers.get("origin")):
-            return PlainTextResponse(REFUSED, 403)
-        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and scope["path"] != "/":
-            return PlainTextResponse(REFUSED, 403)
-        cookies = headers.get("cookie", "")
-        if scope["path"] == "/" and (session := access.session_of(scope["query_string"], cookies)):
-            response = RedirectResponse("/", 303)
-            response.set_cookie(access.cookie, session, httponly=True, samesite="strict", path="/")
-            return response
-        return None if access.has_cookie(cookies) else PlainTextResponse(REFUSED, 403)
+            return _refused()
+        if headers.get("sec-fetch-site", "none") not in ("none", "same-origin") and path != "/":  # which links lead to
+            return _refused()
+        key = headers.get("authorization", "").removeprefix(BEARER)
+        if path == ENTRY and scope["method"] == "POST":
+            session = access.session_of(headers.get(TOKEN, ""), key)
+            return JSONResponse({"key": session}) if session else _refused()
+        return None if path in self.public or access.has(key) else _refused()
+
+
+def _refused() -> Response:
+    return PlainTextResponse(REFUSED, 403)
 
 
 def _same(one: str, other: str) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from functools import partial
 from importlib.resources import files
+from importlib.resources.abc import Traversable
 from typing import Any
 
 from starlette.applications import Starlette
@@ -27,6 +28,8 @@ MOST_BYTES = 8_000_000
 KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
 
 BINARY = "application/octet-stream"
+
+PLOTLY = "/plotly.js"
 
 
 def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> ASGIApp:
@@ -73,12 +76,13 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         Route("/ask/{question}", ask, methods=["POST"]),
         Route("/begin", started_with),
         Route("/logs/{name}", upload, methods=["POST"]),
-        Route("/plotly.js", _plotly),
+        Route(PLOTLY, _plotly),
         Route("/", _page),
         Route("/{file}", _page),
     ]
     gone = {ClientDisconnect: _gone}
-    return Gate(Starlette(routes=routes, lifespan=lifespan, exception_handlers=gone), access)
+    public = {"/", PLOTLY, *(f"/{name}" for name in _page_files())}
+    return Gate(Starlette(routes=routes, lifespan=lifespan, exception_handlers=gone), access, public)
 
 
 async def _gone(request: Request, error: Exception) -> Response:
@@ -86,18 +90,26 @@ async def _gone(request: Request, error: Exception) -> Response:
     return Response(status_code=400)
 
 
+def _page_files() -> dict[str, Traversable]:
+    """The files of the page by their plain names."""
+    held = files("friso.app").joinpath("page").iterdir()
+    return {item.name: item for item in held if item.is_file() and _suffix(item.name) in KINDS}
+
+
+def _suffix(name: str) -> str:
+    return name[name.rfind(".") :]
+
+
 async def _page(request: Request) -> Response:
     """A file of the page, by its plain name."""
-    name = request.path_params.get("file", "index.html")
-    held = {item.name: item for item in files("friso.app").joinpath("page").iterdir() if item.is_file()}
-    suffix = name[name.rfind(".") :]
-    if name not in held or suffix not in KINDS:
+    name, held = request.path_params.get("file", "index.html"), _page_files()
+    if name not in held:
         return _refused("there is no such page", 404)
-    return Response(held[name].read_bytes(), media_type=KINDS[suffix])
+    return Response(held[name].read_bytes(), media_type=KINDS[_suffix(name)])
 
 
 async def _plotly(request: Request) -> Response:
-    """plotly.js as the package plotly has it; browsers may keep it, for it is another one with another version."""
+    """plotly.js as the package plotly has it."""
     return Response(files("plotly").joinpath("package_data", "plotly.min.js").read_bytes(), media_type=KINDS[".js"])
 
 

@@ -1,5 +1,6 @@
 // Questions to the server. A newer question on a lane overtakes the one before it; answers come in frames, see frames.py.
 import { token } from "./dom.js";
+import { enter, request } from "./entry.js";
 
 /** How long [ms] what is of an earlier machine is shown as if it were of the one that is there: what is newer mostly comes before. */
 export const OLD_AFTER = 300;
@@ -14,7 +15,7 @@ export async function ask(question, body, lane = question, part = () => {}) {
   const abort = new AbortController();
   lanes.set(lane, abort);
   try {
-    const response = await fetch(`ask/${question}`, {
+    const response = await request(`ask/${question}`, {
       method: "POST",
       headers: { "Content-Type": "application/json" },
       body: JSON.stringify({ ...body, page, lane, number: ++asked }),
@@ -57,7 +58,7 @@ async function reason(response) {
 
 /** Hand a file to the server; resolves to the name it has there, or throws what is wrong. */
 export async function hand(file) {
-  const response = await fetch(`logs/${encodeURIComponent(file.name)}`, { method: "POST", body: file }).catch((error) => {
+  const response = await request(`logs/${encodeURIComponent(file.name)}`, { method: "POST", body: file }).catch((error) => {
     reached(false);
     throw error;
   });
@@ -69,7 +70,8 @@ export async function hand(file) {
 /** The stage file that the server begins with; null while it cannot be reached. */
 export async function first() {
   try {
-    const response = await fetch("begin");
+    await enter();
+    const response = await request("begin");
     if (response.ok) return await response.json();
     reached(false, response.status === 403 ? ANEW : GONE);
   } catch {
@@ -120,7 +122,7 @@ let looking = null;
 export const onReach = (listener) => listeners.push(listener);
 
 const GONE = "The server does not answer. What is on this page is kept; it goes on when the server is back.";
-const ANEW = "This page is no longer let in: open the address that the server printed. What is on this page is kept.";
+const ANEW = "friso lets in only the browser that has opened the address which it printed when it started: open that address. What is on this page is kept.";
 
 function reached(now, text = GONE) {
   if (now === there && now) return;
@@ -131,7 +133,7 @@ function reached(now, text = GONE) {
 
 async function look() {
   try {
-    const response = await fetch("begin");
+    const response = await request("begin");
     if (response.status === 403) return reached(false, ANEW);
     if (!response.ok) return;
     clearInterval(looking);
