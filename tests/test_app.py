@@ -288,11 +288,12 @@ def test_options_name_no_file(served: Served) -> None:
 def test_logs_are_kept_under_names_of_the_server_and_no_others_are_read(served: Served) -> None:
     log = b"time [s],position [m]\n" + b"".join(b"%g,%g\n" % (k / 1000, k % 7) for k in range(50))
     status, _, content = served.request("POST", "/logs/..%5C..%5Cmy%20log.csv", log)
-    assert (status, json.loads(content)) == (200, {"file": "1/my log.csv"})
-    part = served.ask("logs", RIG, files=["1/my log.csv"])[-1]
+    kept = json.loads(content)["file"]
+    assert (status, kept.partition("/")[2]) == (200, "my log.csv")
+    part = served.ask("logs", RIG, files=[kept])[-1]
     assert part["channels"] == ["time", "position"]
     assert "position" in part["roles"]
-    for name in ("/etc/passwd", "../1/my log.csv", str(RIG), 3):
+    for name in ("/etc/passwd", f"../{kept}", str(RIG), 3):
         assert served.ask("identify", RIG, files=[name])[0]["kind"] == "refused"
     assert served.request("POST", "/logs/x.csv", log, Origin="http://evil.example")[0] == 403
 
@@ -364,6 +365,45 @@ def test_logs_that_come_at_the_same_time_are_both_kept() -> None:
         assert [kept.path(name).read_bytes() for name in asyncio.run(both())] == [b"1", b"2"]
     finally:
         kept.remove()
+
+
+async def one_byte() -> AsyncIterator[bytes]:
+    yield b"1"
+
+
+def test_a_name_means_no_other_file_to_a_later_server() -> None:
+    """A page that was left open would identify it in place of its own, or twice."""
+    first, second = uploads.Uploads(), uploads.Uploads()
+    try:
+        names = [asyncio.run(kept.keep("log.csv", one_byte())) for kept in (first, second)]
+        assert second.path(names[1]).read_bytes() == b"1"
+        with pytest.raises(InputError, match="while this server ran"):
+            second.path(names[0])
+    finally:
+        first.remove()
+        second.remove()
+
+
+def test_a_log_that_is_let_go_gives_its_place_to_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    kept = uploads.Uploads()
+    monkeypatch.setattr(uploads, "MOST_FILES", 1)
+    try:
+        name = asyncio.run(kept.keep("a.csv", one_byte()))
+        with pytest.raises(InputError, match="Other files"):
+            asyncio.run(kept.keep("b.csv", one_byte()))
+        kept.let_go(name)
+        other = asyncio.run(kept.keep("b.csv", one_byte()))
+        assert [path.name for path in kept.folder.glob("*/*")] == ["b.csv"]
+        assert kept.path(other).is_file()
+    finally:
+        kept.remove()
+
+
+def test_the_page_lets_logs_go_by_their_names_alone(served: Served) -> None:
+    kept = json.loads(served.request("POST", "/logs/a%20log.csv", b"1")[2])["file"]
+    names = [quote(kept), quote(kept), "..%2f/a.csv", "x/y"]
+    assert [served.request("DELETE", f"/logs/{name}")[0] for name in names] == [204, 404, 404, 404]
+    assert served.ask("logs", RIG, files=[kept])[0]["kind"] == "refused"
 
 
 def test_what_a_killed_server_left_goes_with_the_next(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

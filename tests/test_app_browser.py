@@ -679,7 +679,9 @@ def test_of_a_log_that_says_nothing_roles_units_and_scales_are_told(browsed: Bro
         page.keyboard.press("Tab")
     page.wait_for_selector("#picture .wrong")
     assert page.inner_text("#picture .wrong").startswith("mute.csv: unit")
-    page.click("#picture button:text-is('Other files')")  # for the tests that follow
+    with page.expect_response(lambda response: response.request.method == "DELETE") as gone:
+        page.click("#picture button:text-is('Other files')")
+    assert gone.value.status == 204  # the server keeps it no longer
 
 
 def test_no_text_from_a_file_steers_the_page(browsed: Browsed, tmp_path: Path) -> None:

@@ -65,6 +65,13 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         except OSError as error:
             return _refused(f"the file could not be kept: {str(error.strerror or error).lower()}", 507)
 
+    async def let_go(request: Request) -> Response:
+        try:
+            uploads.let_go("{folder}/{name}".format(**request.path_params))
+        except InputError as error:
+            return _refused(str(error), 404)
+        return Response(status_code=204)
+
     @asynccontextmanager
     async def lifespan(_: Starlette) -> AsyncIterator[None]:
         with workshop.listening():
@@ -76,6 +83,7 @@ def application(access: Access, begin: dict[str, Any], workshop: Workshop) -> AS
         Route("/ask/{question}", ask, methods=["POST"]),
         Route("/begin", started_with),
         Route("/logs/{name}", upload, methods=["POST"]),
+        Route("/logs/{folder}/{name}", let_go, methods=["DELETE"]),
         Route(PLOTLY, _plotly),
         Route("/", _page),
         Route("/{file}", _page),

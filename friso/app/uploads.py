@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
+import secrets
 from collections.abc import AsyncIterable
 from contextlib import ExitStack
 from pathlib import Path
@@ -24,21 +24,21 @@ PREFIX = "friso-uploads-"
 
 
 class Uploads:
-    """The files by the names under which the page knows them. The page names no other file. What a killed server left
-    is deleted by the next."""
+    """The files by the names under which the page knows them. The page names no other file, and no name means another
+    file to a later server: a page may have been left open. What a killed server left is deleted by the next."""
 
     def __init__(self) -> None:
         self.held = ExitStack()
         self.folder = self.held.enter_context(temporary_folder(PREFIX))
         self.files: dict[str, Path] = {}
-        self.numbers = itertools.count(1)
 
     async def keep(self, name: str, chunks: AsyncIterable[bytes]) -> str:
         """Keep a file as it comes; the name by which it is asked for. Raises InputError for one that is too large, and
         OSError for one that cannot be written."""
-        place = self.folder / str(next(self.numbers))  # several may come at the same time
+        place = self.folder / secrets.token_hex(8)  # several may come at the same time
         if sum(1 for entry in self.folder.iterdir() if entry.is_dir()) >= MOST_FILES:
-            raise InputError("file", f"more than {MOST_FILES} files", "a new start of the server")
+            most = f"at most {MOST_FILES}: Other files lets those go that are shown"
+            raise InputError("file", f"more than {MOST_FILES} files", most)
         plain = plain_name(name, "log")
         place.mkdir()
         size = 0
@@ -63,6 +63,12 @@ class Uploads:
         if path is None:
             raise InputError("file", str(name)[:60], "a file that was dropped on the page while this server ran")
         return path
+
+    def let_go(self, name: str) -> None:
+        """Delete one of them. Raises InputError for any other name."""
+        place = self.path(name).parent
+        del self.files[name]
+        remove_folder(place)
 
     def remove(self) -> None:
         """Delete all of them."""

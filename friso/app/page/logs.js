@@ -2,7 +2,7 @@
 import { el } from "./dom.js";
 import { shownAnswer } from "./long.js";
 import { paragraphs } from "./tables.js";
-import { end, hand } from "./wire.js";
+import { drop, end, hand } from "./wire.js";
 
 const LARGEST = 64e6;
 const SCALE = /^[-+]?[.\d]+(e[-+]?\d+)?\s*[^\s.\d/]/i; // and no "1/min"
@@ -14,6 +14,7 @@ export class Logs {
     this.status = el("div", { class: "status", role: "status" });
     this.form = el("div", { class: "form" });
     this.result = el("div", {});
+    window.addEventListener("pagehide", (event) => event.persisted || this.letGo());
     this.place = el("div", {}, el("div", { class: "drop" }, "Drop logs here, or choose them: ", this.input), this.status, this.form, this.result);
   }
 
@@ -87,9 +88,14 @@ export class Logs {
     this.look();
   }
 
-  forget() {
+  /** The server keeps no file that the page has let go. */
+  letGo() {
     end("logs");
-    this.files = [];
+    this.files.splice(0).forEach(({ id }) => drop(id));
+  }
+
+  forget() {
+    this.letGo();
     this.roles.clear();
     this.measures.clear();
     this.input.value = "";

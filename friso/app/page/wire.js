@@ -67,6 +67,9 @@ export async function hand(file) {
   return (await response.json()).file;
 }
 
+/** Have the server delete a file that was handed to it, even while the page is being left; a server that is gone has deleted it. */
+export const drop = (name) => request(`logs/${name.split("/").map(encodeURIComponent).join("/")}`, { method: "DELETE", keepalive: true }).catch(() => {});
+
 /** The stage file that the server begins with; null while it cannot be reached. */
 export async function first() {
   try {
