@@ -712,6 +712,87 @@ def test_two_logs_dropped_at_once_are_both_taken(browsed: Browsed) -> None:
     page.wait_for_function("() => document.querySelectorAll('#picture .plot, #picture table').length")
 
 
+FILL = """() => {
+    const left = () => 'x'.repeat(localStorage.getItem('other')?.length ?? 0);
+    for (let size = 2 ** 23; size >= 1; size /= 2) {
+        try {
+            localStorage.setItem('other', left() + 'x'.repeat(size));
+        } catch {
+            // half as much
+        }
+    }
+}"""
+KEPT = "JSON.parse(localStorage.getItem(`friso-machines-${sessionStorage.friso}`)).machines[0]"
+
+
+def test_a_browser_whose_storage_is_full_is_said_so(browsed: Browsed) -> None:
+    """What other tabs kept goes first; where that is not enough, it stays."""
+    page = browsed.page
+    try:
+        page.evaluate("""() => {
+            const other = (name) => name.startsWith('friso-machines-') && !name.endsWith(sessionStorage.friso);
+            Object.keys(localStorage).filter(other).forEach((name) => localStorage.removeItem(name));
+            localStorage.setItem('friso-machines-old', 'x'.repeat(1000));
+        }""")
+        page.evaluate(FILL)
+        browsed.type("controller.crossover", "11 Hz")
+        page.wait_for_function(f"() => {KEPT}.step === 1")
+        assert page.evaluate("localStorage.getItem('friso-machines-old')") is None
+        assert page.is_hidden("#trouble")
+        page.evaluate(FILL)
+        page.evaluate("""() => {
+            localStorage.setItem('other', localStorage.getItem('other').slice(40));
+            localStorage.setItem('friso-machines-old', '{"at": 1}');
+        }""")
+        more = {
+            "controller.crossover": "12 Hz",
+            "masses.cart": "1.3 kg",
+            "masses.stage": "0.61 kg",
+            "joint.locked": True,
+        }
+        page.evaluate("async changes => (await import('/state.js')).set(changes)", more)
+        page.wait_for_selector("#trouble:has-text('storage of the browser is full')")
+        assert page.evaluate("localStorage.getItem('friso-machines-old')") == '{"at": 1}'
+        assert page.evaluate(f"{KEPT}.step") == 1
+    finally:
+        page.evaluate("['other', 'friso-machines-old'].forEach((name) => localStorage.removeItem(name))")
+    browsed.type("controller.crossover", "13 Hz")
+    page.wait_for_selector("#trouble", state="hidden")
+    assert page.evaluate(f"{KEPT}.step") == 3
+
+
+def test_of_very_many_changes_the_last_can_be_undone(browsed: Browsed) -> None:
+    page = browsed.page
+    steps = page.evaluate("""async () => {
+        const { set, current } = await import('/state.js');
+        for (let k = 0; k < 250; k += 1) set({ 'controller.crossover': `${8 + k / 100} Hz` });
+        return [current().steps.length, current().step, current().steps.at(-1)];
+    }""")
+    assert steps == [200, 199, {"controller.crossover": "10.49 Hz"}]
+
+
+def test_a_tab_that_is_opened_from_another_keeps_its_own(browsed: Browsed) -> None:
+    """It begins as a copy, the mark by which it keeps what it has included."""
+    page = browsed.page
+    set_key = "async ([key, value]) => (await import('/state.js')).set({ [key]: value })"
+    now = "async () => (await import('/state.js')).changes()"
+    page.evaluate(set_key, ["masses.cart", "1.3 kg"])
+    with page.context.expect_page() as opening:
+        page.evaluate("window.open(location.href)")
+    other = opening.value
+    try:
+        other.wait_for_selector("[data-part=controller]")
+        page.wait_for_function("mark => sessionStorage.friso !== mark", arg=other.evaluate("sessionStorage.friso"))
+        other.evaluate(set_key, ["controller.crossover", "9 Hz"])
+        page.evaluate(set_key, ["controller.crossover", "11 Hz"])
+        for one, crossover in ((other, "9 Hz"), (page, "11 Hz")):
+            one.reload()
+            one.wait_for_selector("[data-part=controller]")
+            assert one.evaluate(now) == {"masses.cart": "1.3 kg", "controller.crossover": crossover}
+    finally:
+        other.close()
+
+
 def test_a_link_is_opened_and_a_broken_one_does_no_harm(browsed: Browsed) -> None:
     page = browsed.page
     link = """changes => {

@@ -229,8 +229,12 @@ async function opened(files) {
   pictures.own.logs.add(logs);
 }
 
-function trouble(said) {
-  const text = plain(said);
+const troubles = new Map();
+
+/** Say what is wrong; of one matter, what was said last. */
+function trouble(said, about = "") {
+  troubles.set(about, plain(said));
+  const text = [...troubles.values()].filter(Boolean).join("\n");
   if ($("trouble").textContent === text) return; // it is read out once
   $("trouble").textContent = text;
   $("trouble").hidden = !text;
@@ -272,6 +276,7 @@ function wire() {
     else if (there) begin();
   });
   machines.onChange(changed);
+  machines.onKept((text) => trouble(text, "kept"));
 }
 
 /** Ask for what a command would write, and save it; resolves to what to say. */

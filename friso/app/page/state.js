@@ -4,12 +4,17 @@ import { token } from "./dom.js";
 
 const STORE = "friso-machines-";
 const MOST_KEPT = 10;
+const MOST_STEPS = 200;
 const listeners = [];
+const keeping = [];
 
 export const state = { machines: [], shown: 0, pinned: null };
 
 /** Be told of every change; `dragged` is true while a slider moves. */
 export const onChange = (listener) => listeners.push(listener);
+
+/** Be told with every change why the browser does not keep it, "" where it does. */
+export const onKept = (listener) => keeping.push(listener);
 
 function changed(dragged = false) {
   if (!dragged) save();
@@ -75,7 +80,8 @@ export function set(values, dragged = false) {
 function append(machine, next) {
   machine.steps.length = machine.step + 1;
   machine.steps.push(next);
-  machine.step += 1;
+  machine.steps.splice(0, machine.steps.length - MOST_STEPS);
+  machine.step = machine.steps.length - 1;
 }
 
 /** Show a machine as it was when no more than these keys were `given`; one that was closed is opened again. */
@@ -102,29 +108,78 @@ export function pin() {
 
 // ---------------------------------------------------------------- kept in the browser, and in a link
 
+const FULL = "What you change now is lost when this page is closed: the storage of the browser is full. Save the stage files under Out, or close machines.";
+const NONE = "What is on this page is lost when it is closed: the browser keeps nothing for it. Save the stage files under Out.";
+
 function save() {
+  let said = "";
   try {
     sessionStorage.friso ??= token();
-    localStorage.setItem(STORE + sessionStorage.friso, JSON.stringify({ ...state, at: Date.now() }));
+    put(own(), JSON.stringify({ ...state, at: Date.now() }));
+  } catch (error) {
+    said = error.name === "QuotaExceededError" ? FULL : NONE;
+  }
+  keeping.forEach((listener) => listener(said));
+}
+
+const own = () => STORE + sessionStorage.friso;
+
+/** What the tabs of the browser kept, the last first, with the texts of the stores. */
+function stores() {
+  const names = Object.keys(localStorage).filter((name) => name.startsWith(STORE));
+  const all = names.map((name) => ({ name, text: localStorage.getItem(name) })).map((store) => ({ ...store, kept: parsed(store.text) }));
+  return all.sort((one, other) => (other.kept.at ?? 0) - (one.kept.at ?? 0));
+}
+
+function parsed(text) {
+  try {
+    return JSON.parse(text) ?? {};
   } catch {
-    // a browser that keeps nothing
+    return {};
+  }
+}
+
+/** Keep a text. Where there is no room, what other tabs kept goes, the oldest first, unless even that is not enough. */
+function put(name, text) {
+  const gone = [];
+  const others = [];
+  for (;;) {
+    try {
+      localStorage.setItem(name, text);
+      return;
+    } catch (error) {
+      if (!gone.length) others.push(...stores().filter((store) => store.name !== name));
+      if (!others.length) {
+        gone.reverse().forEach((store) => localStorage.setItem(store.name, store.text));
+        throw error;
+      }
+      gone.push(others.pop());
+      localStorage.removeItem(gone.at(-1).name);
+    }
   }
 }
 
 export function restore() {
   try {
-    const names = Object.keys(localStorage).filter((name) => name.startsWith(STORE));
-    const all = names.map((name) => ({ name, kept: JSON.parse(localStorage.getItem(name)) })).sort((one, other) => other.kept.at - one.kept.at);
+    const all = stores();
     for (const { name } of all.slice(MOST_KEPT)) localStorage.removeItem(name);
-    const own = all.find(({ name }) => name === STORE + sessionStorage.friso) ?? all[0];
-    if (!own) return;
-    const { machines, shown, pinned: kept } = own.kept;
-    if (!machines.length || !machines.every(isMachine)) return;
+    const mine = all.find(({ name }) => name === own());
+    const { machines, shown, pinned: kept } = (mine ?? all[0])?.kept ?? {};
+    if (!machines?.length || !machines.every(isMachine)) return;
     Object.assign(state, { machines, pinned: kept, shown: machines[shown] ? shown : 0 });
+    if (mine) save();
   } catch {
     // nothing is kept
   }
 }
+
+/** A tab that is opened from another one, or is a copy of it, begins with its mark, and keeps what it has under it: the other one, which
+ * sees that, takes another mark. */
+window.addEventListener("storage", ({ key, newValue }) => {
+  if (newValue === null || key !== own()) return;
+  sessionStorage.friso = token();
+  save();
+});
 
 const isChanges = (value) => value !== null && typeof value === "object" && !Array.isArray(value) && Object.values(value).every((item) => item === null || typeof item !== "object");
 const isMachine = ({ name, text, steps, step }) => typeof name === "string" && typeof text === "string" && steps.every(isChanges) && isChanges(steps[step]);
