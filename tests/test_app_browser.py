@@ -410,6 +410,43 @@ def test_an_earlier_answer_leads_back_to_its_machine(browsed: Browsed) -> None:
     assert browsed.changes() == {"controller.crossover": "11 Hz"}
 
 
+def test_earlier_answers_are_named_by_what_changed_and_are_one_stop_of_tab(browsed: Browsed) -> None:
+    page, places = browsed.page, "#history button"
+    page.wait_for_selector("#answer .rest .note")
+    page.evaluate("document.getElementById('history').replaceChildren()")
+    both = {"controller.crossover": "9 Hz", "masses.cart": "1.4 kg"}
+    crossovers = [{"controller.crossover": f"{value} Hz"} for value in (11, 12)]
+    named = []
+    for changes in (crossovers[0], {"masses.cart": "1.3 kg"}, crossovers[1], both):
+        count = page.locator(places).count()
+        page.evaluate("async changes => (await import('/state.js')).set(changes)", changes)
+        page.wait_for_function("n => document.getElementById('history').children.length > n", arg=count)
+        named.append(page.locator(places).first.get_attribute("title").split(": ")[0])
+    assert named == [
+        "thesis_rig, controller.crossover 11 Hz",
+        "thesis_rig, masses.cart 1.3 kg",
+        "thesis_rig, controller.crossover 12 Hz",
+        "thesis_rig, controller.crossover 9 Hz, masses.cart 1.4 kg",
+    ]
+    page.focus(f"{places}[tabindex='0']")
+    page.keyboard.press("End")
+    assert page.evaluate("document.activeElement.title").startswith(named[0])
+    stops = page.eval_on_selector_all(places, "all => all.map(one => one.tabIndex)")
+    assert stops == [-1, -1, -1, 0]
+    sizes = page.eval_on_selector_all(places, "all => all.map(one => [one.offsetWidth, one.offsetHeight])")
+    assert np.min(sizes) >= 24  # WCAG 2.2, 2.5.8
+
+
+def test_no_single_key_acts_on_the_page(browsed: Browsed) -> None:
+    """Who speaks to the computer would set it off; WCAG 2.2, 2.1.4."""
+    page, pinned = browsed.page, "async () => Boolean((await import('/state.js')).pinned())"
+    page.focus("#picture")
+    page.keyboard.press("p")
+    assert page.evaluate(pinned) is False
+    page.keyboard.press("Alt+p")
+    assert page.evaluate(pinned) is True
+
+
 def test_a_server_that_is_gone_is_said_so_and_nothing_is_lost(browsed: Browsed) -> None:
     page, wrong = browsed.page, len(browsed.wrong)
     page.context.set_offline(True)

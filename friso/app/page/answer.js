@@ -1,9 +1,10 @@
 // The answer: a sentence per case, with its margin as soon as that is there; progress; and the history of answers.
-import { $, el } from "./dom.js";
+import { $, el, roving } from "./dom.js";
 import { paragraphs } from "./tables.js";
 import { Working } from "./working.js";
 
 let last = {};
+const labels = new WeakMap(); // of each machine, the keys that its newest entry was given, and what that is called
 const MOST = 200;
 const working = new Working();
 let complete = false;
@@ -61,13 +62,22 @@ export function progress(part) {
   working.show(part);
 }
 
+/** What sets the keys `given` apart from those of the entry before. */
+function changed(before, given) {
+  const paths = [...new Set([...Object.keys(before), ...Object.keys(given)])].filter((path) => before[path] !== given[path]);
+  return paths.map((path) => `${path} ${path in given ? given[path] ?? "removed" : "as opened"}`).join(", ");
+}
+
 /** Note the answer for a machine with the keys that were `given`; a click on it goes back there. */
 export function note(verdict, { machine, given }, back) {
   const text = JSON.stringify(given);
   if (last.machine === machine && last.text === text) return;
   last = { machine, text };
-  const changed = Object.entries(given).at(-1)?.join(" ") ?? "as opened";
-  const title = `${machine.name.replace(/\.toml$/, "")}, ${changed}: ${verdict}`;
+  const before = labels.get(machine) ?? { given: {}, label: "as opened" };
+  const label = changed(before.given, given) || before.label;
+  labels.set(machine, { given, label });
+  const title = `${machine.name.replace(/\.toml$/, "")}, ${label}: ${verdict}`;
   $("history").prepend(el("button", { type: "button", class: verdict, title, "aria-label": `Back to ${title}`, onclick: () => back(machine, given) }));
   while ($("history").children.length > MOST) $("history").lastChild.remove();
+  roving($("history"));
 }

@@ -74,6 +74,16 @@ export function tabs(place, buttons) {
   for (const tab of place.children) tab.tabIndex = tab.getAttribute("aria-selected") === "true" ? 0 : -1;
 }
 
+/** Of the buttons in a place, Tab reaches the one that has the focus, or the first, and arrows, Home and End the others. */
+export function roving(place) {
+  const stop = (item) => [...place.children].forEach((one) => (one.tabIndex = one === item ? 0 : -1));
+  place.onkeydown = (event) => {
+    along(event);
+    stop(document.activeElement);
+  };
+  stop(place.contains(document.activeElement) ? document.activeElement : place.firstElementChild);
+}
+
 /** "limiter_stiffness" as words. */
 export const words = (key) => {
   const text = key.slice(key.lastIndexOf(".") + 1).replaceAll("_", " ");

@@ -258,7 +258,10 @@ function wire() {
     if ((event.ctrlKey || event.metaKey) && event.key.toLowerCase() === "z") {
       event.preventDefault();
       $(event.shiftKey ? "redo" : "undo").click();
-    } else if (event.key === "p" && !event.ctrlKey && !event.metaKey) $("pin").click();
+    } else if (event.altKey && ["p", "π"].includes(event.key.toLowerCase())) { // as a Mac has it
+      event.preventDefault();
+      $("pin").click();
+    }
   });
   $("keys").addEventListener("focusout", caughtUp);
   document.addEventListener("dragover", (event) => event.preventDefault());
