@@ -6,6 +6,7 @@ import asyncio
 import base64
 import errno
 import functools
+import gc
 import http.client
 import io
 import json
@@ -15,6 +16,7 @@ import socket
 import struct
 import threading
 import time
+import weakref
 import zipfile
 from collections.abc import AsyncIterator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -37,6 +39,7 @@ from friso.app.ghosts import ghosts_of
 from friso.app.kept import MOST, KeptAnswers
 from friso.app.lines import command_line, python_line
 from friso.app.machine import Machine, machine_on_page
+from friso.app.questions import QUESTIONS
 from friso.app.serve import Server, listening
 from friso.app.server import application
 from friso.app.work import Work, Workshop
@@ -238,7 +241,9 @@ def test_every_response_says_what_a_page_may_load(served: Served, path: str, mor
 
 
 def test_the_page_has_no_script_in_it_and_names_no_other_place(served: Served) -> None:
-    for name in ("", "main.js", "style.css", "plot.js", "wire.js"):
+    names = [path.name for path in (Path(friso.__file__).parent / "app" / "page").iterdir()]
+    assert {"index.html", "main.js", "style.css", "entry.js"} <= {*names}
+    for name in names:
         status, _, content = served.request("GET", f"/{name}")
         assert status == 200
         assert b"https://" not in content
@@ -496,6 +501,23 @@ def test_the_schema_is_read_by_one_thread_alone(monkeypatch: pytest.MonkeyPatch)
         shown = [*pool.map(machine_on_page, 4 * [machine])]
     assert most == [1]
     assert shown == 4 * shown[:1]
+
+
+class Text(str):
+    """A text of which one sees whether it is kept."""
+
+
+def test_few_texts_of_machines_are_kept() -> None:
+    """A stage file is of 4 MB at most, and every place of a slider makes another machine of it."""
+    rig = RIG.read_text(encoding="utf-8")
+    texts = [Text(f"{rig}# {k}\n") for k in range(2 * machines.MOST_KEPT)]
+    kept = [weakref.ref(text) for text in texts]
+    assert Machine(texts[0], "rig.toml").stage is Machine(texts[0], "rig.toml").stage
+    for text in texts:
+        assert Machine(text, "rig.toml").stage.name
+    del text, texts
+    gc.collect()
+    assert sum(text() is not None for text in kept) * 4e6 <= 64e6
 
 
 @pytest.mark.parametrize("name", [name for name in friso.answers.starting.example_names() if "/" not in name])
@@ -834,6 +856,32 @@ def test_a_log_that_is_cut_off_by_the_end_of_the_server_is_no_error(capsys: pyte
     asyncio.run(ended())
     assert capsys.readouterr().err == ""
     assert logging.getLogger("uvicorn.error").isEnabledFor(logging.ERROR)
+
+
+def test_a_browser_that_disconnects_ends_what_it_asked(served: Served, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At once, though nothing is being sent: Starlette listens for it with servers of ASGI up to 2.3 alone."""
+    begun, ended, given_up = threading.Event(), threading.Event(), threading.Event()
+
+    def job(asked: Any, work: Work) -> Iterator[dict[str, Any]]:
+        begun.set()
+        while not work.flag[0] and not given_up.is_set():
+            time.sleep(0.001)
+        if work.flag[0]:
+            ended.set()
+        yield {"kind": "answer"}
+
+    monkeypatch.setitem(QUESTIONS, "run", job)  # type: ignore[arg-type]
+    body = json.dumps({"machine": {"text": ""}}).encode()
+    head = f"Host: 127.0.0.1:{served.port}\r\nAuthorization: Bearer {served.access.session}\r\n"
+    head += f"Content-Type: application/json\r\nContent-Length: {len(body)}\r\n\r\n"
+    try:
+        with socket.create_connection(("127.0.0.1", served.port)) as browser:
+            browser.sendall(f"POST /ask/run HTTP/1.1\r\n{head}".encode() + body)
+            assert begun.wait(60)
+            assert not ended.is_set()
+        assert ended.wait(60)
+    finally:
+        given_up.set()
 
 
 def test_a_question_that_arrives_late_does_not_overtake_a_newer_one() -> None:

@@ -678,6 +678,16 @@ def test_the_loops_follow_a_slider_and_what_they_allow_is_said_at_its_end(browse
     page.wait_for_selector("#picture .js-plotly-plot .main-svg")
 
 
+def test_the_drawing_of_the_leaf_springs_goes_with_its_picture(browsed: Browsed) -> None:
+    """It stands in the page: what has an address of its own (blob:) is kept for as long as the page is there."""
+    page = browsed.page
+    text = Path(friso.example("thesis_leaves")).read_text(encoding="utf-8")
+    page.evaluate("async text => (await import('/state.js')).add('leaves.toml', text)", text)
+    page.click("#tab-flexure")
+    page.wait_for_function("() => document.querySelector('.drawn img')?.naturalWidth > 0")
+    assert page.get_attribute(".drawn img", "src").startswith("data:image/svg+xml,")
+
+
 def test_a_dropped_log_shows_its_channels(browsed: Browsed, tmp_path: Path) -> None:
     page = browsed.page
     page.click("#tab-logs")

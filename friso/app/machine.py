@@ -64,7 +64,12 @@ class Machine:
 _VALUES = (str, bool, int, float, type(None))
 
 
-@lru_cache(256)
+MOST_KEPT = 16
+"""Stages that are kept of the machines asked about last, whose texts may be of 4 MB each: while a slider moves, several
+questions are about the same one."""
+
+
+@lru_cache(MOST_KEPT)
 def _stage(machine: Machine) -> Stage:
     base = loads(machine.text, machine.name)
     written = base.as_written()

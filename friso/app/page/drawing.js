@@ -60,7 +60,7 @@ function bodies(joint, two, value) {
     controller: [hit(118, 12, 142, 56), svg("circle", { class: "body", cx: 132, cy: 40, r: 8 }), line("M 140 40 H 158"), box(158, 22, 96, 36), text(206, 44, "Controller")],
     actuator: [hit(268, 12, 112, 110), line("M 254 40 H 280"), head(280, 40, 0), box(280, 22, 88, 36), text(324, 44, "Actuator"), line("M 350 58 V 128"), head(350, 128, 90)],
     encoder: [hit(388, 12, 84, 180), box(436, 138, 26, 46), line("M 441 148 H 457 M 441 156 H 457 M 441 164 H 457 M 441 172 H 457", "thin"), line("M 449 138 V 80 H 132 V 50"), head(132, 50, -90), text(424, 74, "encoder", "small")],
-    stage: [hit(294, 124, 136, 90), box(300, 132, 124, rigid ? 74 : 74), text(362, 166, "Stage"), text(362, 184, mass("stage"), "small")],
+    stage: [hit(294, 124, 136, 90), box(300, 132, 124, 74), text(362, 166, "Stage"), text(362, 184, mass("stage"), "small")],
     friction: [hit(12, 206, 456, 50), line("M 20 228 H 460"), line(Array.from({ length: 44 }, (_, k) => `M ${24 + 10 * k} 228 l -7 9`).join(" "), "thin"), text(240, 252, `Bearing: ${value("friction.model") ?? "no friction"}`, "small")],
   };
   const wheels = (x) => [svg("circle", { class: "body", cx: x, cy: 219, r: 8 }), svg("circle", { class: "body", cx: x + 46, cy: 219, r: 8 })];
@@ -69,7 +69,6 @@ function bodies(joint, two, value) {
   } else {
     shapes.friction.splice(1, 0, ...wheels(338));
     if (value("masses.stage") == null) {
-      shapes.stage = [];
       shapes.cart = [hit(294, 124, 136, 90), box(300, 132, 124, 74), text(362, 166, "Cart"), text(362, 184, mass("cart"), "small")];
       delete shapes.stage;
     }

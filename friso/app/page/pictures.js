@@ -194,7 +194,7 @@ export class Pictures {
   }
 
   drawn({ label, svg }) {
-    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+    const address = `data:image/svg+xml,${encodeURIComponent(svg)}`; // goes with the picture
     const of = label ? `: ${label}` : "";
     return el("figure", { class: "drawn" }, el("img", { src: address, alt: `The leaf springs, to scale${of}` }), label ? el("figcaption", {}, label) : null);
   }
