@@ -26,6 +26,7 @@ from friso.identification.output_error import fit as fitting
 from friso.identification.output_error import identifiable
 from friso.identification.output_error import profile as profiles
 from friso.identification.output_error.compliance import with_compliance
+from friso.identification.output_error.delay import with_delay
 from friso.identification.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby, polished
 from friso.identification.output_error.holding import with_force_settled, with_smoothness_settled
 from friso.identification.output_error.identifiable import BRISTLES, IdentifiableFit, believed, bounds_as_much
@@ -319,6 +320,29 @@ def test_no_coupling_is_seen_where_there_is_none() -> None:
     log = on_a_coupling(1e4, False)
     fitted, bandwidth = rigid(log)
     assert with_compliance(fitted, log["position"], log.sample_time, bandwidth) == (fitted, 0.0)
+
+
+@pytest.mark.parametrize("late", [1, 3, -2])
+def test_an_interval_of_friction_holds_the_truth_where_a_delay_moves_the_fit(late: int, wording: Wording) -> None:
+    """A force that acts some samples after it was logged, or before."""
+    plain = on_a_coupling(1e4, False)
+    log = replace(plain, signals={**plain.signals, "force": np.roll(plain["force"], -late)})
+    fitted, bandwidth = rigid(log)
+    wider, time = with_delay(fitted, log["force"], log.sample_time, bandwidth)
+    assert time == pytest.approx(late * log.sample_time, rel=0.2)
+    names = [fitted.problem.parameters[number].name for number in fitted.free]
+    off = [np.log(fitted.value(name) / true) for name, true in zip(names[1:3], FRICTION, strict=True)]
+    assert (COVERAGE * np.sqrt(np.diag(wider.covariance))[1:3] > np.abs(off)).all()
+    well = Quality(0.05, 0.05, 0.05, 0.1, 0.1)
+    (doubt,) = method._with_delay(fitted, well, log, bandwidth)[1].doubts
+    wording(doubt)
+    assert not method._with_delay(fitted, replace(well, spoilt=True), log, bandwidth)[1].doubts
+
+
+def test_no_delay_is_seen_where_there_is_none() -> None:
+    log = on_a_coupling(1e4, False)
+    fitted, bandwidth = rigid(log)
+    assert with_delay(fitted, log["force"], log.sample_time, bandwidth) == (fitted, 0.0)
 
 
 def test_the_fit_tells_whether_the_force_of_a_log_is_held() -> None:

@@ -28,6 +28,7 @@ from friso.identification.output_error.break_aways import exceeded_at_break_away
 from friso.identification.output_error.changes import changes_beside, drift_of_friction, inverse_reaching, reaching
 from friso.identification.output_error.compliance import WORTH_TELLING, with_compliance
 from friso.identification.output_error.coverage import Coverage, coverage
+from friso.identification.output_error.delay import LATE, with_delay
 from friso.identification.output_error.drawn import drawn_from
 from friso.identification.output_error.fit import OutputErrorFit
 from friso.identification.output_error.identifiable import fit_identifiable
@@ -116,6 +117,7 @@ def identify_moves(
         fit, quality = _with_directions(fit, quality, moved.velocity, log.unit("force"))
     if not (quality.failed or quality.rejected or is_free(flat)):
         fit, quality = _with_compliance(fit, quality, log["position"][part], log.sample_time, inverse.bandwidth)
+    fit, quality = _with_delay(fit, quality, log, inverse.bandwidth)
     fit, inverse, quality = _with_changes(fit, inverse, quality, moved.velocity, log.unit("force"))
     answer = replace(answer, fit=fit)
     estimates, correlation = estimates_of(answer, covered)
@@ -182,6 +184,22 @@ def _with_compliance(
     doubt = (
         f"The force goes with the motion as if {where}: the mass may be {percent(abs(share))} {way}, for which the "
         "intervals allow; a frequency response would show the coupling"
+    )
+    return fit, replace(quality, doubts=(*quality.doubts, doubt))
+
+
+def _with_delay(fit: OutputErrorFit, quality: Quality, log: Log, bandwidth: float) -> tuple[OutputErrorFit, Quality]:
+    """A fit with intervals that allow for a delay between force and motion, and the quality that says so, unless a
+    cause in time, or another, is named already."""
+    if quality.failed or quality.rejected:
+        return fit, quality
+    fit, late = with_delay(fit, log["force"][log.longest], log.sample_time, bandwidth)
+    if abs(late) < LATE * log.sample_time or quality.spoilt or quality.without:
+        return fit, quality
+    doubt = (
+        f"The motion seems to come {abs(late) * 1e3:.2g} ms {'after' if late > 0 else 'before'} the force: a delay "
+        "of the drive or between the channels, which passes for damping and viscous friction; the intervals allow for "
+        "it"
     )
     return fit, replace(quality, doubts=(*quality.doubts, doubt))
 
