@@ -24,6 +24,8 @@ from friso.identification.estimate import Estimate
 from friso.identification.experiments.break_away import static_from_ramps
 from friso.identification.experiments.steps import stiffness_from_steps
 from friso.identification.experiments.stick_slip import static_from_stick_slip
+from friso.identification.kind import NOTHING_CHOSEN, Prior
+from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
@@ -551,7 +553,7 @@ def test_friction_velocity_map_without_slow_speeds(wording: Wording) -> None:
     assert len(curve.velocities) == 6
     assert curve.both.coulomb.holds(1.0)
     assert curve.both.viscous.holds(4.0)
-    assert curve.bias.holds(0.3)
+    assert curve.bias.holds(-0.3)  # of a motor that has to hold 0.3 N against it
     assert curve.both.coulomb.half_width < 0.1
     assert curve.directions["forward"].coulomb.value == pytest.approx(1.3, abs=0.03)
     assert curve.directions["backward"].coulomb.value == pytest.approx(0.7, abs=0.03)
@@ -577,7 +579,7 @@ def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:
     solution, squares, *_ = np.linalg.lstsq(columns, curve.forces, rcond=None)
     spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * squares[0] / 3)
     for estimate, value, deviation in zip(
-        (curve.both.coulomb, curve.both.viscous, curve.bias), solution, spread, strict=True
+        (curve.both.coulomb, curve.both.viscous, curve.bias), solution * [1, 1, -1], spread, strict=True
     ):
         assert estimate.value == pytest.approx(value, abs=0.01 * deviation)
         assert estimate.half_width == pytest.approx(t_value(3) * deviation, rel=0.01)
@@ -590,7 +592,79 @@ def test_friction_velocity_map_with_slow_speeds_has_the_stribeck_curve() -> None
     assert curve.both.static.value == pytest.approx(1.5, rel=0.05)
     assert curve.both.stribeck_velocity.value == pytest.approx(5e-3, rel=0.1)
     assert curve.both.coulomb.value == pytest.approx(1.0, rel=0.05)
-    assert curve.both.covariance.shape == (4, 4)
+    assert curve.both.stribeck_exponent.value == pytest.approx(2.0, abs=0.1)
+    assert curve.both.covariance.shape == (5, 5)
+
+
+def at_speeds(seed: int) -> tuple[Log, dict[str, float]]:
+    """Perfect motion of a machine that is drawn, there and back at 10 to 20 speeds from 0.3 to 100 mm/s; and its truth:
+    friction, exponent and the constant force on the body."""
+    rng = np.random.default_rng(seed)
+    coulomb, exponent, speed = 10.0, rng.uniform(0.5, 2.0), 10 ** rng.uniform(-3, -2)
+    static, viscous, bias = coulomb * rng.uniform(1.15, 2.0), rng.uniform(10.0, 60.0), rng.uniform(-2.0, 2.0)
+    rows = []
+    for leg in np.geomspace(3e-4, 0.1, rng.integers(10, 21)):
+        for way in (leg, -leg):
+            level = coulomb + (static - coulomb) * np.exp(-((leg / speed) ** exponent)) + viscous * leg
+            rows += [np.zeros((200, 2)), np.tile([way, np.sign(way) * level - bias], (800, 1))]
+    velocity, force = np.concatenate(rows).T
+    noisy = force + 0.02 * coulomb * rng.standard_normal(len(force))
+    truth = {"coulomb": coulomb, "viscous": viscous, "static": static, "stribeck_velocity": speed}
+    log = record("drawn", DT, position=np.cumsum(velocity) * DT, force=noisy)
+    return log, {**truth, "stribeck_exponent": exponent, "bias": bias}
+
+
+@pytest.mark.parametrize("stated", [False, True])
+def test_what_constant_speeds_show_holds_the_truth_whatever_the_exponent(stated: bool) -> None:
+    """An exponent of 2 assumed of all put static friction of 22 N at 19.05 N +/- 0.46 N."""
+    held: dict[str, list[bool]] = {}
+    for seed in range(20):
+        log, truth = at_speeds(seed)
+        curve = friction_velocity(log, 0.0, truth["stribeck_exponent"] if stated else None)
+        for name, value in truth.items():
+            estimate = curve.bias if name == "bias" else getattr(curve.both, name)
+            held.setdefault(name, []).extend([estimate.holds(value)] if estimate.determined else [])
+    for name, hits in held.items():
+        assert len(hits) >= (0 if stated and name == "stribeck_exponent" else 18), name
+        assert sum(hits) >= 0.9 * len(hits), name
+    assert stated == (not held["stribeck_exponent"])
+
+
+def test_slow_passes_count_though_they_go_a_three_hundredth_of_the_speed() -> None:
+    log, _ = at_speeds(3)
+    speeds = np.abs(friction_velocity(log).velocities)
+    assert speeds.min() == pytest.approx(3e-4, rel=0.01)
+    assert np.allclose(np.sort(speeds)[::2], np.sort(speeds)[1::2], rtol=1e-3)  # there and back
+
+
+def test_an_exponent_that_the_forces_refute_is_not_believed(wording: Wording) -> None:
+    log, truth = at_speeds(0)
+    wrong = 2.0 if truth["stribeck_exponent"] < 1.3 else 0.7
+    curve = friction_velocity(log, 0.0, wrong)
+    assert curve.both.stribeck_exponent.holds(truth["stribeck_exponent"])
+    wording(curve.warnings[-1])
+
+
+def test_constant_speeds_name_the_force_as_the_stage_file_does() -> None:
+    """What acts on the body, not what the motor has to do against it."""
+    log, truth = at_speeds(1)
+    kind = KINDS["constant-speed"]
+    result = kind.analyse([log], Prior(), NOTHING_CHOSEN)
+    (bias,) = [one for one in kind.estimates(result, None) if one.name == "bias.cart"]
+    assert bias.holds(truth["bias"])
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_the_exponent_of_constant_speeds_is_that_which_the_stage_file_states(stated: bool) -> None:
+    log, truth = at_speeds(2)
+    exponent = round(truth["stribeck_exponent"], 3) if stated else "0.5 .. 2.5"
+    stage = rig_of_thesis().replace({"friction.stribeck_exponent": exponent})
+    kind = KINDS["constant-speed"]
+    estimates = kind.estimates(kind.analyse([log], Prior(stage, from_user=True), NOTHING_CHOSEN), stage)
+    names = {one.name: one for one in estimates}
+    assert ("friction.stribeck_exponent" in names) != stated
+    assert names["friction.static"].holds(truth["static"])
+    assert ("of the stage" in names["friction.static"].method) == stated
 
 
 def test_one_speed_leaves_a_range(wording: Wording) -> None:
@@ -609,7 +683,7 @@ def test_emps_friction_is_that_published() -> None:
     curve = friction_velocity(log, 95.1)
     assert curve.both.coulomb.value == pytest.approx(20.3935, rel=0.1)
     assert curve.both.viscous.holds(203.5034)
-    assert curve.bias.holds(-3.1648)
+    assert curve.bias.holds(3.1648)  # published: the offset of the motor
     assert not curve.both.static.determined
     assert not curve.both.stribeck_velocity.determined
 

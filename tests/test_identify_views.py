@@ -48,6 +48,7 @@ from friso.views.drawing import plotly_renderer
 from friso.views.drawing.figure import Figure, Panel, Series
 from friso.views.identify.document import identify_document
 from friso.views.identify.figures import identify_figures
+from friso.views.identify.kinds.constant_speed import VIEW as CONSTANT_SPEED
 from friso.views.identify.moves_figures import moves_figures, record_panels
 from friso.views.identify.numbers import interval_text, unit_of, value_text, with_interval
 from friso.views.identify.page import identify_html
@@ -195,6 +196,19 @@ def constant() -> tuple[Any, Log]:
     force = friction + 0.02 * np.random.default_rng(8).standard_normal(len(position))
     log = record("speeds", DT, reference=position, position=position, force=force)
     return FrictionAtSpeeds(friction_velocity(log), friction_position(log)), log
+
+
+def test_where_passes_do_not_repeat_nothing_is_said_of_the_rail() -> None:
+    """White noise of the force sensor is no friction along the rail."""
+    result, log = constant()
+    rail = [name for name, _ in CONSTANT_SPEED.facts(result) if name.startswith("Along the rail")]
+    assert len(rail) == len(result.position.passes)
+    level = np.sign(np.gradient(log["position"])) * 2.0
+    noisy = level + 0.1 * np.random.default_rng(9).standard_normal(len(level))
+    white = replace(log, signals={**log.signals, "force": noisy})
+    result = FrictionAtSpeeds(friction_velocity(white), friction_position(white))
+    assert result.position.passes
+    assert not any(name.startswith("Along the rail") for name, _ in CONSTANT_SPEED.facts(result))
 
 
 def presliding() -> tuple[Any, Log]:

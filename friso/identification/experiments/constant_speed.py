@@ -12,6 +12,7 @@ from friso.identification.combine import Correlated
 from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
 from friso.identification.logs.log import Log
+from friso.identification.output_error.parameters import EXPONENT
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import FrictionPosition, friction_position
 from friso.identification.readings.friction_velocity import STRAIGHT, FrictionVelocity, distinct, friction_velocity
@@ -31,26 +32,36 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     (log,) = logs
     assert isinstance(log, Log)
     mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
-    return FrictionAtSpeeds(friction_velocity(log, mass), friction_position(log, mass, crossover))
+    friction = friction_velocity(log, mass, _stated_exponent(prior))
+    return FrictionAtSpeeds(friction, friction_position(log, mass, crossover))
+
+
+def _stated_exponent(prior: Prior) -> float | None:
+    """The Stribeck exponent that the user's stage file states, without uncertainty; None where it states none."""
+    if prior.stage is None or not prior.from_user or EXPONENT in {*prior.made_up, *prior.stage.uncertain()}:
+        return None
+    return prior.stage.flat().get(EXPONENT)
 
 
 def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
-    """Friction in both directions, in the order of its covariance."""
-    both = result.velocity.both
-    keys = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
-    keys["stribeck_velocity"] = both.stribeck_velocity
-    return tuple(replace(estimate, name=f"friction.{key}") for key, estimate in keys.items())
+    """Friction in both directions, in the order of its covariance, and the constant force; an exponent that the stage
+    states is none of them."""
+    both, bias = result.velocity.both, "bias.stage" if stage and "masses.cart" not in stage.flat() else "bias.cart"
+    friction = [both.coulomb, both.viscous, both.static, both.stribeck_velocity]
+    friction += [both.stribeck_exponent] if both.stribeck_exponent.low < both.stribeck_exponent.high else []
+    return *friction, replace(result.velocity.bias, name=bias)
 
 
 def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Correlated:
-    """By the covariance of the fit."""
+    """By the covariance of the fit, of which the constant force is independent: passes go there and back."""
     covariance = result.velocity.both.covariance
     if not covariance.size:
         return independent(result, estimates)
-    fitted = enumerate(estimates[: len(covariance)])
-    rows = [row for row, estimate in fitted if estimate.determined and estimate.half_width > 0]
     size = np.sqrt(np.diag(covariance))
-    return [estimates[row] for row in rows], (covariance / np.outer(size, size))[np.ix_(rows, rows)]
+    together = np.eye(len(estimates))
+    together[: len(size), : len(size)] = covariance / np.outer(size, size)
+    rows = [row for row, estimate in enumerate(estimates) if estimate.determined]
+    return [estimates[row] for row in rows], together[np.ix_(rows, rows)]
 
 
 def _partial(log: Log) -> bool:

@@ -71,6 +71,11 @@ class FrictionPosition:
     verdict: str
     warnings: tuple[str, ...]
 
+    @property
+    def repeats(self) -> bool:
+        """Whether passes over the same places repeat the force: only then it is one of the places."""
+        return self.repeatability.determined and self.repeatability.value >= REPEATS
+
 
 def friction_position(log: Log, mass: float = 0.0, crossover: float | None = None) -> FrictionPosition:
     """Friction along the rail from the passes at constant velocity, `mass` [kg] times acceleration taken off.
@@ -93,7 +98,11 @@ def friction_position(log: Log, mass: float = 0.0, crossover: float | None = Non
     repeatability = _repeatability(maps, pairs)
     separated, verdict = _verdict(maps, repeatability, crossover)
     short = len(stretches) - len(long)
-    warnings = [f"{short} passes shorter than a fifth of the longest are left out."] if short else []
+    warnings = (
+        [f"{short} passes go less than a fifth of the longest one's way: friction along the rail leaves them out."]
+        if short
+        else []
+    )
     if not mass:
         warnings.append("No mass is given: the force contains that of inertia.")
     return FrictionPosition(maps, repeatability, pairs, separated, verdict, tuple(warnings))

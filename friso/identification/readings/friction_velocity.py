@@ -6,13 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import f as fisher
 
 from friso.identification.estimate import Estimate
 from friso.identification.logs.log import Log
-from friso.identification.readings.common import Mean, by_direction, by_t, stribeck_curve, t_value
+from friso.identification.readings.common import Mean, by_direction, by_t, t_value
 from friso.identification.readings.passes import CUTOFF, Pass, on_common_places, passes, places_of
+from friso.identification.readings.stribeck import FittedStribeck, Forces, Possible, stribeck_fit
 from friso.intervals import COVERAGE
 
 SPAN = 1.5
@@ -27,28 +26,29 @@ STRAIGHT = 3
 ROUNDING = 1e-9
 """Of the greatest force: no mean is known better."""
 
-SURE = 0.01
-"""Probability by chance below which a Stribeck curve is taken for shown."""
-
 METHOD = "mean forces over stretches of constant velocity"
 
 
 @dataclass(frozen=True)
 class Direction:
-    """One direction: Coulomb [N], viscous [N s/m], static [N] friction and Stribeck velocity [m/s], with the covariance
-    of those fitted (in that order, SI), shape (2, 2) or (4, 4), or (0, 0)."""
+    """One direction: Coulomb [N], viscous [N s/m], static [N] friction, Stribeck velocity [m/s] and exponent, with the
+    covariance of those fitted (in that order, SI), shape (2, 2), (4, 4) or (5, 5), or (0, 0); and the `curve`, None
+    where a straight line does as well."""
 
     coulomb: Estimate
     viscous: Estimate
     static: Estimate
     stribeck_velocity: Estimate
+    stribeck_exponent: Estimate
     covariance: np.ndarray
+    curve: FittedStribeck | None = None
 
 
 @dataclass(frozen=True)
 class FrictionVelocity:
     """The directions "forward" and "backward", each with what constant force there is in its Coulomb friction, both
-    together with that taken out, and the `bias` [N] itself, on top of equal friction. Per steady stretch, shape (n,):
+    together with that taken out, and the `bias` [N], the constant force on the body as in the stage file, beside equal
+    friction. Per steady stretch, shape (n,):
     velocity [m/s], mean force [N] less inertia, half-width of its 95 % interval [N]; velocities of those that were not
     steady, shape (m,); and the `places` [m] from end to end over which the steady ones were read."""
 
@@ -63,19 +63,22 @@ class FrictionVelocity:
     warnings: tuple[str, ...]
 
 
-def friction_velocity(log: Log, mass: float = 0.0) -> FrictionVelocity:
+def friction_velocity(log: Log, mass: float = 0.0, exponent: float | None = None) -> FrictionVelocity:
     """Friction-velocity map from the stretches of constant velocity, over the places that all of them share if they
-    share one, `mass` [kg] times what is left of acceleration taken off. What the speeds present cannot show is unknown,
-    with the reason. Raises InputError for missing channels."""
+    share one, `mass` [kg] times what is left of acceleration taken off. The Stribeck curve has the `exponent` of the
+    stage unless the forces refute that, else what the forces leave possible of it is inside all intervals. What the
+    speeds present cannot show is unknown, with the reason. Raises InputError for missing channels."""
     stretches = passes(log, CUTOFF)
     used = on_common_places(log, [stretch for stretch in stretches if stretch.steady], CUTOFF)
-    velocities, forces, errors = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 3).T
+    velocities, forces, errors, swings = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 4).T
+    size = np.abs(forces)
+    errors = np.hypot(errors, swings**2 * (size.max(initial=0.0) - size.min(initial=np.inf))) if used else errors
     unsteady = np.array([stretch.velocity for stretch in stretches if not stretch.steady])
     sides = {
-        words: _direction(np.abs(velocities[m]), np.sign(velocities[m]) * forces[m], errors[m], words)
+        words: _direction(velocities[m], np.sign(velocities[m]) * forces[m], errors[m], words, exponent)
         for words, m in by_direction(velocities)
     }
-    bias, both = _together(velocities, forces, errors)
+    bias, both, refuted = _together(velocities, forces, errors, exponent)
     places = places_of(log, used)
     warnings = []
     if used and places != places_of(log, [stretch for stretch in stretches if stretch.steady]):
@@ -83,24 +86,32 @@ def friction_velocity(log: Log, mass: float = 0.0) -> FrictionVelocity:
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
+    if refuted:
+        warnings.append(f"The forces refute the Stribeck exponent of the stage, {exponent:g}: it is fitted instead.")
     return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, tuple(warnings))
 
 
-def _row(stretch: Pass, mass: float) -> tuple[float, float, float]:
+def _row(stretch: Pass, mass: float) -> tuple[float, float, float, float]:
+    """Velocity [m/s], force [N] less inertia, half-width [N] of its interval, and swing as a share of the velocity: the
+    mean of a curve over it is off by the square of that, as a share of how far the curve falls."""
     return (
         stretch.velocity,
         stretch.force.value - mass * stretch.acceleration,
         t_value(stretch.force.freedom) * stretch.force.error,
+        stretch.swing / abs(stretch.velocity),
     )
 
 
-def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[Estimate, Direction]:
-    """The bias by least squares of Coulomb, viscous and bias on all stretches, and the friction without it."""
-    name, method = "offset", f"{METHOD}, forward and backward"
+def _together(
+    velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray, exponent: float | None
+) -> tuple[Estimate, Direction, bool]:
+    """The bias by least squares of Coulomb, viscous and bias on all stretches, or with the Stribeck curve where one
+    shows; the friction without it; and whether the forces refute the exponent."""
+    name, method = "bias", f"{METHOD}, forward and backward"
     sign = np.sign(velocities)
     if min((sign > 0).sum(), (sign < 0).sum()) < 2:
         reason = "fewer than two steady stretches in one of the directions"
-        return Estimate.unknown(name, "N", method, reason), _nothing(reason)
+        return Estimate.unknown(name, "N", method, reason), _nothing(reason), False
     columns = [sign, np.ones_like(sign)]
     if np.abs(velocities).max() >= SPAN * np.abs(velocities).min():
         columns.insert(1, velocities)
@@ -108,9 +119,16 @@ def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) ->
     even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # a curve that the line lacks cancels, there and back
     solution, covariance, freedom = _linear(design, forces, even)
     if freedom < 1:
-        return Estimate.unknown(name, "N", method, "too few steady stretches"), _nothing("too few steady stretches")
-    bias = by_t(name, "N", Mean(float(solution[-1]), float(covariance[-1, -1] ** 0.5), freedom), method)
-    return bias, _direction(np.abs(velocities), sign * (forces - solution[-1]), errors, "both directions", 1)
+        reason = "too few steady stretches"
+        return Estimate.unknown(name, "N", method, reason), _nothing(reason), False
+    bias = by_t(name, "N", Mean(-float(solution[-1]), float(covariance[-1, -1] ** 0.5), freedom), method)
+    friction = sign * (forces - solution[-1])
+    both = _direction(velocities, friction, errors, "both directions", exponent, 1)
+    if both.curve is None:
+        return bias, both, False
+    offset = both.curve.offset
+    value, low, high = (-float(solution[-1]) - end for end in (offset.value, offset.high, offset.low))
+    return Estimate(name, "N", value, low, high, method), both, both.curve.refuted
 
 
 def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
@@ -141,19 +159,39 @@ def _covariance(
     counts where it is greater than 1; `levels` are the places of what is a level of friction."""
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
-    covariance[np.ix_(levels, levels)] += float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2))
+    covariance[np.ix_(levels, levels)] += _level(deviations, errors) ** 2
     return covariance
 
 
+def _level(deviations: np.ndarray, errors: np.ndarray) -> float:
+    """Standard deviation [N] that all levels of friction share, by the half-widths in `errors` [N]."""
+    return float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2)) ** 0.5
+
+
 def _nothing(reason: str) -> Direction:
-    names = (("coulomb", "N"), ("viscous", "N s/m"), ("static", "N"), ("stribeck_velocity", "m/s"))
+    names = (
+        ("coulomb", "N"),
+        ("viscous", "N s/m"),
+        ("static", "N"),
+        ("stribeck_velocity", "m/s"),
+        ("stribeck_exponent", ""),
+    )
     unknown = [Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in names]
-    return Direction(unknown[0], unknown[1], unknown[2], unknown[3], np.empty((0, 0)))
+    coulomb, viscous, static, velocity, exponent = unknown
+    return Direction(coulomb, viscous, static, velocity, exponent, np.empty((0, 0)))
 
 
-def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, words: str, spent: int = 0) -> Direction:
-    """Fit of one direction, friction [N] positive against the motion, with half-widths `errors` [N]; `spent` degrees of
-    freedom are gone before."""
+def _direction(
+    velocities: np.ndarray,
+    friction: np.ndarray,
+    errors: np.ndarray,
+    words: str,
+    exponent: float | None,
+    spent: int = 0,
+) -> Direction:
+    """Fit of one direction or both, friction [N] positive against the motion, with half-widths `errors` [N]; `spent`
+    degrees of freedom are gone before, for the constant force; with the `exponent` of the stage, if it tells one."""
+    speeds = np.abs(velocities)
     method = f"{METHOD}, {words}"
     if len(speeds) < 3 + spent:
         return _nothing(f"{len(speeds)} steady stretches {words}: {3 + spent} are needed")
@@ -174,15 +212,20 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
     if distinct(speeds) < STRAIGHT:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
-    curved = _stribeck(speeds, friction, errors, solution, freedom)
-    if curved is not None:
-        return _curved(*curved, speeds, method)
+    if freedom >= STRAIGHT and distinct(speeds) >= SPEEDS:
+        deviations = _deviations(friction, errors)
+        plain = float(np.sum(((friction - solution[0] - solution[1] * speeds) / deviations) ** 2))
+        forces = Forces(speeds, friction, np.sign(velocities), deviations, _level(deviations, errors), spent > 0)
+        curve = stribeck_fit(forces, plain, exponent)
+        if curve is not None:
+            return _curved(curve, speeds, method, exponent)
     if viscous.high < 0:
         return _still_falling(coulomb, viscous, f"from {low:.3g} to {high:.3g} mm/s friction falls with the speed")
     flat = f"{slowest}: no rise of friction towards rest shows"
     static = Estimate.unknown("friction.static", "N", method, flat, coulomb.low)
     speed = Estimate.unknown("friction.stribeck_velocity", "m/s", method, static.reason, 0.0, float(speeds.min()))
-    return Direction(coulomb, viscous, static, speed, covariance)
+    exponent_open = replace(_nothing(flat).stribeck_exponent, method=method)
+    return Direction(coulomb, viscous, static, speed, exponent_open, covariance)
 
 
 def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:
@@ -197,6 +240,7 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
         Estimate.unknown("friction.viscous", "N s/m", method, reason, 0.0, top / float(speeds.mean())),
         nothing.static,
         nothing.stribeck_velocity,
+        nothing.stribeck_exponent,
         nothing.covariance,
     )
 
@@ -215,6 +259,7 @@ def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Directi
         Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low),
         nothing.static,
         nothing.stribeck_velocity,
+        nothing.stribeck_exponent,
         nothing.covariance,
     )
 
@@ -225,44 +270,32 @@ def _fitted(
     return by_t(name, unit, Mean(float(solution[place]), float(covariance[place, place] ** 0.5), freedom), method)
 
 
-def _stribeck(
-    speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, line: np.ndarray, freedom: int
-) -> tuple[np.ndarray, np.ndarray, int] | None:
-    """The fit of F_c, F_v, F_s, v_s, covariance and degrees of freedom; None where a straight line does as well."""
-    if freedom < 3 or distinct(speeds) < SPEEDS:
-        return None
-    deviations, scale = _deviations(friction, errors), float(np.abs(friction).max())
-    plain = float(np.sum(((friction - line[0] - line[1] * speeds) / deviations) ** 2))
-
-    def off(p: np.ndarray) -> np.ndarray:
-        dry = stribeck_curve(speeds, p[0], p[2], np.exp(p[3]))
-        return ((dry + p[1] * speeds / speeds.max()) * scale - friction) / deviations
-
-    def start(at: float) -> list[float]:
-        return [line[0] / scale, line[1] * speeds.max() / scale, float(friction[np.argmin(speeds)]) / scale, np.log(at)]
-
-    fits = [least_squares(off, start(at)) for at in np.geomspace(speeds.min(), speeds.max() / 2, 4)]
-    best = min(fits, key=lambda fit: fit.cost)
-    left, rest = freedom - 2, 2 * best.cost
-    bent = best.x[2] > best.x[0] > 0
-    if not bent or (rest > 0 and fisher.sf((plain - rest) / 2 / (rest / left), 2, left) > SURE):
-        return None
-    units = np.array([scale, scale / speeds.max(), scale, np.exp(best.x[3])])
-    solution = np.array([best.x[0], best.x[1], best.x[2], 1.0]) * units
-    inverse = units[:, None] * np.linalg.pinv(best.jac) / deviations
-    return solution, _covariance(inverse, deviations, rest / left, errors, [0, 2]), left
+def _curved(curve: FittedStribeck, speeds: np.ndarray, method: str, exponent: float | None) -> Direction:
+    """With a Stribeck curve: what the forces leave open of it, over all Stribeck velocities and exponents, is inside
+    the intervals. F_s and v_s are shown only where speeds reach below the Stribeck velocity."""
+    velocity, several = curve.velocity, "several exponents with their Stribeck velocities explain the forces alike"
+    if exponent is not None and not curve.refuted:
+        method = f"{method}; Stribeck exponent {exponent:g} of the stage"
+        several = f"{exponent:g} is that of the stage"
+    rises = f"friction rises towards rest, but no steady motion below {speeds.min() * 1e3:.3g} mm/s shows how far"
+    falls = f"friction may still fall with the speed at {speeds.max() * 1e3:.3g} mm/s"
+    seen = velocity.closed and velocity.value >= speeds.min() and velocity.high - velocity.low < 2 * velocity.value
+    high = "" if curve.coulomb.closed else falls
+    low = high or ("" if seen else rises)
+    return Direction(
+        _ranged("coulomb", "N", curve.coulomb, method, high),
+        _ranged("viscous", "N s/m", curve.viscous, method, high),
+        _ranged("static", "N", curve.static, method, low),
+        _ranged("stribeck_velocity", "m/s", velocity, method, low),
+        _ranged("stribeck_exponent", "", curve.exponent, method, "" if curve.exponent.closed else several),
+        curve.covariance,
+        curve,
+    )
 
 
-def _curved(solution: np.ndarray, covariance: np.ndarray, freedom: int, speeds: np.ndarray, method: str) -> Direction:
-    """With a Stribeck curve; F_s and v_s are shown only where speeds reach below the Stribeck velocity."""
-    names = ("coulomb", "viscous", "static", "stribeck_velocity")
-    units = ("N", "N s/m", "N", "m/s")
-    fits = [
-        _fitted(f"friction.{name}", unit, i, solution, covariance, freedom, method)
-        for i, (name, unit) in enumerate(zip(names, units, strict=True))
-    ]
-    if solution[3] < speeds.min() or fits[3].half_width > solution[3] or solution[2] < solution[0]:
-        reason = f"friction rises towards rest, but no steady motion below {speeds.min() * 1e3:.3g} mm/s shows how far"
-        fits[2] = Estimate.unknown(fits[2].name, "N", method, reason, float(solution[0]))
-        fits[3] = Estimate.unknown(fits[3].name, "m/s", method, reason, 0.0, float(speeds.max()))
-    return Direction(fits[0], fits[1], fits[2], fits[3], covariance)
+def _ranged(name: str, unit: str, fitted: Possible, method: str, reason: str) -> Estimate:
+    """An estimate by its range; not determined for a `reason`, if there is one."""
+    key = f"friction.{name}"
+    if reason:
+        return Estimate.unknown(key, unit, method, reason, max(fitted.low, 0.0), fitted.high)
+    return Estimate(key, unit, fitted.value, fitted.low, fitted.high, method)

@@ -34,6 +34,14 @@ LEAST_COMMON, COMMON = 16, 0.5
 """Samples of each pass on the way that all of them share, and the share of this in the way of the shortest, from which
 it is enough."""
 
+SETTLED = 0.1
+"""Share of its velocity by which a body that keeps it changes it within a period of the cutoff: at slow speeds a share
+of the largest acceleration would take a start for a stretch."""
+
+SLOWEST, SWINGING = 1e-4, 1e-3
+"""Shares of the greatest speed of a log below which a body creeps, or settles where it does not keep its velocity: no
+speed that was asked for (our choice)."""
+
 CORNER = 0.02
 """Share of the largest acceleration of the reference below which its velocity is constant."""
 
@@ -117,17 +125,24 @@ def _of_reference(log: Log, part: slice, cutoff: float) -> list[slice]:
     velocity = np.gradient(low_pass(reference, log.sample_time, cutoff), log.sample_time)
     acceleration = np.abs(np.gradient(velocity, log.sample_time))
     steady = acceleration <= CORNER * float(acceleration.max())
-    moving = np.abs(velocity) > 1e-3 * float(np.abs(velocity).max())
+    moving = np.abs(velocity) > SLOWEST * float(np.abs(velocity).max())
     return _trimmed(steady & moving, log.sample_time, cutoff, 0.1)
 
 
 def _of_motion(velocity: np.ndarray, sample_time: float, cutoff: float) -> list[slice]:
-    """Where the body itself keeps its velocity: its acceleration is within the noise, or small against the largest."""
+    """Where the body itself keeps its velocity: its acceleration is within the noise, or small against the largest and
+    its velocity. Where none of a stretch does the latter it swings, and is no less a stretch."""
     smooth = low_pass(velocity, sample_time, cutoff / 2)
-    acceleration = np.gradient(smooth, sample_time)
-    limit = max(CORNER * float(np.percentile(np.abs(acceleration), 99.5)), 5 * robust(acceleration))
-    moving = np.abs(smooth) > max(0.01 * float(np.abs(smooth).max()), 8 * robust(velocity - smooth))
-    return _trimmed((np.abs(acceleration) <= limit) & moving, sample_time, cutoff, 0.0)
+    acceleration, speed = np.abs(np.gradient(smooth, sample_time)), np.abs(smooth)
+    noise, top = 5 * robust(np.gradient(smooth, sample_time)), float(speed.max())
+    gentle = CORNER * float(np.percentile(acceleration, 99.5))
+    moving = speed > max(SLOWEST * top, 8 * robust(velocity - smooth))
+    even = moving & (acceleration <= np.maximum(np.minimum(gentle, SETTLED * cutoff * speed), noise))
+    swinging = moving & (speed > SWINGING * top) & (acceleration <= max(gentle, noise))
+    kept = _trimmed(even, sample_time, cutoff, 0.0)
+    others = _trimmed(swinging, sample_time, cutoff, 0.0)
+    kept += [one for one in others if not any(one.start < other.stop and other.start < one.stop for other in kept)]
+    return sorted(kept, key=lambda one: one.start)
 
 
 def _trimmed(mask: np.ndarray, sample_time: float, cutoff: float, share: float) -> list[slice]:

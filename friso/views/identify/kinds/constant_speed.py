@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.identification.estimate import Estimate
 from friso.identification.experiments.constant_speed import FrictionAtSpeeds
 from friso.identification.readings.common import stribeck_curve
 from friso.identification.readings.friction_position import FrictionPosition
@@ -34,7 +35,6 @@ def _facts(result: FrictionAtSpeeds) -> Facts:
     facts = [(f"Friction {name}", _direction_text(side)) for name, side in result.velocity.directions.items()]
     facts += [
         ("Friction, both directions", _direction_text(result.velocity.both)),
-        ("Constant force", with_interval(result.velocity.bias)),
         ("Repeatability along the rail", with_interval(result.position.repeatability)),
     ]
     facts += [
@@ -43,13 +43,13 @@ def _facts(result: FrictionAtSpeeds) -> Facts:
             f"mean {with_interval(stretch.mean)}, standard deviation {digits(stretch.spread, 'N')}; "
             f"correlation length {with_interval(stretch.correlation_length)}",
         )
-        for stretch in result.position.passes
+        for stretch in (result.position.passes if result.position.repeats else ())
     ]
     return tuple(facts)
 
 
 def _direction_text(direction: Direction) -> str:
-    several = (direction.coulomb, direction.viscous, direction.static, direction.stribeck_velocity)
+    several = (*_friction(direction).values(),)
     visible = [estimate for estimate in several if estimate.determined]
     reasons = {estimate.reason: None for estimate in several if not estimate.determined}
     names = [within(estimate.name) for estimate in several if not estimate.determined]
@@ -84,9 +84,12 @@ def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
 
 
 def _direction_numbers(direction: Direction) -> dict[str, Any]:
-    several = {"coulomb": direction.coulomb, "viscous": direction.viscous, "static": direction.static}
-    several["stribeck_velocity"] = direction.stribeck_velocity
-    return {name: estimate_document(estimate) for name, estimate in several.items()}
+    return {name: estimate_document(estimate) for name, estimate in _friction(direction).items()}
+
+
+def _friction(direction: Direction) -> dict[str, Estimate]:
+    names = ("coulomb", "viscous", "static", "stribeck_velocity", "stribeck_exponent")
+    return {name: getattr(direction, name) for name in names}
 
 
 def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
@@ -113,10 +116,13 @@ def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
     """The curve fitted to one direction, over the velocities it was fitted to."""
     if not (direction.coulomb.determined and direction.viscous.determined):
         return []
-    size, coulomb = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200), direction.coulomb.value
-    curved = direction.static.determined and direction.stribeck_velocity.determined
-    static, stribeck = (direction.static.value, direction.stribeck_velocity.value) if curved else (coulomb, np.inf)
-    friction = stribeck_curve(size, coulomb, static, stribeck) + direction.viscous.value * size
+    size, curve = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200), direction.curve
+    if curve is None:
+        dry = np.full_like(size, direction.coulomb.value)
+    else:
+        levels = (curve.coulomb, curve.static, curve.velocity, curve.exponent)
+        dry = stribeck_curve(size, *(level.value for level in levels))
+    friction = dry + direction.viscous.value * size
     sign = 1.0 if word == "forward" else -1.0
     return [Series(sign * size, sign * friction, f"fit, {word}", WAYS[word], "dashed")]
 

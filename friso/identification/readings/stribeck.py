@@ -1,0 +1,212 @@
+"""A Stribeck curve through the friction at constant speeds, with the intervals of its profile.
+
+At a given Stribeck velocity and exponent the curve is linear in all other parameters: the least squares of both are
+laid out over a grid, and an interval holds whatever explains the forces as well as chance allows, be the exponent what
+it may (profile likelihood). An interval by the slope at the best fit is much too narrow: another exponent with another
+velocity may leave as little.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import f as fisher
+
+from friso.identification.output_error.parameters import EXPONENTS
+from friso.identification.readings.common import t_value
+
+SURE = 0.01
+"""Probability by chance below which a curve is taken for shown, or an exponent for another than stated."""
+
+VELOCITIES, SHAPES = 81, 41
+"""Points of the grid: Stribeck velocities and exponents; first of all there are, then of those that are possible."""
+
+FINER, MARGIN = 2, 2
+"""How often the grid is laid out again around what is possible, and by how many steps further than that: the valley of
+velocities with their exponents may be narrower than a step."""
+
+USUAL = 2.0
+"""Exponent with which a curve has to show alone where forces are few: another one costs a parameter."""
+
+SLOWER, FASTER = 30.0, 2.0
+"""How far below the slowest and above the fastest speed a Stribeck velocity may lie, as ratios."""
+
+
+@dataclass(frozen=True)
+class Possible:
+    """The best value of a parameter, what the forces leave possible of it, and whether that ends within the grid."""
+
+    value: float
+    low: float
+    high: float
+    closed: bool
+
+
+@dataclass(frozen=True)
+class FittedStribeck:
+    """Coulomb [N], viscous [N s/m] and static friction [N], the Stribeck velocity [m/s], the exponent, and the constant
+    force [N] along the axis by which friction was too large forward, each with its range; the covariance of the first
+    five (of four where the exponent was given), SI; and whether an exponent that was given was `refuted`."""
+
+    coulomb: Possible
+    viscous: Possible
+    static: Possible
+    velocity: Possible
+    exponent: Possible
+    offset: Possible
+    covariance: np.ndarray
+    refuted: bool
+
+
+@dataclass(frozen=True)
+class Forces:
+    """Friction [N] against the motion at some speeds [m/s], its directions (1, -1), and the standard deviation [N] of
+    each as a weight, all of shape (n,); the standard deviation [N] that all levels share; and whether directions share
+    one curve, beside a constant force."""
+
+    speeds: np.ndarray
+    friction: np.ndarray
+    directions: np.ndarray
+    deviations: np.ndarray
+    level: float
+    both: bool
+
+
+def stribeck_fit(forces: Forces, plain: float, exponent: float | None) -> FittedStribeck | None:
+    """The curve through the forces; None where a straight line, which leaves `plain` (squares over variances), does as
+    well. With an `exponent` that is not refuted by the forces it is that one; forces too few to tell leave all."""
+    speeds = forces.speeds
+    velocities = np.geomspace(speeds.min() / SLOWER, speeds.max() * FASTER, VELOCITIES)
+    shapes, left = np.linspace(EXPONENTS[0], EXPONENTS[1], SHAPES), len(speeds) - 5 - forces.both
+    apart = left < 1
+    left += apart
+    if left < 1:
+        return None
+    grid = _Grid(forces, velocities, shapes, apart).around(left)
+    refuted = False
+    if exponent is not None:
+        stated = _Grid(forces, velocities, np.array([exponent]), False).around(left + (not apart))
+        worse = (stated.least - grid.least) / max(grid.least / left, 1.0)
+        refuted = not apart and bool(fisher.sf(worse, 1, left) < SURE)
+        if not refuted:
+            grid, left = stated, left + (not apart)
+    free = len(grid.shapes) > 1 and not apart
+    usual = _Grid(forces, velocities, np.array([USUAL]), False).around(left + free) if free else grid
+    if not (_better(plain, grid.least, 2 + free, left) or _better(plain, usual.least, 2, left + free)):
+        return None
+    return grid.curve(left, refuted, (velocities[0], velocities[-1]))
+
+
+def _better(plain: float, least: float, more: int, left: int) -> bool:
+    """Whether a curve with so many more parameters than a line leaves less than chance would have it."""
+    return least < plain and (least == 0 or bool(fisher.sf((plain - least) / more * left / least, more, left) < SURE))
+
+
+class _Grid:
+    """The least squares of all that is linear, at each Stribeck velocity and exponent, shapes (velocities, exponents):
+    `cost` (squares over variances; infinite where friction would not rise towards rest), the solutions (.., p) and
+    their covariance (.., p, p) with all deviations as stated. Exponents taken `apart` are each as good as the best."""
+
+    def __init__(self, forces: Forces, velocities: np.ndarray, shapes: np.ndarray, apart: bool) -> None:
+        """Shapes (velocities,) and (exponents,)."""
+        self.forces, self.velocities, self.shapes, self.apart = forces, velocities, shapes, apart
+        speeds = forces.speeds
+        decay = np.exp(-((speeds / velocities[:, None, None]) ** shapes[:, None]))
+        columns = [1 - decay, np.broadcast_to(speeds / speeds.max(), decay.shape), decay]
+        if forces.both:
+            columns.append(np.broadcast_to(forces.directions, decay.shape))
+        design = np.stack(columns, axis=-1) / forces.deviations[:, None]
+        target = forces.friction / forces.deviations
+        inverse = np.linalg.pinv(design, rcond=1e-9)
+        self.solutions = inverse @ target
+        self.cost = np.sum((target - np.einsum("vsnp,vsp->vsn", design, self.solutions)) ** 2, axis=-1)
+        self.covariance = inverse @ np.swapaxes(inverse, -1, -2)
+        coulomb, static = self.solutions[..., 0], self.solutions[..., 2]
+        self.cost[(static <= coulomb) | (coulomb <= 0)] = np.inf
+
+    @property
+    def least(self) -> float:
+        """The least squares over variances."""
+        return float(self.cost.min())
+
+    def around(self, left: int) -> _Grid:
+        """A grid around what is possible with `left` degrees of freedom, a little further than that where this one goes
+        on; the same where no curve is."""
+        grid = self
+        for _ in range(FINER if np.isfinite(self.least) and left > 0 else 0):
+            inside, ends = grid.room(left) >= 0, []
+            for points, here in ((grid.velocities, inside.any(axis=1)), (grid.shapes, inside.any(axis=0))):
+                at = np.flatnonzero(here)
+                ends += [points[max(at[0] - MARGIN, 0)], points[min(at[-1] + MARGIN, len(points) - 1)]]
+            shapes = np.linspace(ends[2], ends[3], SHAPES) if len(grid.shapes) > 1 else grid.shapes
+            grid = _Grid(grid.forces, np.geomspace(ends[0], ends[1], VELOCITIES), shapes, grid.apart)
+        return grid
+
+    def room(self, left: int) -> np.ndarray:
+        """By how much less than chance allows, with `left` degrees of freedom, each point leaves more than the best."""
+        least = self.cost.min(axis=0, keepdims=True) if self.apart else np.array([[self.least]])
+        least = np.where(np.isfinite(least), least, 0.0)
+        return t_value(left) ** 2 * np.maximum(least / left, 1.0) - (self.cost - least)
+
+    def curve(self, left: int, refuted: bool, outer: tuple[float, float]) -> FittedStribeck:
+        """The best curve with its ranges, of `left` degrees of freedom; those that reach an `outer` Stribeck velocity
+        or exponent are not closed."""
+        forces, open_shape = self.forces, len(self.shapes) > 1
+        best = np.unravel_index(int(np.argmin(self.cost)), self.cost.shape)
+        scatter, t = max(float(self.cost[best]) / left, 1.0), t_value(left)
+        room = self.room(left)
+        inside = room >= 0
+        fast, shaped = np.asarray(inside.any(axis=1)), np.asarray(inside.any(axis=0))
+        ends = [bool(self.velocities[fast][end] == outer[end]) for end in (0, -1)]
+        cut = any(float(self.shapes[shaped][end]) == EXPONENTS[end] for end in (0, -1))
+
+        def linear(place: int, scale: float, level: float, closed: bool) -> Possible:
+            centre = self.solutions[..., place][inside] * scale
+            half = np.sqrt(room[inside] * self.covariance[..., place, place][inside]) * scale
+            value = float(self.solutions[(*best, place)]) * scale
+            below, above = value - float((centre - half).min()), float((centre + half).max()) - value
+            return Possible(value, value - float(np.hypot(below, level)), value + float(np.hypot(above, level)), closed)
+
+        shared = t * forces.level
+        fastest = forces.speeds.max()
+        velocities, shapes = _between(self.velocities, fast, True), _between(self.shapes, shaped, False)
+        return FittedStribeck(
+            linear(0, 1.0, shared, not ends[1]),
+            linear(1, 1 / fastest, 0.0, not ends[1]),
+            linear(2, 1.0, shared, not ends[0]),
+            Possible(float(self.velocities[best[0]]), *velocities, not any(ends)),
+            Possible(float(self.shapes[best[1]]), *shapes, open_shape and not (cut or self.apart)),
+            linear(3, 1.0, 0.0, True) if forces.both else Possible(0.0, 0.0, 0.0, False),
+            self._covariance((int(best[0]), int(best[1])), scatter, open_shape and not self.apart),
+            refuted,
+        )
+
+    def _covariance(self, best: tuple[int, int], scatter: float, open_shape: bool) -> np.ndarray:
+        """Of Coulomb, viscous and static friction, Stribeck velocity and, where it is open, exponent, SI, by the slope
+        at the best curve."""
+        forces, speeds = self.forces, self.forces.speeds
+        velocity, shape = float(self.velocities[best[0]]), float(self.shapes[best[1]])
+        ratio = speeds / velocity
+        decay, drop = np.exp(-(ratio**shape)), float(self.solutions[(*best, 2)] - self.solutions[(*best, 0)])
+        columns = [1 - decay, speeds, decay, drop * decay * ratio**shape * shape / velocity]
+        if open_shape:
+            columns.append(-drop * decay * ratio**shape * np.log(ratio))
+        count = len(columns)
+        columns += [forces.directions] if forces.both else []
+        design = np.stack(columns, axis=1)
+        size = np.linalg.norm(design, axis=0)
+        inverse = np.linalg.pinv(design / size / forces.deviations[:, None]) / size[:, None]
+        covariance = (inverse @ inverse.T * scatter)[:count, :count]
+        covariance[np.ix_([0, 2], [0, 2])] += forces.level**2
+        return covariance
+
+
+def _between(points: np.ndarray, inside: np.ndarray, ratios: bool) -> tuple[float, float]:
+    """The least and the greatest point of a grid that lie inside, each by half a step further out."""
+    (at,) = np.nonzero(inside)
+    scale = np.log(points) if ratios else points
+    step = float(scale[1] - scale[0]) if len(points) > 1 else 0.0
+    ends = np.array([scale[at[0]] - step / 2, scale[at[-1]] + step / 2])
+    low, high = np.exp(ends) if ratios else np.clip(ends, points[0], points[-1])
+    return float(low), float(high)
