@@ -1,11 +1,14 @@
 """The work that a question may take: counted in steps, the same on every machine."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from variants import VARIANTS
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.engine.batch import RunOptions, run_chunks
-from friso.engine.kernel import kernel
+from friso.engine.kernel import CALL, OPERATION, STEP, kernel
 from friso.equations.structure import structure
 from friso.hunting.measures import measured_run
 from friso.hunting.verdict import BANDWIDTHS, STARTS, judge
@@ -25,14 +28,27 @@ def runs_of(stage: Stage, count: int) -> np.ndarray:
     return runs.statistic("attempted")
 
 
-def test_work_is_counted_by_states_and_steps(locked: Stage) -> None:
-    states = len(kernel(structure(locked.flat())).full_state)
+def test_work_is_counted_by_steps_and_what_they_compute(locked: Stage) -> None:
+    work = kernel(structure(locked.flat())).work
     with allowance() as around, allowance() as several:
         steps = runs_of(locked, 24)
-    assert several.used == around.used >= states * steps.sum()
+    assert several.used == around.used >= work * steps.sum()
     with allowance() as single:
         runs_of(locked, 1)
     assert several.used / 24 < single.used < several.used  # a run alone keeps a whole vector busy
+
+
+def test_a_step_is_as_dear_as_the_operations_in_it() -> None:
+    """Of one more state, of a bristle, and of deviations beside all states; by the source alone, so that it does not
+    depend on the machine."""
+    rigid, free = (kernel(structure(VARIANTS[name].flat())) for name in ("rigid", "free"))
+    variational = kernel(structure(VARIANTS["rigid"].flat()), variational=True)
+    bare = replace(
+        rigid,
+        source="def step(b, k):\n    b[0] = b[1] * b[2] + exp(b[3])\n\ndef locate(b, k):\n    b[0] = b[1] / b[2]\n",
+    )
+    assert STEP < rigid.work < free.work < variational.work < 5 * rigid.work
+    assert bare.work == pytest.approx(STEP + 2 * OPERATION + CALL)
 
 
 def test_runs_beyond_an_allowance_are_refused(locked: Stage) -> None:

@@ -142,7 +142,7 @@ def _doubts(records: list[dict[str, Any]]) -> None:
     print_table(("not sure", "why", "", "stages"), sorted(rows, key=lambda row: -row[2]))
     slowest = sorted(records, key=lambda record: -record["work"])[:SLOWEST]
     print_table(
-        ("most work, in steps times states", "", "CPU [s]"),
+        ("most work, in units of 12 ns", "", "CPU [s]"),
         [[f"{r['seed']}:{r['number']}", f"{r['work']:.1e}", f"{r['cpu']:.1f}"] for r in slowest],
     )
 

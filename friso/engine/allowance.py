@@ -26,9 +26,9 @@ class Exhausted(Exception):
 
 @dataclass
 class Allowance:
-    """The `work` that runs may take together, in steps times states (about 12 ns each on a core of 2024), and what of
-    it is `used`; and whether it was `exhausted`: it did not suffice. Work beyond an allowance `around` this one is not
-    allowed either."""
+    """The `work` that runs may take together, in steps times what one of their kernel takes (`Kernel.work`; a unit is
+    about 12 ns on a core of 2024), and what of it is `used`; and whether it was `exhausted`: it did not suffice. Work
+    beyond an allowance `around` this one is not allowed either."""
 
     work: float
     around: Allowance | None = None
@@ -41,21 +41,22 @@ class Allowance:
         own = self.work - self.used
         return own if self.around is None else min(own, self.around.left)
 
-    def most_steps(self, runs: int, states: int) -> float:
-        """How many steps each of some runs may take. Raises Exhausted if nothing is left."""
+    def most_steps(self, runs: int, step: float) -> float:
+        """How many steps, of so much work, each of some runs may take. Raises Exhausted if nothing is left."""
         left = self.left
         if left <= 0:
             self.exhaust()
-        return left / states * min(1 / LANES, FAIR / runs)
+        return left / step * min(1 / LANES, FAIR / runs)
 
     def exhaust(self) -> NoReturn:
         """Tell that the allowance does not suffice: raises Exhausted."""
         self.exhausted = True
         raise Exhausted
 
-    def charge(self, steps: np.ndarray, states: int) -> None:
-        """Count the work of a batch of runs by their steps, shape (runs,): a run alone takes as long as eight."""
-        work = PER_BATCH + states * max(float(np.sum(steps)), LANES * float(np.max(steps, initial=0.0)))
+    def charge(self, steps: np.ndarray, step: float) -> None:
+        """Count the work of a batch of runs by their steps, shape (runs,), each of so much work: a run alone takes as
+        long as eight."""
+        work = PER_BATCH + step * max(float(np.sum(steps)), LANES * float(np.max(steps, initial=0.0)))
         at: Allowance | None = self
         while at is not None:
             at.used += work

@@ -183,17 +183,17 @@ def _run_within_allowance(kernel: Kernel, batch: Batch, options: RunOptions, res
     """Run a batch; where there is an allowance, in no more steps than it has left for each run. Those for which that
     does not suffice, a few as a rule, are run again by themselves, and may take what the others have left over. Raises
     Exhausted where that is hardly more."""
-    allowance, states = current_allowance(), len(kernel.full_state)
+    allowance = current_allowance()
     if allowance is None:
         run_batch(kernel, batch, options_of(options), results, options.threads)
         return
     which, part, steps = np.arange(len(batch.starts)), results, 0
     while which.size:
-        before, steps = steps, int(min(options.budget, allowance.most_steps(len(which), states)))
+        before, steps = steps, int(min(options.budget, allowance.most_steps(len(which), kernel.work)))
         if steps < MORE * before:
             allowance.exhaust()
         run_batch(kernel, _batch_of(batch, which), options_of(replace(options, budget=steps)), part, options.threads)
-        allowance.charge(part.statistics[:, STATISTICS.index("attempted")], states)
+        allowance.charge(part.statistics[:, STATISTICS.index("attempted")], kernel.work)
         if part is not results:
             for column, rows in zip(results, part, strict=True):
                 column[which] = rows

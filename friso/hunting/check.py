@@ -94,6 +94,9 @@ class Case:
 AT_LIMIT = 1e-9
 """Share of a limit of the force by which one that stands there may differ from it."""
 
+FREE = 0.58
+"""Share of the work of a check that the case with a free joint may use: it takes the most."""
+
 FED = 0.3
 """Share of the work of a case that the search for what feeds its cycle may use at least."""
 
@@ -115,8 +118,7 @@ def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Prog
     done = Tally(progress, len(different) * len(PARTS))
 
     def judged(variant: Stage) -> Case:
-        others = len(different) > 1 and not _is_free(variant)  # a free joint takes the most work
-        return _case(variant, rtol, traces, done, WORK / 2 if others else WORK)
+        return _case(variant, rtol, traces, done, _share(variant) * WORK if len(different) > 1 else WORK)
 
     cases = side_by_side([partial(judged, variant) for variant in different])
     return {name: cases[different.index(variant)] for name, variant in variants.items()}
@@ -127,8 +129,10 @@ def needed_kernels(stage: Stage) -> set[KernelRequest]:
     return set[KernelRequest]().union(*map(_needed, stage.variants().values()))
 
 
-def _is_free(stage: Stage) -> bool:
-    return stage.joint is not None and not stage.joint.locked
+def _share(stage: Stage) -> float:
+    """The share of the work of a check that a case with its joint locked, or free, may use beside the other one."""
+    free = stage.joint is not None and not stage.joint.locked
+    return FREE if free else 1 - FREE
 
 
 def check_given(stage: Stage, rtol: float = RTOL) -> Case:
@@ -154,12 +158,12 @@ def _case(stage: Stage, rtol: float, traces: bool, done: Tally, work: float) -> 
         ended += (step := int(part != ATTRACTION))
         done.add(step, part)
 
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
-    measures = measure_runs(flat, runs)
+    with allowance() as spent:
+        (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(measuring_options(rtol), room=ROOM))
+        measures = measure_runs(flat, runs)
+        judgement = judge(stage, measures, max(rtol, LONG), begin, work - spent.used)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
-    with allowance() as spent:
-        judgement = judge(stage, measures, max(rtol, LONG), begin, work)
     fed = None
     if judgement.swing and structure(flat).plays:
         fed = _fed(stage, max(work - spent.used, FED * work))

@@ -49,9 +49,8 @@ from friso.stage import Stage
 MOVING = "the reference never stands still"
 """Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
 
-WORK = 7e8
-"""Work of a case of a check (see `friso.engine.allowance`): about 8 s on one core. Beside a free joint
-the locked one has half of it."""
+WORK = 8e8
+"""Work of a check (see `friso.engine.allowance`): about 10 s on one core."""
 
 SURVEY, REST, KICKS = 0.4, 0.3, 0.3
 """Shares of the work of a verdict that the search for what attracts the stage may use at most, and of what that leaves
