@@ -485,6 +485,13 @@ def test_stamps_with_few_digits_are_those_of_a_uniform_clock(period: float, begi
     assert np.abs(read.time[measured] - clock * 1e-4).max() < 1.01e-4
 
 
+def test_what_a_log_holds_is_told_with_the_rate_of_its_clock(tmp_path: Path) -> None:
+    time = np.round(np.arange(2000) / 400, 3)  # 2 and 3 ms for 2.5
+    path = log_files.write_text(tmp_path / "a.csv", NAMES, [time, *columns()[1:]])
+    rates = [channel.sample_rate for channel in friso.logs(path).result[0].channels if channel.sample_rate]
+    assert rates == pytest.approx([400.0] * 3, rel=1e-3)
+
+
 def test_a_random_walk_of_whole_digits_is_no_uniform_clock() -> None:
     steps = np.random.default_rng(1).choice([2e-3, 3e-3], 2000)
     read = track("position", np.cumsum(steps), np.arange(2000.0))

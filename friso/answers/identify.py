@@ -176,7 +176,8 @@ def identify(
     """
     if stage is None and set:
         first = next(iter(f"{key}={value}" for key, value in set.items()) if isinstance(set, Keyed) else iter(set))
-        raise InputError("set", str(first), "a stage whose keys to override", "stage=stage.toml")
+        wanted = "a stage whose keys to override"
+        raise InputError("set", str(first), wanted, "--stage stage.toml (in Python stage=...)")
     if stage is None and laws:
         wanted = "the stage, for its masses and what lies before its guide"
         raise InputError("--laws", "no stage", wanted, "--stage stage.toml")

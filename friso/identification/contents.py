@@ -18,6 +18,7 @@ from friso.identification.logs.measured_response import MeasuredResponse
 from friso.identification.logs.read import file_format, is_frequency_response, read_frequency_response
 from friso.identification.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identification.logs.signals import Notes, Reading, instants, with_user_units
+from friso.identification.logs.time_base import usual_step
 from friso.identification.sources import log_with_signals, unnamed
 
 BINS = 24
@@ -52,7 +53,7 @@ class ChannelContent:
         """The usual rate [Hz] of the samples; None without instants that increase."""
         steps = np.diff(self.time) if self.time is not None else np.empty(0)
         steps = steps[steps > 0]
-        return 1 / float(np.median(steps)) if steps.size else None
+        return 1 / usual_step(steps) if steps.size else None
 
     def course(self) -> np.ndarray:
         """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""

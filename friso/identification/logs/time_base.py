@@ -68,7 +68,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
             f"time stamps with {percent(gaps.mean())} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
         )
         raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
-    period = float(steps[~gaps].mean())
+    period = usual_step(steps)
     lost = np.round(steps / period) - 1
     scatter = min(max(EVEN, SCATTER * float(np.std(steps[~gaps])) / period), CLEAR)
     whole = np.abs(steps / period - 1 - lost) <= scatter  # else the clock began anew
@@ -79,6 +79,11 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     ends = np.cumsum([0, *(part[0].size for part in parts)]).tolist()
     time, values, filled = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     return _evened(name, Track(time, values, period, [slice(a, b) for a, b in pairwise(ends)], filled, read))
+
+
+def usual_step(steps: np.ndarray) -> float:
+    """The mean [s] of the steps of time, shape (n,), that are no gaps."""
+    return float(steps[~_gaps(steps)].mean())
 
 
 def _gaps(steps: np.ndarray) -> np.ndarray:
