@@ -98,11 +98,12 @@ class CheckAnswer(Answer):
         return tables
 
     def details(self) -> Sequence[str]:
-        """Whether the friction law may give energy back."""
+        """What the search for the edge may miss, and whether the friction law may give energy back."""
         from friso.stage.tables import passive_where
+        from friso.views.check.words import between_surveyed
         from friso.views.convert.words import activity_sentences
 
-        return activity_sentences(passive_where(self.stage.flat()))
+        return [*between_surveyed(self.result), *activity_sentences(passive_where(self.stage.flat()))]
 
     @cached_property
     def traced(self) -> Mapping[str, Case]:

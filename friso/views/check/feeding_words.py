@@ -35,8 +35,5 @@ def _course(name: str, decline: Decline) -> str:
 
 def _doubt(*declines: Decline) -> list[str]:
     certain = all(decline.certain for decline in declines)
-    return (
-        []
-        if certain
-        else ["That is not certain: some simulations were given up, or do not show all swings that may last."]
-    )
+    doubt = "That is not certain: some simulations were given up, or swings too small for them to see may last."
+    return [] if certain else [doubt]

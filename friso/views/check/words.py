@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
 from friso.hunting.criteria import ATTRACTED
-from friso.hunting.margin import DISTANCE, FARTHEST
+from friso.hunting.margin import COARSE, DISTANCE, FARTHEST, STEPS
 from friso.hunting.verdict import BANDWIDTHS, FEEDING, LOWER, STARTS
 from friso.quantities import percent
 from friso.stage.controllers import FORCE_LIMIT
@@ -310,6 +310,17 @@ def _windows(case: Case) -> list[str]:
         elif low or high:
             places.append(f"above {low}" if low else f"below {high}, but not just above that")
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
+
+
+def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
+    """How far apart the bandwidths are that the search for an edge surveys: what is narrower may lie between them."""
+    if all(case.judgement.margin is None for case in cases.values()):
+        return []
+    fine, coarse = (percent(FARTHEST ** (1 / steps) - 1) for steps in (STEPS, COARSE))
+    return [
+        f"Bandwidths up to {FARTHEST:g} times as high and as low were surveyed, {fine} or {coarse} apart: ranges in "
+        "which the stage hunts that are narrower may lie between them (friso boundary follows cycles through them)."
+    ]
 
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
