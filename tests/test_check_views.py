@@ -38,8 +38,7 @@ from friso.hunting import Judgement, Kick, Margin
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.hunting import Swing
 from friso.hunting.loop import LowerGains
-from friso.hunting.margin import BandwidthWindow
-from friso.hunting.outward import AttractionEnd
+from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.verdict import BANDWIDTHS, LOWER, STARTS
 from friso.version import VERSION
 from friso.views import pages

@@ -17,9 +17,9 @@ from friso.engine.arrays import Status
 from friso.hunting import basin, verdict
 from friso.hunting.attractors import Attractors, Target
 from friso.hunting.basin import Kick, MoveShare, displacements_that_hunt
-from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths
+from friso.hunting.margin import NOT_SOUGHT, Margin, SearchedBandwidths
 from friso.hunting.measures import measuring_options
-from friso.hunting.outward import AttractionEnd
+from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.hunting.verdict import (
     BANDWIDTHS,
     BY_CHANCE,
@@ -212,6 +212,7 @@ def test_a_longer_run_that_is_given_up_tells_nothing_of_settling(budget: int, wo
     made_up = {
         "hunting": lambda *_, **__: attraction,
         "search_bandwidths": lambda *_: NOT_SOUGHT,
+        "followed_on": lambda stage, sought, attracting: sought,
         "measuring_options": lambda *_: replace(measuring_options(1e-6), budget=budget),
     }
     with patched({verdict: made_up}), allowance() as spent:

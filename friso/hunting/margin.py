@@ -13,7 +13,8 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.outward import ALONG, PRECISE, AttractionEnd, Beyond, Outward
+from friso.hunting.outward import ALONG, PRECISE, AttractionEnd, BandwidthWindow, Beyond, Outward
+from friso.hunting.restabilised import windows_again
 from friso.stage import Stage
 
 FARTHEST = 10.0
@@ -30,7 +31,8 @@ windows narrower than a step may be missed."""
 @dataclass(frozen=True)
 class Margin:
     """The edge of hunting in bandwidth: the highest one, over the range searched, below which something attracts and
-    above which nothing does. Of a stage that nothing attracts it is the nearest below.
+    above which nothing does, but in the windows told beside it. Of a stage that nothing attracts it is the nearest
+    below.
 
     `factor` is the bandwidth at the edge over that of the stage, `crossover` [Hz] the crossover there (None for a
     controller given by its gains, all of whose poles and zeros the factor scales). At `quiet`, a factor just above,
@@ -50,15 +52,6 @@ class Margin:
     def end(self) -> AttractionEnd:
         """The end of what attracts, in factors of the bandwidth."""
         return AttractionEnd(self.factor, self.quiet, self.certain, self.reserve)
-
-
-@dataclass(frozen=True)
-class BandwidthWindow:
-    """Bandwidths at which something attracts: its ends, in factors of that of a stage. None: as far as the search
-    goes."""
-
-    low: AttractionEnd | None
-    high: AttractionEnd | None
 
 
 @dataclass(frozen=True)
@@ -105,12 +98,24 @@ def search_bandwidths(stage: Stage, attracting: bool, survey: Attractors | None 
     lower = grid.lower_end(index) if attracting else None
     contradicts = bool(grid.attracts[index]) and not attracting
     if edge is None:
-        return SearchedBandwidths(None, grid.windows(index), lower, contradicts, bool(grid.attracts[index:].all()))
+        to_the_top = bool(grid.attracts[index:].all())
+        return SearchedBandwidths(None, grid.windows(index), lower, contradicts, to_the_top)
     at, end, certain = edge
     conclusive = certain and not contradicts
     inside = None if crossover is None else crossover * end.inside
     outermost = Margin(end.inside, inside, conclusive, end.outside, end.reserve)
     return SearchedBandwidths(outermost, grid.windows(at), lower, contradicts)
+
+
+def followed_on(stage: Stage, sought: SearchedBandwidths, attracting: bool) -> SearchedBandwidths:
+    """The same, with the windows in which cycles attract again that repel just beyond the edge, or, without one, repel
+    at the bandwidth of a stage that nothing attracts; as far as an allowance reaches."""
+    nothing = not (attracting or sought.contradicts)
+    starts = [(sought.margin.quiet, FARTHEST)] if sought.margin else [(1.0, FARTHEST), (1.0, 1 / FARTHEST)] * nothing
+    windows = sought.windows
+    for at, farthest in starts:
+        windows += windows_again(stage.flat(), at, farthest, windows)
+    return replace(sought, windows=windows)
 
 
 class _Grid:

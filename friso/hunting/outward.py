@@ -33,6 +33,9 @@ PACE, SHORTEST = 3.0, 1e-5
 """How much faster branches are followed than where they are drawn, and their shortest step: the end of a branch that is
 lost is known to a thousandth at best."""
 
+NARROW = 1e-3
+"""Share of the bandwidth below which a window is narrow."""
+
 FLAT = 3e-4
 """Step along a branch that ends the search for a fold: there the bandwidth changes with the square of it."""
 
@@ -92,6 +95,25 @@ class AttractionEnd:
     outside: float
     certain: bool
     reserve: float = PRECISE
+
+
+@dataclass(frozen=True)
+class BandwidthWindow:
+    """Bandwidths at which something attracts: its ends, in factors of that of a stage. None: as far as the search
+    goes."""
+
+    low: AttractionEnd | None
+    high: AttractionEnd | None
+
+    @property
+    def narrow(self) -> bool:
+        """Whether no machine holds its bandwidth so exactly that it would stay in there (see `NARROW`)."""
+        return bool(self.low and self.high and self.high.inside < self.low.inside * (1 + NARROW))
+
+    def holds(self, factor: float) -> bool:
+        """Whether something attracts at a factor."""
+        low, high = self.low.inside if self.low else 0.0, self.high.inside if self.high else np.inf
+        return low <= factor <= high
 
 
 @dataclass

@@ -40,10 +40,10 @@ from friso.hunting.cycle.hunting import (
     why_not,
 )
 from friso.hunting.loop import may_run_away, winds_up_at_a_limit
-from friso.hunting.margin import DISTANCE, NOT_SOUGHT, BandwidthWindow, Margin, SearchedBandwidths, search_bandwidths
+from friso.hunting.margin import DISTANCE, NOT_SOUGHT, Margin, SearchedBandwidths, followed_on, search_bandwidths
 from friso.hunting.measures import Measures, measuring_options
 from friso.hunting.motions import FollowedMotions, Motions, followed_motions, resting, run_motions, some_of
-from friso.hunting.outward import AttractionEnd
+from friso.hunting.outward import AttractionEnd, BandwidthWindow
 from friso.stage import Stage
 
 MOVING = "the reference never stands still"
@@ -56,6 +56,9 @@ SURVEY, REST, KICKS = 0.4, 0.3, 0.3
 """Shares of the work of a verdict that the search for what attracts the stage may use at most, and of what that leaves
 those for following a motion that has not come to rest, and for kicks and moves; the search for the edge of hunting may
 use all that is left then."""
+
+AGAIN = 1.5e8
+"""Work beside that of a check in which cycles are followed beyond the edge of hunting."""
 
 FARTHER = 12.0
 """How many times as long a motion is followed that still swings by less than what attracts."""
@@ -310,8 +313,11 @@ def _some_unknown(displacement: Kick | None, push: Kick | None, moved: MoveShare
 
 def _sought(stage: Stage, attraction: Hunting, work: float) -> tuple[SearchedBandwidths, tuple[str, ...]]:
     """What a search through the bandwidths shows that may use so much work, and what of it had to be given up."""
+    attracting = attraction.target is not None
     with allowance(work) as search:
-        sought = search_bandwidths(stage, attraction.target is not None, attraction.surveyed)
+        sought = search_bandwidths(stage, attracting, attraction.surveyed)
+    with allowance(AGAIN):
+        sought = followed_on(stage, sought, attracting)
     left = LOWER if sought.to_the_top else BANDWIDTHS
     return sought, (left,) if search.exhausted else ()
 

@@ -161,7 +161,7 @@ def unsettled_parts(case: Case, measured: Performance, goal: Goal) -> tuple[str,
         listed.append("distance")
     if goal.bandwidth_limit is not None and not loop_bandwidth(case.stage) <= goal.bandwidth_limit * (1 + ROUNDED):
         listed.append("bandwidth")
-    if any(_near(window.low, window.high, goal.distance) for window in judgement.windows):
+    if any(_near(window.low, window.high, goal.distance) for window in judgement.windows if not window.narrow):
         listed.append("window")
     if case.unstable or measured.own_margin < goal.margin * (1 - ROUNDED):
         listed.append("own margin")

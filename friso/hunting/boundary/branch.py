@@ -88,8 +88,8 @@ class Branch:
 class Tracer:
     """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
     those of the cycle (the latter only if they are not as few as there may be); `pace` times as fast as a curve is
-    drawn, in steps not shorter than `shortest`. At a place, what is varied changes by a hundredth over a length of the
-    line, `hundredth`."""
+    drawn, in steps not shorter than `shortest`, as long as its multiplier is below the `steepest`. At a place, what is
+    varied changes by a hundredth over a length of the line, `hundredth`."""
 
     def __init__(
         self,
@@ -101,10 +101,11 @@ class Tracer:
         pace: float = 1.0,
         shortest: float = SHORTEST,
         hundredth: Callable[[float], float] = lambda _: HUNDREDTH,
+        steepest: float = STEEPEST,
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
         self.first, self.longest, self.smooth = pace * FIRST, pace * LONGEST, pace * SMOOTH
-        self.shortest, self.hundredth = shortest, hundredth
+        self.shortest, self.hundredth, self.steepest = shortest, hundredth, steepest
 
     def solve(
         self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
@@ -199,8 +200,8 @@ class Tracer:
         stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
         if point.cycle.amplitude[0] < SHRUNK * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
-        if abs(point.multiplier) > STEEPEST:
-            return f"the cycle repels {STEEPEST:g}-fold and more per return"
+        if abs(point.multiplier) > self.steepest:
+            return f"the cycle repels {self.steepest:g}-fold and more per return"
         return ""
 
     def branch(self, start: Point) -> Branch:

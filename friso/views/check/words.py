@@ -27,7 +27,7 @@ from friso.views.loop_words import unstable_where
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Kick, Margin
-    from friso.hunting.outward import AttractionEnd
+    from friso.hunting.outward import AttractionEnd, BandwidthWindow
 
 _MICRON, _TEN_MICRON = BANDS
 
@@ -39,6 +39,9 @@ _AFTERWARDS = {
 """What becomes of a swing that was observed beyond a force limit without anti-windup, by the loop at lower gains."""
 
 _UNFINISHED = "this run was completed, but not the longer one that shows whether it ends in the hunting that was found"
+
+ONE_PLACE = 1.01
+"""Factor between the ends of a window below which it is told by its middle and its width."""
 
 ROUGH = 5e-4
 """Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""
@@ -299,27 +302,37 @@ def _elsewhere(case: Case) -> str | None:
     return None if controller.bandwidth_name == "crossover" else controller.bandwidth_key
 
 
-def _windows(case: Case) -> list[str]:
-    """Where else in bandwidth something attracts."""
-    places = []
-    for window in case.judgement.windows:
-        low = None if window.low is None else edge_text(case, window.low)
-        high = None if window.high is None else edge_text(case, window.high)
-        if low and high:
-            places.append(f"from {low} to {high}")
-        elif low or high:
-            places.append(f"above {low}" if low else f"below {high}, but not just above that")
+def _windows(case: Case, narrow: bool = False) -> list[str]:
+    """Where else in bandwidth something attracts: in windows that are narrow, or not."""
+    places = [_window(case, window) for window in case.judgement.windows if window.narrow == narrow]
     return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
+def _window(case: Case, window: BandwidthWindow) -> str:
+    """Where a window of bandwidths lies."""
+    low, high = window.low, window.high
+    if low and high and high.inside < low.inside * ONE_PLACE:
+        width = percent(high.inside / low.inside - 1)
+        middle = (low.inside + high.inside) / 2
+        return f"within a range of {width} about {_bandwidth(case, middle, up=None, digits=5)}"
+    if low and high:
+        return f"from {edge_text(case, low)} to {edge_text(case, high)}"
+    if low:
+        return f"above {edge_text(case, low)}"
+    return f"below {edge_text(case, high)}, but not just above that" if high else "at all bandwidths searched"
+
+
 def between_surveyed(cases: Mapping[str, Case]) -> list[str]:
-    """How far apart the bandwidths are that the search for an edge surveys: what is narrower may lie between them."""
+    """Windows that are so narrow that no machine stays in there, and how far apart the bandwidths are that the search
+    for an edge surveys: others may lie between them."""
     if all(case.judgement.margin is None for case in cases.values()):
         return []
     fine, coarse = (percent(FARTHEST ** (1 / steps) - 1) for steps in (STEPS, COARSE))
     return [
-        f"Bandwidths up to {FARTHEST:g} times as high and as low were surveyed, {fine} or {coarse} apart: ranges in "
-        "which the stage hunts that are narrower may lie between them (friso boundary follows cycles through them)."
+        *(f"{item.label}: {sentence}" for item in shown_cases(cases) for sentence in _windows(item.case, narrow=True)),
+        f"Bandwidths up to {FARTHEST:g} times as high and as low were surveyed, {fine} or {coarse} apart, and cycles "
+        "that begin to repel at the edge were followed to where they turn back. Other ranges in which the stage hunts, "
+        "narrower than these steps, may lie between (friso boundary follows cycles from more bandwidths).",
     ]
 
 
@@ -370,7 +383,7 @@ def _faster(case: Case, edge: Margin) -> str:
 
 def _distance(case: Case, edge: Margin) -> float:
     """The factor from the edge that advice keeps; 1 where something attracts again within it."""
-    begins = [window.low.inside for window in case.judgement.windows if window.low is not None]
+    begins = [window.low.inside for window in case.judgement.windows if window.low and not window.narrow]
     again = any(edge.factor < begin <= edge.quiet * DISTANCE * (1 + ROUGH) for begin in begins)
     return 1.0 if again or edge.quiet * DISTANCE > FARTHEST else DISTANCE
 
