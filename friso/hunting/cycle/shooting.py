@@ -22,7 +22,7 @@ SERVES = 0.1
 
 STALLED = (3, 8, 1)
 """Steps after which an orbit whose gap has not halved gets no closer: while it is above `RENEWED`, below that, and once
-the orbit is closed: what is left then is rounding, and halves by chance."""
+the orbit is closed, or as close as the tolerance of its runs: what is left then is rounding, and halves by chance."""
 
 STRIDE = 0.3
 """Largest change in one step of the distance at which the stage sticks, and of the time, as a share of it."""
@@ -250,7 +250,7 @@ class _Shooting:
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = self.stalled
-        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > CLOSED, near, closed))
+        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > max(CLOSED, self.rtol), near, closed))
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
