@@ -29,9 +29,10 @@ from friso.identification.kinds import KINDS
 from friso.identification.logs.log import Log
 from friso.identification.method import identify
 from friso.identification.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
+from friso.identification.readings.course import Course
 from friso.identification.readings.friction_position import friction_position
 from friso.identification.readings.friction_velocity import friction_velocity
-from friso.identification.readings.ramps import force_ramps
+from friso.identification.readings.ramps import FEW_RAMPS, force_ramps
 from friso.identification.readings.rate_effect import break_away, share_below, static_friction
 from friso.identification.response.fitting import ResponseFit
 from friso.identification.sources import recognised
@@ -476,6 +477,31 @@ def test_a_mass_that_is_not_told_stays_in_the_interval() -> None:
     assert of_mass.holds(4.6)
     assert of_none.holds(4.6)
     assert of_none.low < of_mass.low
+
+
+def test_ramps_from_rest_are_recognised() -> None:
+    """They were taken for moves. One event a log is enough where there are several; two are too few."""
+    log = ramps(LUGRE, [1.0, 2.0, 1.0, 4.0], 1.0, np.random.default_rng(7))
+    assert recognised(log, Path("log.csv"))[0] == "break-away"
+    few = ramps(LUGRE, [1.0, 2.0], 1.0, np.random.default_rng(7))
+    assert recognised(few, Path("log.csv"))[0] == "moves"
+    together = KINDS["break-away"].claims_together
+    assert together is not None
+    assert together([Course(few), Course(few)])
+    assert not together([Course(few), Course(record("rest", DT, position=np.zeros(4000), force=np.zeros(4000)))])
+
+
+@pytest.mark.parametrize("crossover", ["6 Hz", "8 Hz"])
+def test_an_integrator_that_winds_up_makes_no_ramps_from_none(rig: friso.Stage, crossover: str) -> None:
+    """Of a stage that hunts, long after its move, the integrator takes the force through zero while it sticks."""
+    changes = {"joint.locked": True, "controller.crossover": crossover, "motion.duration": "40 s"}
+    run = friso.simulate(rig.replace(changes), sample_time=DT)
+    rng = np.random.default_rng(8)
+    position, force = (np.asarray(run[name])[round(15 / DT) :] for name in ("position", "force"))
+    log = record("hunting", DT, position=measured(position, 1e-7, rng), force=measured(force, 0.05, rng))
+    assert len(force_ramps(log).forces) > FEW_RAMPS
+    assert Course(log).ramps == 0
+    assert recognised(log, Path("log.csv"))[0] == "moves"
 
 
 def test_rates_that_are_too_high_are_told(wording: Wording) -> None:

@@ -250,7 +250,9 @@ class _Shooting:
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         far, near, closed = self.stalled
-        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > max(CLOSED, self.rtol), near, closed))
+        patience = np.where(
+            self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > max(CLOSED, self.rtol), near, closed)
+        )
         moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 

@@ -14,11 +14,9 @@ from friso.identification.estimate import Estimate
 from friso.identification.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import by_direction
-from friso.identification.readings.ramps import Ramps, force_ramps
+from friso.identification.readings.course import Course
+from friso.identification.readings.ramps import FEW_RAMPS, Ramps, force_ramps
 from friso.identification.readings.rate_effect import BRISTLE_RATE, static_friction
-
-FEW = 3
-"""Ramps that a log shows for static friction of its own."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +58,13 @@ def static_from_ramps(log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE
     return BreakAway(together, forward, backward, ramps, tuple(notes))
 
 
+def _claims_together(courses: Sequence[Course]) -> str | None:
+    """Enough ramps of the force in all, and some in each log."""
+    ramps = [course.ramps for course in courses]
+    enough = all(ramps) and sum(ramps) >= FEW_RAMPS
+    return f"the force rises evenly from none {sum(ramps)} times until the position moves off" if enough else None
+
+
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
     (log,) = logs
     assert isinstance(log, Log)
@@ -72,5 +77,7 @@ KIND = ExperimentKind[BreakAway](
     after=("frequency", "moves"),
     foreign=("force",),
     per_unit=True,
-    partial=lambda log: len(static_from_ramps(log).ramps.times) < FEW,
+    partial=lambda log: len(static_from_ramps(log).ramps.times) < FEW_RAMPS,
+    claims=lambda course: _claims_together([course]),
+    claims_together=_claims_together,
 )

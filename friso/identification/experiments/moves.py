@@ -16,6 +16,7 @@ from friso.identification.moves import IdentifiedMoves, SimulatedLog, check_role
 from friso.identification.output_error.problem import why_continuous
 from friso.identification.readings.course import Course
 from friso.identification.readings.friction_velocity import STRAIGHT, distinct
+from friso.identification.readings.ramps import FEW_RAMPS
 from friso.identification.stage_file import made_up
 from friso.stage import Stage
 
@@ -35,11 +36,11 @@ RESTS = 0.1
 
 
 def _claims(course: Course) -> str | None:
-    """A reference moves; or it is no series of constant speeds, and nothing repeats, the position rests in between, or
-    the force turns seldom and holds few frequencies."""
+    """A reference moves; or it is no series of constant speeds or force ramps, and nothing repeats, the position rests
+    in between, or the force turns seldom and holds few frequencies."""
     if course.reference_moves:
         return "its reference moves"
-    if distinct(course.speeds) >= STRAIGHT:
+    if distinct(course.speeds) >= STRAIGHT or course.ramps >= FEW_RAMPS:
         return None
     repetition = course.repetition
     if repetition is None:

@@ -12,6 +12,7 @@ from friso.errors import InputError
 from friso.identification.logs.log import Log
 from friso.identification.readings.common import runs
 from friso.identification.readings.passes import Pass, passes
+from friso.identification.readings.ramps import force_ramps
 from friso.identification.response.period import find_periods
 
 BACK = 0.1
@@ -33,6 +34,13 @@ have to be reached from both: friction at rest follows the last motion, and with
 
 LONG = 0.01
 """Share of a log for which a position that rests does so."""
+
+RAMPING = 0.25
+"""Share of a log that force ramps take together at least (our choice): moves begin within a few per cent of theirs."""
+
+EVEN, BEFORE = 0.1, 0.05
+"""By what share of its break-away force a ramp may be off its line a quarter of the way up, and by what share of it the
+force off none before: an integrator takes the force through zero without a rest."""
 
 BLUR = 20
 """Samples over which a position is averaged, for the way that it goes not to be that of its noise."""
@@ -90,6 +98,33 @@ class Course:
         way = float(np.abs(np.diff(uniform_filter1d(position[part], BLUR))).sum())
         gone = sum(float(np.ptp(position[stretch.span])) for stretch in steady)
         return np.array([abs(stretch.velocity) for stretch in steady if gone > MOSTLY * way])
+
+    @cached_property
+    def ramps(self) -> int:
+        """How often the force rises evenly from none until the body moves off, where that is most of what happens and
+        no reference moves; 0 where it is not, or where the position has no SI unit."""
+        log = self.log
+        try:
+            shown = None if self.reference_moves else force_ramps(log.per_unit_of_force())
+        except InputError:
+            return 0
+        if shown is None:
+            return 0
+        rows = zip(shown.times, shown.directions * shown.forces, shown.forces / shown.rates, strict=True)
+        even = [lasts for at, force, lasts in rows if self._from_none(at, force, lasts)]
+        return len(even) if sum(even) > RAMPING * len(log.time) * log.sample_time else 0
+
+    def _from_none(self, at: float, force: float, lasts: float) -> bool:
+        """Whether the force rests at none and then rises evenly, for as long as it lasts [s], to what it is at an
+        instant [s]."""
+
+        def mean(first: float, last: float) -> float:
+            """Over some part of the way, as a share of the force."""
+            edges = np.searchsorted(self.log.time, at - lasts * (1 - np.array([first, last])))
+            values = self.log["force"][edges[0] : edges[1]]
+            return float(values.mean()) / force if values.size else 0.0
+
+        return abs(mean(0.2, 0.3) - 0.25) < EVEN and abs(mean(-0.2, -0.1)) < BEFORE
 
     @property
     def one_way(self) -> bool:

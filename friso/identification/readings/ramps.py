@@ -17,16 +17,17 @@ CUTOFF = 100.0
 SMEARED = 2.0
 """Periods of the low-pass that the second half of a ramp must last for its break-away to be read."""
 
-
 SAMPLES = 5
 """Samples of the second half of a ramp from which its rate is read."""
 
 BROAD = 40
 """To see where its second half begins the push is smoothed over one in so many samples of the rest and the ramp."""
 
+FEW_RAMPS = 3
+"""Ramps that a log shows for static friction of its own."""
+
 LEAST = 20
 """Samples of a segment that may hold a ramp."""
-
 
 FROM = 0.5
 """Share of its force at the break-away from below which a ramp rises: our choice. A body that stops within a ramp and

@@ -89,10 +89,19 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: flo
     low, high = mean.value - half, (mean.value + half) / (1 - share) if share < 1 else np.inf
     low, high = float(low), float(high)
     if share > 2 * FAR:
-        reason = f"the force rises at {np.median(rates):.3g} N/s: too fast, break-away may be {percent(share)} below it"
+        reason = (
+            f"at {np.median(rates):.3g} N/s ramps may break away up to {percent(share)} below static friction; ramps "
+            f"below {_slow_enough(bristle_rate):.2g} N/s, or at rates more than {SPREAD:g} times apart, would show it"
+        )
         return Estimate.unknown(name, "N", method, reason, low, high)
     value = float(mean.value * (1 + share / (1 - share) / 2))
     return Estimate(name, "N", value, low, high, method, systematic=(high - low) / 2 - scatter)
+
+
+def _slow_enough(bristle_rate: float) -> float:
+    """The force rate [N/s], to a tenth, up to which ramps of one rate show static friction."""
+    rates = bristle_rate * np.geomspace(1e-6, 1, 145)
+    return float(max(rate for rate in rates if share_below(rate, bristle_rate) <= 2 * FAR))
 
 
 def _extrapolated(

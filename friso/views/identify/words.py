@@ -8,6 +8,8 @@ from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from friso.axis import KINDS as AXES
 from friso.axis import axis_shown, unit_shown
 from friso.identification.kinds import KINDS
@@ -76,11 +78,15 @@ def _headline(identification: Identification) -> list[tuple[str, str]]:
     effects = [estimate for estimate in visible if not _absent(estimate)]
     headlines = [view_of(experiment.kind).headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
+    bounded = [one for one in estimates if not one.determined and 0 < one.low < one.high < np.inf]
     doubts = [(VERMILLION if identification.failed else ORANGE, f"{doubt}.") for doubt in identification.doubts]
     lines = doubts if identification.failed else []
     if effects:
         values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in effects)
         lines.append((GREEN, f"Identified: {values}."))
+    elif bounded:
+        bounds = ", ".join(f"{within(one.name)} ({interval_text(one)})" for one in bounded)
+        lines.append((ORANGE, f"Known to lie in an interval too wide for a value: {bounds}."))
     elif not headlines:
         lines.append((VERMILLION, "These logs determine no key of the stage file."))
     lines += [(GREEN, sentence) for sentence in headlines]
