@@ -382,10 +382,18 @@ def _faster(case: Case, edge: Margin) -> str:
 
 
 def _distance(case: Case, edge: Margin) -> float:
-    """The factor from the edge that advice keeps; 1 where something attracts again within it."""
-    begins = [window.low.inside for window in case.judgement.windows if window.low and not window.narrow]
-    again = any(edge.factor < begin <= edge.quiet * DISTANCE * (1 + ROUGH) for begin in begins)
-    return 1.0 if again or edge.quiet * DISTANCE > FARTHEST else DISTANCE
+    """The factor from the edge that advice keeps; 1 where something attracts again within it, over more than a
+    hundredth of the bandwidth or as close to where the advice leads."""
+    to = edge.quiet * DISTANCE
+
+    def in_the_way(window: BandwidthWindow) -> bool:
+        low, high = window.low, window.high
+        if low is None or not edge.factor < low.inside <= to * (1 + ROUGH):
+            return False
+        return high is None or high.inside * ONE_PLACE >= min(to, low.inside * ONE_PLACE**2)
+
+    again = any(in_the_way(window) for window in case.judgement.windows)
+    return 1.0 if again or to > FARTHEST else DISTANCE
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
