@@ -45,7 +45,7 @@ from friso.views import pages
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
 from friso.views.check.page import check_html, conclusion, verdict_sentence
-from friso.views.check.table import rows
+from friso.views.check.table import rows, rows_behind
 from friso.views.check.words import edge_text
 from friso.views.drawing import images, matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
@@ -398,7 +398,7 @@ def test_freeing_the_joint_is_advised_only_where_the_free_joint_certainly_settle
 def tabled(judgement: Judgement, **changes: Any) -> dict[str, str | None]:
     """The rows of a case."""
     item = ShownCase("given", "As given", "#000000", replace(fake_case(), judgement=judgement, **changes))
-    return {name: texts[0] for name, texts in rows((item,))}
+    return {name: texts[0] for name, texts in [*rows((item,)), *rows_behind((item,))]}
 
 
 def changed_rows(before: dict[str, str | None], after: dict[str, str | None]) -> str:

@@ -41,11 +41,13 @@ def question(function: Callable[Arguments, Returned]) -> Callable[Arguments, Ret
 
 @dataclass(frozen=True)
 class AnswerTable:
-    """A small table: columns with a label each, and rows that have names."""
+    """A small table: columns with a label each, and rows that have names. One that stands `behind` the answer is shown
+    with its details alone."""
 
     title: str
     columns: Sequence[str]
     rows: Sequence[tuple[str, Sequence[str]]]
+    behind: bool = False
 
 
 _SHOWN = {"sentences", "blocks", "tables", "details", "next_steps", "figures", "document", "files"}
@@ -231,7 +233,7 @@ class Answer(ABC):
         """What a notebook shows: the answer and the small tables, no arrays."""
         first, *rest = [escape(sentence) for sentence in self.sentences()] or ["no answer"]
         blocks = "".join(f"<pre>{escape(block)}</pre>" for block in self.blocks())
-        tables = blocks + "".join(map(_html_table, self.tables()))
+        tables = blocks + "".join(_html_table(table) for table in self.tables() if not table.behind)
         texts = "".join(f"<p>{sentence}</p>" for sentence in rest)
         return escaped(f"<div><p><b>{first}</b></p>{texts}{tables}</div>")
 

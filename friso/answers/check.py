@@ -86,7 +86,7 @@ class CheckAnswer(Answer):
         from friso.views.check.cases import case_labels, shown_cases
         from friso.views.check.draws import draws_rows
         from friso.views.check.laws import laws_columns, laws_rows
-        from friso.views.check.table import rows
+        from friso.views.check.table import rows, rows_behind
 
         cases = shown_cases(self.result)
         tables = [AnswerTable(self.stage.name, [item.label for item in cases], rows(cases))]
@@ -95,7 +95,8 @@ class CheckAnswer(Answer):
             tables.append(AnswerTable(title, [*case_labels(self.draws.stage).values()], draws_rows(self.draws)))
         if self.laws:
             tables.append(AnswerTable("Across friction laws", laws_columns(self.laws), laws_rows(self.laws)))
-        return tables
+        behind = AnswerTable("How that was computed", [item.label for item in cases], rows_behind(cases), behind=True)
+        return [*tables, behind]
 
     def details(self) -> Sequence[str]:
         """What the search for the edge may miss, and whether the friction law may give energy back."""

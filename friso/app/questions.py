@@ -87,7 +87,11 @@ def words_of(answer: Answer) -> AnswerPart:
     return {
         "kind": "answer",
         "sentences": [*answer.sentences()],
-        "tables": [{"title": item.title, "columns": item.columns, "rows": item.rows} for item in answer.tables()],
+        "tables": [
+            {"title": item.title, "columns": item.columns, "rows": item.rows}
+            for item in answer.tables()
+            if not item.behind
+        ],
         "details": [*answer.details()],
         "failure": answer.failure,
     }

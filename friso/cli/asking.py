@@ -83,15 +83,16 @@ def show(
             print_wrapped(sentence)
         for block in answer.blocks():
             print(f"\n{block}\n")
-        for table in answer.tables():
-            print_table(table.title, table.columns, [(label, [*cells]) for label, cells in table.rows])
-        more = answer.details()
+        tables, more = answer.tables(), answer.details()
+        for table in tables:
+            if details or not table.behind:
+                print_table(table.title, table.columns, [(label, [*cells]) for label, cells in table.rows])
         for paragraph in more if details else ():
             print_wrapped(paragraph)
         print_written(written)
         for command in answer.next_steps(written):
             print(f"next: {command}")
-        if more and not details:
+        if not details and (more or any(table.behind for table in tables)):
             print("more: --details")
     failures = [failure for failure in (answer.failure, unwritten) if failure]
     for failure in failures:

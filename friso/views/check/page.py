@@ -11,7 +11,7 @@ from friso.views.check.draws import draws_figure, draws_sentences
 from friso.views.check.figures import check_figures
 from friso.views.check.isolator_words import isolator_sentence
 from friso.views.check.laws import laws_sentences
-from friso.views.check.table import rows
+from friso.views.check.table import rows, rows_behind
 from friso.views.check.words import conclusion, verdict_sentence
 from friso.views.files import Content
 from friso.views.pages import Report
@@ -63,6 +63,6 @@ def check_html(
             *(laws_sentences(laws) if laws else []),
         ],
         columns=in_order,
-        rows=rows(in_order),
+        rows=[*rows(in_order), *rows_behind(in_order)],
         computed=f", relative tolerance {', '.join(tolerances)}. {BASIS}",
     ).html()

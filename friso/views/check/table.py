@@ -29,7 +29,16 @@ UNKNOWN = "not determined: that takes more work than a check may"
 
 def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some case has something to say."""
-    texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in _COLUMNS.items()]
+    return _rows(_NUMBERS, cases)
+
+
+def rows_behind(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+    """The same of what those rest on, in terms of the method."""
+    return _rows(_BEHIND, cases)
+
+
+def _rows(columns: dict[str, Callable[[Case], str]], cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+    texts = [(axis_shown().text(name), [text(item.case) for item in cases]) for name, text in columns.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
@@ -143,12 +152,10 @@ def _settled_within(band: float) -> Callable[[Case], str]:
     return text
 
 
-_COLUMNS: dict[str, Callable[[Case], str]] = {
+_NUMBERS: dict[str, Callable[[Case], str]] = {
     "Verdict": _verdict,
     "Hunting cycle, amplitude": _of_the_cycle(_amplitude),
     "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
-    "Hunting multiplier": _of_the_cycle(_multiplier),
-    "Multiplier taken over": _of_the_cycle(_decided),
     "Other hunting cycles": _further_cycles,
     "Observed in simulations": _observed,
     "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
@@ -156,11 +163,16 @@ _COLUMNS: dict[str, Callable[[Case], str]] = {
     "Displacements that hunt": lambda case: _kicks(case, case.judgement.displacement, "m"),
     "Pushes that hunt": lambda case: _kicks(case, case.judgement.push, "m/s"),
     "Moves that end in hunting": _moves,
-    "Counted peaks": _peaks,
     "Peak to peak, last quarter": at_the_end,
     "Period, last quarter": lambda case: with_unit(case.period, "s"),
     **{f"Settling time into {text}": _settled_within(band) for band, text in BANDS.items()},
     "Largest actuator force": lambda case: with_unit(case.largest_force, "N"),
+}
+
+_BEHIND: dict[str, Callable[[Case], str]] = {
+    "Hunting multiplier": _of_the_cycle(_multiplier),
+    "Multiplier taken over": _of_the_cycle(_decided),
+    "Counted peaks": _peaks,
     "Solver status": lambda case: case.solver.status,
     "Steps (rejected)": lambda case: f"{case.solver.steps} ({case.solver.rejected})",
 }
