@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from friso.answers.answer import Answer, question
 from friso.answers.inputs import LOGGER, Changes, StageLike, mention_unstable_loop, read_stage, tolerance_of, wrong
 from friso.answers.map_study import (
@@ -85,10 +87,12 @@ class SweepAnswer(Answer):
         return texts if self.store is None else [*texts, f"store: {self.store}"]
 
     def next_steps(self, files: Sequence[Path]) -> Sequence[str]:
-        """How a cell is run by itself."""
+        """How a cell is run by itself: that which swings farthest at its end."""
         if self.store is None:
             return []
-        return [f"friso simulate --cell {shell_word(str(self.store))} {' '.join('0' * len(self.study.shape))}"]
+        swings = np.nan_to_num(self.result["peak_to_peak"].to_numpy(), nan=-np.inf)
+        cell = " ".join(map(str, np.unravel_index(swings.argmax(), swings.shape)))
+        return [f"friso simulate --cell {shell_word(str(self.store))} {cell}"]
 
     def figures(self) -> Sequence[Figure]:
         """The map."""
