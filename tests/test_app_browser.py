@@ -897,6 +897,7 @@ def test_a_narrow_page_draws_what_is_there_otherwise_and_asks_nothing(browsed: B
     page.click("#tab-map")
     page.wait_for_selector(".plot .heatmaplayer image")
     page.wait_for_function("() => document.querySelector('.plot').data.some((one) => one.z?.length === 41)")
+    page.wait_for_load_state("networkidle")  # the verdict is asked for behind the pictures
     page.on("request", lambda request: asked.append(request.url))
     height = page.evaluate("document.querySelector('.plot').layout.height")
     page.set_viewport_size({"width": 400, "height": 900})
