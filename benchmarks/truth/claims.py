@@ -6,6 +6,8 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from friso.engine.allowance import allowance
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
@@ -17,16 +19,21 @@ from friso.stage import Stage
 
 ATTRACTED = ("hunts", "bistable")
 
+RUNS_AWAY = "runs away"
+"""What is said of a stage, its loop being unstable, of which there is no verdict."""
+
 
 @dataclass(frozen=True)
 class Edge:
     """The edge of hunting as a factor of the stage's bandwidth, whether it is sure, and up to what share of it; one
-    that is not sure lies between that factor, up to which hunting was found, and `quiet`, at which none was found."""
+    that is not sure lies between that factor, up to which hunting was found, and `quiet`, at which none was found. The
+    `windows` beside it, in which hunting is said to be possible, go from where none was found to where none was."""
 
     factor: float
     sure: bool
     reserve: float
     quiet: float
+    windows: tuple[tuple[float, float], ...] = ()
 
     @property
     def beyond(self) -> float:
@@ -52,6 +59,12 @@ class Claim:
     @property
     def attracted(self) -> bool:
         return self.verdict in ATTRACTED
+
+    @property
+    def swing(self) -> float:
+        """Half of peak to peak of the least of what attracts [m]; infinite where nothing does."""
+        motions = self.surveyed.motions if self.surveyed else ()
+        return min((motion.amplitude for motion in motions), default=np.inf)
 
     def __str__(self) -> str:
         text = f"{self.case}: {self.verdict}{'' if self.sure else ' (not sure)'}"
@@ -87,11 +100,16 @@ def checked(stage: Stage) -> Checked:
 
 def _claim(name: str, case: Case) -> Claim:
     said = case.judgement
-    sure = said.hunting.certain and case.verdict != "failed"
+    verdict = RUNS_AWAY if case.runs_away else case.verdict
+    sure = case.runs_away or (said.hunting.certain and verdict != "failed")
     end = said.margin
-    edge = end and Edge(end.factor, sure and end.certain, end.reserve, end.quiet)
+    windows = tuple(
+        (window.low.outside if window.low else 0.0, window.high.outside if window.high else np.inf)
+        for window in said.windows
+    )
+    edge = end and Edge(end.factor, sure and end.certain, end.reserve, end.quiet, windows)
     doubts = _doubts(case, sure, edge)
-    return Claim(name, case.stage, case.verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts)
+    return Claim(name, case.stage, verdict, sure, edge, said.displacement, said.hunting.surveyed, doubts)
 
 
 def _doubts(case: Case, sure: bool, edge: Edge | None) -> dict[str, str]:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.truth.by_hand import NotWritten, by_hand
-from benchmarks.truth.claims import Claim
+from benchmarks.truth.claims import RUNS_AWAY, Claim
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
 from benchmarks.truth.trials import FINE, LINGERING, NEIGHBOURS, ROUGH, ROUNDS, Bench, Trial
 from friso.equations.bandwidth import bandwidth, faster
@@ -61,10 +61,12 @@ class Refutation:
 
 def refutations(claim: Claim, seed: int) -> Iterator[Refutation]:
     """All that is wrong with a claim."""
-    bench = Bench(claim.stage.flat())
+    bench = Bench(claim.stage.flat(), claim.swing)
     if claim.verdict == "failed" or not bench.length > 0:
         return
-    if bench.flat["motion.kind"] != "ramp":  # whose reference never stands still
+    if claim.verdict == RUNS_AWAY:
+        yield from _away(claim, bench)
+    elif bench.flat["motion.kind"] != "ramp":  # whose reference never stands still
         yield from _verdict(claim, bench, seed)
         yield from _own_motion(claim, bench)
         if claim.kick is not None and not claim.kick.unknown:
@@ -166,6 +168,14 @@ _PLACES = {
 }
 
 
+def _away(claim: Claim, bench: Bench) -> Iterator[Refutation]:
+    """Whether the stage's own motion can be followed for long although it is said to leave its reference for good."""
+    words = {rtol: str(bench.follow_own(rtol).words[0]) for rtol in (ROUGH, FINE)}
+    if any(word != FAILED for word in words.values()):
+        why = ", ".join(f"{word} at {rtol:g}" for rtol, word in words.items())
+        yield Refutation("own motion", claim.sure, f"the motion followed for long: {why}")
+
+
 def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
     """Whether the stage's own motion ends as it is said to."""
     wanted = SWINGS if claim.verdict == "hunts" else RESTS
@@ -193,13 +203,15 @@ def _kicks(claim: Claim, kick: Kick, bench: Bench) -> Iterator[Refutation]:
 
 
 def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
-    """Whether nothing attracts on the far side of the edge, and something on the near side."""
+    """Whether nothing attracts on the far side of the edge, but in the windows told, and something on the near side."""
     assert claim.edge
     edge, nearest = claim.edge.factor, claim.edge.beyond / claim.edge.factor
     benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
     swings = _swings(benches[0], seed)
     beyond = ABOVE if claim.attracted else [factor for factor in (*ABOVE[:4], edge**-0.5) if edge * factor < 1]
     for factor in (nearest * factor for factor in beyond):
+        if any(low < edge * factor < high for low, high in claim.edge.windows):
+            continue
         bench = Bench(at(claim, edge * factor))
         trial = bench.starts(*FEW, seed)
         if factor <= nearest * JUST and len(swings):

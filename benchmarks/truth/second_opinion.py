@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.truth.by_hand import ByHand, NotWritten, by_hand
-from benchmarks.truth.claims import Claim
+from benchmarks.truth.claims import RUNS_AWAY, Claim
 from benchmarks.truth.refute import Refutation
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
 from benchmarks.truth.trials import SMALL
@@ -35,9 +35,9 @@ def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
         return
     displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
     own = followed(equations, equations.start(displaced))
-    if claim.verdict == "hunts" and own == RESTS:
+    if claim.verdict in ("hunts", RUNS_AWAY) and own == RESTS:
         yield Refutation("own motion", claim.sure, "SciPy: the motion rests in the end")
-    if claim.attracted:
+    if claim.attracted or claim.verdict == RUNS_AWAY:
         return
     still = equations.held()
     words = {"its own motion": own}
@@ -56,6 +56,8 @@ def followed(equations: ByHand, start: np.ndarray) -> str:
     if corner > 0:
         before = np.linspace(0.0, corner, 100)
         start = equations.run(start, before)[-1]
+        if not np.isfinite(start).all():
+            return UNSURE
     last = replace(equations, pieces=equations.pieces[-1:])
     run = last.run(start, times)
     if (word := _word(equations, run, times - corner)) != SWINGS:

@@ -87,9 +87,11 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Bench:
-    """A stage given as flat keys, its reference held at 0 unless its own motion is followed."""
+    """A stage given as flat keys, its reference held at 0 unless its own motion is followed. A `swing` that it is said
+    to keep up [m], half of peak to peak, is none that rests."""
 
     flat: Mapping[str, Any]
+    swing: float = np.inf
 
     @cached_property
     def kernel(self) -> Kernel:
@@ -231,7 +233,7 @@ class Bench:
 
     @property
     def small(self) -> float:
-        return SMALL * self.length
+        return min(SMALL * self.length, self.swing / 2)
 
     def _words(self, part: Any, end: float, patient: bool) -> tuple[list[str], list[float], list[float]]:
         results = part.results

@@ -85,6 +85,12 @@ class Case:
         return self.judgement.verdict
 
     @property
+    def runs_away(self) -> bool:
+        """Whether the motion leaves its reference for good, as it may where the loop is unstable: nothing else was to
+        be found of it."""
+        return bool(self.unstable) and self.solver.status == Status.DIVERGED.text
+
+    @property
     def unmoved(self) -> bool:
         """Whether the motion exerts too little force to move the stage."""
         joint = self.stage.joint

@@ -85,6 +85,8 @@ def _observed(case: Case) -> str:
 
 
 def _verdict(case: Case) -> str:
+    if case.runs_away:
+        return f"{case.verdict} (runs away)"
     return case.verdict if case.judgement.hunting.certain else f"{case.verdict} (not certain)"
 
 
