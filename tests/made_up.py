@@ -104,6 +104,7 @@ class FakeCase:
     breakaway: float = 3.0
     force_limit: float | None = None
     unmoved: bool = False
+    runs_away: bool = False
     feeding: Any = None
 
     @property

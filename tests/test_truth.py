@@ -1,15 +1,21 @@
 """The adversary of benchmarks.truth judges swings by itself, and draws the same stages again."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from variants import VARIANTS
 
+from benchmarks.truth import refute
+from benchmarks.truth.claims import RUNS_AWAY, Claim, Edge, checked
 from benchmarks.truth.draws import FORMS, SERIES, draw
-from benchmarks.truth.refute import _kicks
+from benchmarks.truth.refute import _edge, _kicks, refutations
 from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
+from benchmarks.truth.trials import Bench
+from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import Kick
 from friso.stage.files import loads
 from friso.stage.tables import FRICTION
@@ -84,3 +90,34 @@ def test_stages_are_those_that_the_documentation_counts() -> None:
 def test_stages_of_every_friction_law_are_drawn() -> None:
     laws = {name for name, law in FRICTION.classes.items() if law.__module__.startswith("friso.")}
     assert {form.friction for form in FORMS} == laws
+
+
+def test_a_stage_that_runs_away_is_said_to_and_another_that_is_said_to_is_refuted() -> None:
+    """An integrator far too strong: m s^3 + sigma_2 s^2 + kp s + ki has roots on the right."""
+    chosen = VARIANTS["rigid stage, PI"]
+    (claim,) = checked(chosen.replace({"controller.ki": "5e6 N/(m*s)"})).claims
+    assert (claim.verdict, claim.sure) == (RUNS_AWAY, True)
+    assert [*refutations(claim, 0)] == []
+    (wrong,) = refutations(replace(claim, stage=chosen), 0)
+    assert (wrong.of, wrong.sure) == ("own motion", True)
+
+
+def test_above_an_edge_nothing_is_tried_where_hunting_is_said_to_be_possible(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried = []
+
+    class Quiet(Bench):
+        def starts(self, *args: Any) -> Any:
+            tried.append(bandwidth(self.flat))
+            return super().starts(1, 1, 1, 0, 0)
+
+        def follow(self, *args: Any, **options: Any) -> Any:
+            return SimpleNamespace(words=np.array([UNSURE]), swinging=np.array([], int))
+
+    monkeypatch.setattr(refute, "Bench", Quiet)
+    chosen = VARIANTS["rigid"]
+    own = bandwidth(chosen.flat())
+    edge = Edge(1.0, sure=True, reserve=0.0, quiet=1.01, windows=((1.05, 1.2), (1.5, np.inf)))
+    claim = Claim("given", chosen, "hunts", sure=True, edge=edge, kick=None)
+    assert [*_edge(claim, 0)] == []
+    above = [value / own for value in tried if value > own]
+    assert above == pytest.approx([1.002, 1.005, 1.01])

@@ -52,10 +52,10 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     case = item.case
     loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
-    if case.verdict not in says and case.solver.done:
-        return " ".join([*loop, f"{case.verdict}: {_UNFINISHED}."])
     if case.runs_away:
         return " ".join([*loop, "runs away from its reference during this motion."])
+    if case.verdict not in says and case.solver.done:
+        return " ".join([*loop, f"{case.verdict}: {_UNFINISHED}."])
     if case.verdict not in says:
         return " ".join([*loop, f"could not be simulated to the end of its motion ({case.solver.status})."])
     feeds = feeding_sentences(case.feeding) if case.feeding else []
