@@ -67,8 +67,10 @@ class CheckAnswer(Answer):
     @property
     def failure(self) -> str:
         """Whether the run of a case was not completed."""
-        done = all(case.solver.done for case in self.result.values())
-        return "" if done else "the computation could not be completed; see the status above"
+        lost = [case for case in self.result.values() if not case.solver.done]
+        if lost and all(case.runs_away for case in lost):
+            return "there is no verdict on hunting for a motion that runs away"
+        return "the computation could not be completed; see the status above" if lost else ""
 
     def sentences(self) -> Sequence[str]:
         """The verdicts, and the chances where keys are uncertain."""
