@@ -1,12 +1,13 @@
 """The cure held against a brute search: `python -m benchmarks.tune [--axes N ...] [--settings N] [--fresh N]`.
 
 Axes with four controllers, three levels of friction, without and with a parasitic mode (24, by their numbers) are tuned
-way by way, the joint kept. For the ways that work a Sobol sequence of settings over the same ranges is measured by the
-same moves and margins on the same machines, and the best of them, surveyed for what attracts like the tuned one, is
-compared with it in the settling time of the slowest twentieth. All tuned stages, the least change too, are measured on
-fresh machines, and the share is counted of those that meet the goal. `--thesis` tunes the rig of the thesis instead;
-`--findings` tries on it what is said of friction isolators: that they narrow the stable range of gains, and that they
-help less at some step sizes.
+way by way, the joint kept. A Sobol sequence of settings over the same ranges is measured by the same moves and margins
+on the same machines, and the best of those with which nothing attracts machines, and which meet the goal on a hundred
+others, as is asked of the tuned one, is compared with it in the settling time of the slowest twentieth. Where nothing
+was tuned that works, whatever the brute search comes upon counts as missed. All tuned stages, the least change too, are
+measured on fresh machines, and the share is counted of those that meet the goal. `--thesis` tunes the rig of the thesis
+instead; `--findings` tries on it what is said of friction isolators: that they narrow the stable range of gains, and
+that they help less at some step sizes.
 """
 
 from __future__ import annotations
@@ -77,8 +78,11 @@ MODE = {"frequency": "300 Hz", "mass": "0.25 kg", "damping_ratio": 0.01}
 
 HEAD = ("machine", "way", "", "tuned", "brute", "ratio", "fresh machines that meet it", "CPU")
 
-CHUNK, BATCH = 1024, 8
-"""Settings that are measured, and surveyed, at once."""
+CHUNK, BATCH, PART = 1024, 8, 1000
+"""Settings that are measured, and surveyed, at once, and fresh machines."""
+
+NEVER = 1e3
+"""A settling time beyond any run [s]."""
 
 BEYOND = 1.3
 """The brute search keeps settings that take up to so many times as long as the tuned ones."""
@@ -97,9 +101,10 @@ def axes() -> Iterator[tuple[str, Stage]]:
 
 
 def brute(search: Search, count: int, most: float) -> float:
-    """The best settling time [s] below `most` of so many settings that keep all constraints and have nothing that
-    attracts; infinite where none is. It is exact: among so few machines the slowest twentieth is the slowest one, so a
-    setting goes no further once it is too slow, or breaks a constraint, on one of them."""
+    """The best settling time [s] below `most` of so many settings that keep all constraints, have nothing that attracts
+    and meet the goal on enough fresh machines; infinite where none is. It is exact: among so few machines the slowest
+    twentieth is the slowest one, so a setting goes no further once it is too slow, or breaks a constraint, on one of
+    them."""
     shares = qmc.Sobol(len(search.remedy.variables), rng=0).random(count)
     chunks = np.array_split(shares, max(1, count // CHUNK))
     stage, remedy = search.remedy.stage, search.remedy
@@ -113,10 +118,17 @@ def brute(search: Search, count: int, most: float) -> float:
         times = np.maximum(slowest, np.concatenate([times_on(search, chunk, machine, most) for chunk in chunks]))
         shares, slowest = shares[times < most], times[times < most]
     for batch in np.array_split(np.argsort(slowest), max(1, len(shares) // BATCH)):
-        clear = search.clear(shares[batch]) if len(batch) else np.zeros(0, bool)
-        if clear.any():
-            return float(slowest[batch[clear]].min())
+        clear = batch[search.clear(shares[batch])] if len(batch) else batch
+        if len(clear) and (meets := search.share(shares[clear]) >= search.goal.surely(search.fresh.count)).any():
+            return float(slowest[clear[meets]].min())
     return float("inf")
+
+
+def meeting(stage: Stage, fresh: Fleet, goal: Goal, drive: Stage) -> float:
+    """The share of fresh machines that meet the goal with a stage."""
+    parts = np.array_split(np.arange(fresh.count), max(1, fresh.count // PART))
+    shares = [performance_of(stage, fresh.take(part), goal, drive).share(goal).probability for part in parts]
+    return float(np.average(shares, weights=[len(part) for part in parts]))
 
 
 def times_on(search: Search, shares: np.ndarray, machine: Fleet, most: float) -> np.ndarray:
@@ -207,7 +219,7 @@ def main() -> None:
         return findings()
     goal = Goal(within=WITHIN, bandwidth_limit=LIMIT, joint=False)
     rows: list[tuple[str, ...]] = []
-    worst, least = 0.0, 1.0
+    ratios, met = list[float](), list[float]()
     listed = [*axes()]
     for name, stage in (listed[number] for number in options.axes):
         begun = process_time()
@@ -217,24 +229,26 @@ def main() -> None:
         machines = machines.take(np.arange(Budget().machines))
         fresh = draw_fleet(stage, Correlations(), options.fresh, 77)
         for outcome in advice.outcomes:
-            row = (name, outcome.remedy.name, outcome.certainty)
-            if outcome.certainty != "works" or outcome.stage is None:
-                rows.append((*row, *[""] * 4, f"{seconds:.0f} s"))
-                continue
-            share = performance_of(outcome.stage, fresh, goal, stage).share(goal)
-            least = min(least, share.probability)
-            compared = ("", "", "")  # the least change is not the one that settles soonest
+            tuned_stage = outcome.stage if outcome.certainty == "works" else None
+            compared, share = ("", "", ""), ""  # the least change is not the one that settles soonest
             if outcome.remedy.name in options.ways:
-                search = Search(outcome.remedy, goal, machines, fresh, stage, Budget(), lambda label: None)
-                tuned = float(search.measured(outcome.shares[None]).settling[0])
-                best = brute(search, options.settings, BEYOND * tuned)
-                worst = max(worst, tuned / best)
-                compared = (f"{tuned:.4g} s", f"{best:.4g} s", f"{tuned / best:.3f}")
-            rows.append((*row, *compared, f"{100 * share.probability:.1f} %", f"{seconds:.0f} s"))
-        print_table(HEAD, rows)
+                search = Search(outcome.remedy, goal, machines, advice.machines, stage, Budget(), lambda label: None)
+                tuned = float(search.measured(outcome.shares[None]).settling[0]) if tuned_stage else np.inf
+                best = brute(search, options.settings, min(BEYOND * tuned, NEVER))
+                ratios.append(tuned / best if np.isfinite(best) else 0.0)
+                compared = (f"{tuned:.4g} s", f"{best:.4g} s", f"{ratios[-1]:.3f}")
+            if tuned_stage:
+                met.append(meeting(tuned_stage, fresh, goal, stage))
+                share = f"{100 * met[-1]:.2f} %"
+            rows.append((name, outcome.remedy.name, outcome.certainty, *compared, share, f"{seconds:.0f} s"))
+            print(*rows[-1], sep=" | ", flush=True)
+    print_table(HEAD, rows)
+    worst, least = max(ratios, default=np.inf), min(met, default=0.0)
+    neither = ratios.count(0.0)
     print_goals(
         [
             Target("settling time over the best of the brute search", f"<= {ALIKE}", f"{worst:.3f}", worst <= ALIKE),
+            Target("ways for which neither found any that is as good", "", f"{neither} of {len(ratios)}", None),
             Target(
                 "share of fresh machines that meet the goal", f">= {goal.share}", f"{least:.3f}", least >= goal.share
             ),

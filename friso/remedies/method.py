@@ -52,11 +52,14 @@ PAIRS = 2
 """Settings against friction that are tried together with the bandwidth."""
 
 FRESH = 1000
-"""What is added to the seed for the machines, not seen by the optimiser, on which its best points are verified."""
+"""What is added to the seed for the machines, not seen by the optimiser, among which its best points are chosen."""
 
 UNSEEN = 2000
-"""The same for those on which what is verified has to meet the goal once more, and on which it is measured: no point is
-chosen by them, but one that fails there is given up for the next."""
+"""The same for those on which what was chosen has to meet the goal, and on which it is measured: one that fails
+there is given up for the next."""
+
+FURTHER = 4000
+"""The same for those on which it is measured too where the ones before are too few to say."""
 
 USUAL, MANY = 3000, 200
 """The same for those that tell how robust machines usually are, and how many of these."""
@@ -158,13 +161,14 @@ def tune(
     report("compiling")
     kernels({KernelRequest(structure(remedy.stage.flat())) for remedy in [Remedy.settled_on("", ideal), *listed]})
     of_ideal = correlations.among(ideal.uncertain())
-    fresh, unseen = (_not_seen(ideal, of_ideal, budget.fresh, seed + further) for further in (FRESH, UNSEEN))
+    fresh, unseen = (_not_seen(ideal, of_ideal, budget.fresh, seed + added) for added in (FRESH, UNSEEN))
+    further = _not_seen(ideal, of_ideal, budget.further, seed + FURTHER)
     machines = machines_of_search(ideal, of_ideal, budget, seed, goal, stage)
     report("the stage as it is")
     case, present = verified(ideal), performance_of(ideal, unseen, goal, stage)
     if not unmet_goals(case, present, goal):
         listed = []  # nothing has to change
-    session = _Session(ideal, stage, goal, machines, fresh, unseen, budget, report)
+    session = _Session(ideal, stage, goal, machines, fresh, unseen, further, budget, report)
     relaxed: tuple[RelaxedGoal, ...] = ()
     sensitivities: Sensitivities | None = None
     interrupted = False
@@ -236,6 +240,7 @@ class _Session:
     machines: Fleet
     fresh: Fleet
     unseen: Fleet
+    further: Fleet
     budget: Budget
     report: _Report
     outcomes: list[RemedyOutcome] = field(default_factory=list)
@@ -338,21 +343,24 @@ class _Session:
             self._made_of_leaves(last)
 
     def _verified(self, search: Search, shares: np.ndarray) -> RemedyOutcome:
-        """A point on machines that the optimiser did not see and, where these meet the goal, by its cycles. As several
-        are tried on these, what is stated of one that passes is that of yet others, which have to meet it too."""
+        """A point on machines that were not seen before and, where these meet the goal, by its cycles. The interval of
+        the share of all machines that meet it has to lie at the share wanted or above: further ones are measured as
+        long as it does not say."""
         remedy, goal = search.remedy, search.goal
         tuned = remedy.tuned(shares)
-        self.report(f"{remedy.name}: fresh machines")
-        measured = performance_of(tuned, self.fresh, goal, self.drive)
+        self.report(f"{remedy.name}: unseen machines")
+        measured = performance_of(tuned, self.unseen, goal, self.drive)
         doubted, case = missed_parts(measured, goal), None
         if not doubted:
             self.report(f"{remedy.name}: cycles")
             case = verified(tuned)
             doubted = unsettled_parts(case, measured, goal)
         if not doubted:
-            self.report(f"{remedy.name}: unseen machines")
-            measured = performance_of(tuned, self.unseen, goal, self.drive)
-            doubted = () if measured.share(goal).probability >= goal.share else ("together",)
+            self.report(f"{remedy.name}: further machines")
+            for part in np.split(np.arange(self.further.count), [self.further.count // 3]):
+                if measured.decides(goal) is None:
+                    measured = measured.with_further(tuned, self.further.take(part), goal, self.drive)
+            doubted = () if measured.decides(goal) else ("together",)
         around = () if doubted else windows(search, shares)
         tried = search.points, search.attracted
         return RemedyOutcome(remedy, tuned, measured, case, doubted, around, *tried, shares=shares)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +19,10 @@ from friso.stage import Stage
 
 TRIED, SURVEYED = 3, 8
 """Points whose machines are surveyed, at most, for one relaxation, and how many machines: those of the search."""
+
+REASONABLE = 3.0
+"""Factor by which one part of the goal is relaxed at most, but for the tolerance, of which the looser one is tried;
+only where nothing helps with that, others than the limit of the bandwidth are relaxed further."""
 
 WIDER, MOST = (1.5, 2.0, 3.0, 5.0), 64
 """Factors of the tolerance that are tried where the moves settle within ten times as much (`LOOSER`), of so many
@@ -55,9 +59,26 @@ def relaxations(outcomes: Sequence[RemedyOutcome], goal: Goal, machines: Fleet) 
 def _of_remedy(remedy: Remedy, points: TriedPoints, goal: Goal, machines: Fleet) -> Iterator[RelaxedGoal]:
     """The cheapest relaxations of a remedy: those of one part each, or else of two, or of three."""
     needed = _needed(points, goal)
+    far = [name for name, values in needed.items() if name != "within" and (values > REASONABLE).any()]
+    listed = [*_within(remedy, points, goal, machines, needed, far)]
+    yield from listed or _within(remedy, points, goal, machines, needed, [n for n in far if n == "bandwidth_limit"])
+
+
+def _within(
+    remedy: Remedy,
+    points: TriedPoints,
+    goal: Goal,
+    machines: Fleet,
+    needed: Mapping[str, np.ndarray],
+    limited: Sequence[str],
+) -> Iterator[RelaxedGoal]:
+    """The same, some parts being `limited` in how far they may be relaxed."""
+    needed = {name: values.copy() for name, values in needed.items()}
     count = np.sum([values > 1 for values in needed.values()], axis=0)
     factor = np.prod([np.maximum(values, 1.0) for values in needed.values()], axis=0)
     possible = np.isfinite(factor) & np.isfinite(points.slower)
+    for name in limited:
+        possible &= needed[name] <= REASONABLE
     few = machines.take(np.arange(min(SURVEYED, machines.count)))
     for parts in (1, 2, 3):
         tried: dict[tuple[str, ...], int] = {}

@@ -39,7 +39,7 @@ WORK = 6e8
 FAR_ABOVE = 1.5
 """Factor of the limit of the bandwidth above which it is far above."""
 
-NEAR = (0.12, 0.03)
+NEAR = (0.12, 0.12, 0.03)
 """Shares of the ranges about the best point, to both sides, in which a search goes on, one after the other."""
 
 AGREED = 0.01
@@ -52,6 +52,9 @@ APART, ALIKE = 0.03, 0.01
 """Least distance of points that are surveyed from those with which something attracts machines, and of points that are
 looked at on fresh machines, as a share of a range."""
 
+FIRST = 3
+"""Machines on which the moves of a search are run before those of the others."""
+
 WIDE = 12
 """Points that are looked at on fresh machines at once."""
 
@@ -62,7 +65,8 @@ WIDENED = 1.5
 @dataclass(frozen=True)
 class Budget:
     """Points of a generation for each variable, generations, and those about the best of these, each time; machines in
-    the moves that are tried and in the surveys; fresh machines on which an answer is measured."""
+    the moves that are tried and in the surveys; fresh machines on which an answer is measured, and `further` ones where
+    these leave open whether it is good enough."""
 
     points: int = 10
     generations: int = 16
@@ -70,6 +74,7 @@ class Budget:
     machines: int = 12
     surveyed: int = 8
     fresh: int = 100
+    further: int = 300
 
 
 @dataclass(frozen=True)
@@ -78,7 +83,7 @@ class TriedPoints:
     settling time of the slowest twentieth [s] and within the looser tolerance, the same with the bandwidth lower by the
     distance from hunting, the largest force [N] and least modulus margin of all but a twentieth, the bandwidth [Hz]
     (see `loop_bandwidth`) of the machine of the stage file, and how near all machines are to settling, from 0 to 1 (see
-    `Search.measured`)."""
+    `Search.measured`). Of those that are not `whole` moves were left out, which count as the best there may be."""
 
     shares: np.ndarray
     settling: np.ndarray
@@ -88,6 +93,7 @@ class TriedPoints:
     margin: np.ndarray
     bandwidth: np.ndarray
     nearness: np.ndarray
+    whole: np.ndarray
 
     def take(self, numbers: np.ndarray) -> TriedPoints:
         """The points with these numbers."""
@@ -146,10 +152,16 @@ class Search:
     tried: list[TriedPoints] = field(default_factory=list)
     attracted: int = 0
     cut: bool = False
+    slowest: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def points(self) -> TriedPoints:
-        """All points that were tried."""
+        """The points that were tried on all machines."""
+        return (begun := self.begun).take(np.flatnonzero(begun.whole))
+
+    @property
+    def begun(self) -> TriedPoints:
+        """All points that were tried, those too that were given up before they had been tried on all machines."""
         return TriedPoints(
             *(np.concatenate(column) for column in zip(*(vars(s).values() for s in self.tried), strict=True))
         )
@@ -172,11 +184,12 @@ class Search:
             self.tried.append(self.measured(np.zeros((1, 0))))
             return
 
-        def cost(shares: np.ndarray) -> np.ndarray:
+        def cost(shares: np.ndarray, most: np.ndarray | float = np.inf) -> np.ndarray:
             self.report(f"{self.remedy.name}: settings")
             points = np.clip(shares.T, 0, 1)
-            self.tried.append(self.measured(points))
-            return self.tried[-1].cost(self.goal, None if wanted is None else wanted(points))
+            small = None if wanted is None else wanted(points)
+            self.tried.append(self.measured(points, most, small))
+            return self.tried[-1].cost(self.goal, small)
 
         if variables == 1:
             count = self.budget.points * 6
@@ -221,29 +234,67 @@ class Search:
         """The bandwidths of points (points, variables) on the machine of the stage file [Hz]."""
         return loop_bandwidths(self.remedy.stage, self.remedy.changes(shares), len(shares))
 
-    def measured(self, shares: np.ndarray) -> TriedPoints:
+    def measured(
+        self, shares: np.ndarray, most: np.ndarray | float = np.inf, wanted: np.ndarray | None = None
+    ) -> TriedPoints:
         """Points on the machines: the moves are run only where the loop is stable and has half of the margin and, of
         remedies that vary more than the bandwidth, this is not far above its limit: such moves chatter and would take
         most of the work. A point is near to settling in so far as machines settle, within the tolerance, the looser
-        one, and that at the lower bandwidth: where none is in position, the search sees where a few are."""
-        goal, count = self.goal, len(shares)
+        one, and that at the lower bandwidth: where none is in position, the search sees where a few are. A point is
+        given up as soon as it costs more than `most` whatever the moves bring that are left; those machines that are
+        the slowest most often are tried first."""
+        goal, count, machines = self.goal, len(shares), self.machines.count
         margin = quantile(-modulus_margins(self.remedy, shares, self.machines, self.drive), goal.share) * -1
         bandwidth = self._bandwidth(shares)
         far = bandwidth > FAR_ABOVE * _most(goal.bandwidth_limit)
         stable = np.flatnonzero((margin > goal.margin / 2) & ~(far & (len(self.remedy.variables) > 1)))
-        columns, nearness = [np.full(count, np.inf) for _ in range(4)], np.zeros(count)
-        if stable.size:
-            moves: Moves = moves_of_points(self.remedy, shares[stable], self.machines, goal)
-            slower, rests = np.full_like(moves.looser, np.inf), np.flatnonzero(np.isfinite(moves.looser).any(axis=1))
-            if rests.size:  # those that settle nowhere are not asked whether they do at a lower bandwidth
-                some = shares[stable[rests]]
-                slower[rests] = moves_of_points(self.remedy, some, self.machines, goal, slower=goal.distance).looser
-            values = (moves.settling, moves.looser, slower, moves.force)
-            for column, value in zip(columns, values, strict=True):
-                column[stable] = quantile(value, goal.share)
-            nearness[stable] = np.mean(np.isfinite(values[:3]), axis=(0, 2))
-        settling, looser, slower, force = columns
-        return TriedPoints(shares, settling, looser, slower, force, margin, bandwidth, nearness)
+        settling, looser, slower, force = columns = [np.full((count, machines), np.inf) for _ in range(4)]
+        for column in columns:
+            column[stable] = 0.0
+        whole = np.ones(count, bool)
+
+        def so_far() -> TriedPoints:
+            nearness = np.mean(np.isfinite(columns[:3]), axis=(0, 2))
+            times, loosely, slowly, forces = (quantile(column, goal.share) for column in columns)
+            return TriedPoints(shares, times, loosely, slowly, forces, margin, bandwidth, nearness, whole)
+
+        def worth_it(left: np.ndarray) -> np.ndarray:
+            goes_on = (so_far().cost(goal, wanted) <= most)[left]
+            whole[left[~goes_on]] = False
+            return left[goes_on]
+
+        if self.slowest.size != machines:
+            self.slowest = np.zeros(machines)
+        order = np.argsort(-self.slowest, kind="stable")
+        left = worth_it(stable)
+        for part in (order[:FIRST], order[FIRST:]):
+            if left.size and part.size:
+                moves: Moves = moves_of_points(self.remedy, shares[left], self.machines.take(part), goal)
+                at = np.ix_(left, part)
+                settling[at], looser[at], force[at] = moves.settling, moves.looser, moves.force
+                left = worth_it(left)
+        rests = np.isfinite(looser[left]).any(axis=1)
+        slower[left[~rests]] = np.inf  # those that settle nowhere are not asked whether they do at a lower bandwidth
+        left = left[rests]
+        for part in (order[:FIRST], order[FIRST:]):
+            if left.size and part.size:
+                some = self.machines.take(part)
+                moves = moves_of_points(self.remedy, shares[left], some, goal, slower=goal.distance)
+                slower[np.ix_(left, part)] = moves.looser
+                left = worth_it(left)
+        settle = stable[np.isfinite(settling[stable]).all(axis=1) & whole[stable]]
+        self.slowest += np.bincount(settling[settle].argmax(axis=1), minlength=machines)
+        return so_far()
+
+    def _whole(self, batch: np.ndarray) -> np.ndarray:
+        """Those of points that were tried which break nothing on all machines, the ones that settle soonest first."""
+        left = ~_same(batch, self.points.shares).any(axis=1)
+        if left.any():
+            self.tried.append(self.measured(batch[left]))
+        points = self.points
+        at = _same(batch, points.shares).argmax(axis=1)
+        at = at[points.meets(self.goal)[at]]
+        return points.shares[at[np.argsort(points.settling[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
         """With which points (points, variables) nothing attracts the machines, shape (points,)."""
@@ -273,7 +324,7 @@ class Search:
         at the edge of what works. Where there are none at all, the one with which most of the fresh machines do."""
         if not self.tried:
             return
-        points = self.points
+        points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
         left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], ALIKE
         away = np.full(len(left), np.inf)  # from those that were looked at
@@ -285,6 +336,10 @@ class Search:
                 break
             while len(batch := _apart(left[away > apart], WIDE, apart)) < WIDE and apart > ALIKE:
                 apart = max(ALIKE, apart / WIDENED)
+            looked_at, batch = batch, self._whole(batch)
+            away = np.minimum(away, _distance(left, looked_at[~_same(looked_at, batch).any(axis=1)]))
+            if not len(batch):
+                continue
             share = self.share(batch)
             if share.max() > most:
                 best, most = batch[[share.argmax()]], share.max()
@@ -299,23 +354,46 @@ class Search:
             yield from best[self.clear(best)]
 
 
+def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
+    """Which points (points, variables) are which of others, shape (points, others)."""
+    return (shares[:, None] == others[None]).all(axis=2)
+
+
 def _distance(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
     """How far points (points, variables) are from the nearest of others, shape (points,); infinitely without any."""
     return np.abs(shares[:, None] - others[None]).max(axis=2, initial=0.0).min(axis=1, initial=np.inf)
 
 
 def _evolve(
-    cost: Callable[[np.ndarray], np.ndarray], start: np.ndarray, ends: list[tuple[float, float]], generations: int
+    cost: Callable[[np.ndarray, np.ndarray | float], np.ndarray],
+    start: np.ndarray,
+    ends: list[tuple[float, float]],
+    generations: int,
 ) -> None:
-    """Differential evolution from points (points, variables) between `ends`."""
+    """Differential evolution from points (points, variables) between `ends`. A point takes the place of the one that it
+    is tried against only if it costs less than that, so `cost` is told how much that may be."""
+    most: np.ndarray | float = np.inf
+
+    def bounded(points: np.ndarray) -> np.ndarray:
+        nonlocal most
+        costs = cost(points, most)
+        if not np.ndim(most):
+            most = float(costs.max())  # before the first generation has ended, their order is not told
+        return costs
+
+    def ended(intermediate_result: Any) -> bool:
+        nonlocal most
+        most = intermediate_result.population_energies.copy()
+        return _agree(intermediate_result)
+
     differential_evolution(
-        cost,
+        bounded,
         ends,
         maxiter=generations - 1,
         init=start,  # pyright: ignore[reportArgumentType]  (the stubs know names alone)
         tol=0.0,
         atol=-1,  # never by itself, not even where all costs are the same
-        callback=_agree,
+        callback=ended,
         rng=SEED,
         polish=False,
         vectorized=True,

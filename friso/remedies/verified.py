@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -35,17 +35,18 @@ Certainty = Literal["works", "unsure", "given up", "does not work"]
 class Performance:
     """A stage on machines: its `moves`, modulus margins and what attracts, in rows of one; and of the stage itself the
     least modulus margin in all settled states, `own_margin`, and the stiffness [N/m] against a load before the integral
-    acts: that of loop and joint in series."""
+    acts: that of loop and joint in series. `further` machines are only known to meet all of the goal, or not, (n,)."""
 
     moves: Moves
     margin: np.ndarray
     attraction: Attraction
     own_margin: float
     stiffness: float
+    further: np.ndarray = field(default_factory=lambda: np.zeros(0, bool))
 
     @property
     def count(self) -> int:
-        return self.margin.size
+        return self.margin.size + self.further.size
 
     def slowest(self, goal: Goal) -> float:
         """The settling time [s] of the slowest twentieth of machines and moves; infinite where that is never."""
@@ -81,8 +82,21 @@ class Performance:
 
     def share(self, goal: Goal) -> Share:
         """The probability that a machine meets all of the goal, with its interval."""
-        meets = np.all([*self.meets(goal).values()], axis=0)
+        meets = np.append(self._meets_all(goal), self.further)
         return share(meets, np.ones(meets.shape, bool))
+
+    def _meets_all(self, goal: Goal) -> np.ndarray:
+        return np.all([*self.meets(goal).values()], axis=0)
+
+    def decides(self, goal: Goal) -> bool | None:
+        """Whether enough of all machines meet the goal; None where the interval leaves that open."""
+        meeting = self.share(goal)
+        return True if meeting.low >= goal.share else False if meeting.high < goal.share else None
+
+    def with_further(self, stage: Stage, machines: Fleet, goal: Goal, drive: Stage) -> Performance:
+        """The same of a stage that was measured on further machines too."""
+        meets = performance_of(stage, machines, goal, drive)._meets_all(goal)
+        return replace(self, further=np.append(self.further, meets))
 
 
 @dataclass(frozen=True)

@@ -18,9 +18,11 @@ from friso.leaf_springs.mechanism import Mechanism
 from friso.quantities import Quantity, percent, positive
 from friso.remedies.change import ChangeSize
 from friso.remedies.goal import Goal
+from friso.remedies.least import LEAST
 from friso.remedies.method import Advice
-from friso.remedies.relax import RelaxedGoal
+from friso.remedies.relax import REASONABLE, RelaxedGoal
 from friso.remedies.search import TriedPoints
+from friso.remedies.trials import LOOSER
 from friso.remedies.variables import BANDWIDTH
 from friso.remedies.verified import Performance, RemedyOutcome
 from friso.remedies.window import VariableWindow
@@ -129,12 +131,22 @@ def answer(tuning: Advice) -> list[str]:
         return [*lines, *_nothing(tuning)]
     least, fastest = tuning.least, tuning.fastest
     assert least is not None
-    lines += _works(least, tuning, f"The least change {'so far ' if tuning.interrupted else ''}that works")
+    lines += _works(least, tuning, _least_words(tuning))
     if fastest is not None and fastest is not least:
         lines += _works(fastest, tuning, "What settles soonest")
     elif len(tuning.working) > 1:
         lines += _works(tuning.working[1], tuning, "The next best")
     return [*lines, f"The goal: {goal_words(tuning.goal)}.", *unknown(tuning)]
+
+
+def _least_words(tuning: Advice) -> str:
+    """What the least change of those that work is: where the search for it was not reached, or did not end, settings
+    that were tuned to settle soonest."""
+    if not tuning.interrupted:
+        return "The least change that works"
+    if any(outcome.remedy.name.endswith(LEAST) and not outcome.interrupted for outcome in tuning.outcomes):
+        return "The least change so far that works"
+    return "This works, but was tuned to settle soonest and is not the least change, which was not sought yet"
 
 
 def unknown(tuning: Advice) -> list[str]:
@@ -301,7 +313,10 @@ def _no_relaxation(tuning: Advice) -> str:
     """That no relaxation was found, or that none was sought."""
     if tuning.outcomes and not any(outcome.remedy.verifiable for outcome in tuning.outcomes):
         return "Relaxations of the goal were not sought: no cycle verifies a stage with dither."
-    return "No relaxation of up to three parts of the goal was found with which an option meets it."
+    return (
+        "No relaxation of up to three parts of the goal was found with which an option meets it (of the limit of "
+        f"the bandwidth up to {REASONABLE:g} times, of the tolerance up to {LOOSER:g})."
+    )
 
 
 def _relax(relaxed: RelaxedGoal, before: Stage) -> str:
