@@ -42,7 +42,7 @@ from friso.remedies import search as search_module
 from friso.remedies.catalogue import Remedy, remedies
 from friso.remedies.change import ChangeSize, change_size
 from friso.remedies.goal import Goal
-from friso.remedies.least import LEAST, change_costs, least_remedy
+from friso.remedies.least import LEAST, candidates, change_costs, least_remedy
 from friso.remedies.machines import Fleet, draw_fleet
 from friso.remedies.method import UNSEEN, Advice, _not_seen, _Session, tune
 from friso.remedies.relax import WIDER, _tolerances, relaxations
@@ -713,6 +713,23 @@ def test_settings_next_to_the_best_are_taken_where_those_miss_the_goal_on_fresh_
     search.share = lambda batch: 0.92 + 0.5 * batch[:, 0]  # pyright: ignore[reportAttributeAccessIssue]
     enough = (Goal().surely(machines.count) - 0.92) / 0.5  # not reached by the first of those that are looked at
     assert enough <= next(search.surveyed())[0] < enough + 0.1
+
+
+def test_the_least_change_is_sought_off_the_line_where_something_attracts_all_along_it(
+    machines: Fleet, rigid: Stage
+) -> None:
+    """Along the least change of an axis, and from it to the tuned settings, something attracted some machine: its least
+    change was given up."""
+    remedy = Remedy(
+        "gains", rigid.replace({"controller.crossover": "40 Hz"}), (of_key("controller.crossover", 10, 160, 10),)
+    )
+    shares = np.linspace(0.02, 1, 50)
+    points = TriedPoints(shares[:, None], *np.ones((8, 50)))
+    search = Search(remedy, Goal(), machines, machines, rigid, TINY, lambda label: None, [points])
+    search.measured = lambda batch: replace(points, shares=batch).take(np.arange(len(batch)))  # pyright: ignore[reportAttributeAccessIssue]
+    search.share = lambda batch: np.ones(len(batch))  # pyright: ignore[reportAttributeAccessIssue]
+    search.clear = lambda batch: batch[:, 0] > 0.6  # pyright: ignore[reportAttributeAccessIssue]
+    assert 0.6 < next(candidates(search))[0] < 0.7
 
 
 def test_a_stage_that_never_leaves_does_not_settle(rigid: Stage, machines: Fleet) -> None:

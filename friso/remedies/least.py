@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import product
 
 import numpy as np
@@ -59,7 +60,7 @@ def _between(tuned: Stage, key: str, old: float, new: float) -> Variable:
 
 def seek_least(search: Search) -> None:
     """Search a remedy of `least_remedy` for the least change: fewer keys first, then smaller factors."""
-    search.optimise(lambda shares: change_costs(search.remedy, shares), _beginnings(search.remedy))
+    search.optimise(partial(change_costs, search.remedy), _beginnings(search.remedy))
 
 
 def change_costs(remedy: Remedy, shares: np.ndarray) -> np.ndarray:
@@ -90,9 +91,10 @@ def _ends(remedy: Remedy) -> np.ndarray:
 
 
 def candidates(search: Search) -> Iterator[np.ndarray]:
-    """The least change of those tried that break nothing, (variables,), the same change taken further, and then points
-    on the way from it to the settings that work: those with which enough of the fresh machines meet the goal by their
-    moves and margins, or else most of them, and nothing attracts the machines."""
+    """The least change of those tried that break nothing, (variables,), the same change taken further, then points on
+    the way from it to the settings that work, and last others that were tried, the least change first: those with which
+    enough of the fresh machines meet the goal by their moves and margins, or else most of them, and nothing attracts
+    the machines."""
     if not search.tried:
         return
     points = search.points
@@ -105,9 +107,9 @@ def candidates(search: Search) -> Iterator[np.ndarray]:
     towards = [least + part * (works - least) for part in PARTS]
     tried = np.clip([*further, *towards], 0, 1)
     kept = tried[search.measured(tried).meets(search.goal)]
-    if not len(kept):
-        return
-    share = search.share(kept)
-    most = min(share.max(), search.goal.surely(search.fresh.count))
-    kept = kept[share >= most]
-    yield from kept[search.clear(kept)]
+    if len(kept):
+        share = search.share(kept)
+        most = min(share.max(), search.goal.surely(search.fresh.count))
+        kept = kept[share >= most]
+        yield from kept[search.clear(kept)]
+    yield from search.surveyed(partial(change_costs, search.remedy))

@@ -286,15 +286,15 @@ class Search:
         self.slowest += np.bincount(settling[settle].argmax(axis=1), minlength=machines)
         return so_far()
 
-    def _whole(self, batch: np.ndarray) -> np.ndarray:
-        """Those of points that were tried which break nothing on all machines, the ones that settle soonest first."""
+    def _whole(self, batch: np.ndarray, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
+        """Those of points that were tried which break nothing on all machines, the best first (see `surveyed`)."""
         left = ~_same(batch, self.points.shares).any(axis=1)
         if left.any():
             self.tried.append(self.measured(batch[left]))
         points = self.points
         at = _same(batch, points.shares).argmax(axis=1)
         at = at[points.meets(self.goal)[at]]
-        return points.shares[at[np.argsort(points.settling[at], kind="stable")]]
+        return points.shares[at[np.argsort(_order(points, wanted)[at], kind="stable")]]
 
     def clear(self, shares: np.ndarray) -> np.ndarray:
         """With which points (points, variables) nothing attracts the machines, shape (points,)."""
@@ -317,16 +317,17 @@ class Search:
             meets[robust] &= in_time & (moves.force <= _most(goal.force_limit))
         return np.asarray(meets.mean(axis=1))
 
-    def surveyed(self) -> Iterator[np.ndarray]:
-        """The best points first, shape (variables,), with which enough of the fresh machines meet the goal, as far as
-        nothing attracts the machines with them; those that are alike are taken for one. After each batch without any,
-        the next one is taken from farther away, as far as there are as many: the points that settle soonest are often
-        at the edge of what works. Where there are none at all, the one with which most of the fresh machines do."""
+    def surveyed(self, wanted: Callable[[np.ndarray], np.ndarray] | None = None) -> Iterator[np.ndarray]:
+        """The points first that settle soonest, or of which what is `wanted` small is least, shape (variables,), with
+        which enough of the fresh machines meet the goal, as far as nothing attracts the machines with them; those that
+        are alike are taken for one. After each batch without any, the next one is taken from farther away, as far as
+        there are as many: the best points are often at the edge of what works. Where there are none at all, the one
+        with which most of the fresh machines do."""
         if not self.tried:
             return
         points = self.begun
         free = np.flatnonzero(points.meets(self.goal))
-        left, apart = points.shares[free[np.argsort(points.settling[free], kind="stable")]], ALIKE
+        left, apart = points.shares[free[np.argsort(_order(points, wanted)[free], kind="stable")]], ALIKE
         away = np.full(len(left), np.inf)  # from those that were looked at
         enough, any_clear = self.goal.surely(self.fresh.count), False
         best, most = np.zeros((0, points.shares.shape[1])), 0.0
@@ -336,7 +337,7 @@ class Search:
                 break
             while len(batch := _apart(left[away > apart], WIDE, apart)) < WIDE and apart > ALIKE:
                 apart = max(ALIKE, apart / WIDENED)
-            looked_at, batch = batch, self._whole(batch)
+            looked_at, batch = batch, self._whole(batch, wanted)
             away = np.minimum(away, _distance(left, looked_at[~_same(looked_at, batch).any(axis=1)]))
             if not len(batch):
                 continue
@@ -352,6 +353,11 @@ class Search:
             away[_distance(left, few[~clear]) <= APART] = 0.0
         if not any_clear and len(best) and most < enough:
             yield from best[self.clear(best)]
+
+
+def _order(points: TriedPoints, wanted: Callable[[np.ndarray], np.ndarray] | None) -> np.ndarray:
+    """By what points are sorted, shape (n,): their settling time, or what is `wanted` small instead."""
+    return points.settling if wanted is None else wanted(points.shares)
 
 
 def _same(shares: np.ndarray, others: np.ndarray) -> np.ndarray:
