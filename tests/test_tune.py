@@ -931,7 +931,7 @@ def test_a_key_that_cannot_be_changed_by_a_share_has_no_derivative(rigid: Stage)
         sensitivity(locked, ["joint.stroke"])
 
 
-def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: range) -> tuple[Any, Performance]:
+def made_up(machines: int = 40, given_up: tuple[str, ...] = (), **failing: Any) -> tuple[Any, Performance]:
     """The case of a stage that settles, and machines of which some fail a part of the goal."""
     hunting = SimpleNamespace(certain=True)
     judgement = SimpleNamespace(verdict="settles", hunting=hunting, margin=None, windows=(), given_up=given_up)
@@ -948,11 +948,13 @@ FORCE_LIMITED = Goal(force_limit=10.0)
 
 def test_machines_that_meet_all_of_the_goal_are_counted() -> None:
     """2 of 40 fail each part: 95 % meet each, 80 % meet all."""
-    apart = made_up(**{name: range(2 * k, 2 * k + 2) for k, name in enumerate(PARTS)})
+    each_two: dict[str, Any] = {name: range(2 * k, 2 * k + 2) for k, name in enumerate(PARTS)}
+    apart = made_up(**each_two)
     assert apart[1].share(FORCE_LIMITED).probability == pytest.approx(0.8)
     assert unmet_goals(*apart, FORCE_LIMITED) == ("together",)
-    assert unmet_goals(*made_up(400, **dict.fromkeys(PARTS, range(12))), FORCE_LIMITED) == ()
-    assert unmet_goals(*made_up(400, **dict.fromkeys(PARTS, range(20))), FORCE_LIMITED) == ("together",)  # by chance
+    some, many = (dict[str, Any].fromkeys(PARTS, range(count)) for count in (12, 20))
+    assert unmet_goals(*made_up(400, **some), FORCE_LIMITED) == ()
+    assert unmet_goals(*made_up(400, **many), FORCE_LIMITED) == ("together",)  # by chance
     assert unmet_goals(*made_up(margin=range(3), force=range(3, 5)), FORCE_LIMITED) == ("margin",)
 
 
