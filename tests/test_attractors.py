@@ -3,6 +3,8 @@ hunt all the same. What they do is simulated here from the kicks that start it, 
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -21,8 +23,8 @@ from friso.equations.roles import Role
 from friso.hunting import verdict
 from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
-from friso.hunting.attractors.rounds import Pending, lengthened
-from friso.hunting.attractors.survey import Swinging
+from friso.hunting.attractors.rounds import Ends, Pending, lengthened
+from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.basin import ends_in, swings_seldom
 from friso.hunting.boundary import KeyRange, Space, diagram
 from friso.hunting.check import check_given
@@ -841,3 +843,24 @@ def test_a_large_swing_that_dies_out_slowly_does_not_attract() -> None:
     assert position[5000:].max() < 1e-6
     result = hunting(stage)
     assert not (result.certain and result.observed)
+
+
+def test_of_runs_beside_a_cycle_that_repels_those_that_leave_it_first_are_followed_on_either_side() -> None:
+    """Also where they repeat themselves after twice its time, as they do beside one whose multiplier is below -1."""
+    beside = np.array([1e-5, 2e-2, 1e-4, 5e-3, 1e-3, 1e-2, -1e-5, -3e-2, -1e-2])
+    others = np.array([3.0, 3.01, 0.5])
+    size, time = np.append(1 + beside, others), np.where(np.arange(12) % 2, 2.0, 1.0)
+    repeats = SimpleNamespace(size=size, time=time, swings=np.where(time > 1, 2, 1))
+    repelling: Any = SimpleNamespace(
+        closed=np.ones(1, bool),
+        attracting=np.zeros(1, bool),
+        amplitude=np.array([0.5]),
+        orbits=SimpleNamespace(times=np.ones(1)),
+        time_constant=np.array([50.0]),
+    )
+    learned, owners, ends = Survey(np.zeros(1, bool), True, 1e-6), np.zeros(12, np.int64), SimpleNamespace()
+    learned.slow_down(np.zeros(1, np.int64), repelling)
+    ends.repeats = repeats
+    chosen = learned._kinds(owners, cast(Ends, ends), 32, learned._beside(owners, cast(Ends, ends)))
+    assert sorted(size[chosen]) == pytest.approx([0.5, 0.97, 0.99, 1 - 1e-5, 1.001, 1.005, 1.01, 1.02, 3.0, 3.01])
+    assert not learned.unknown.any()

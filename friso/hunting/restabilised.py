@@ -17,6 +17,7 @@ import numpy as np
 
 from friso.engine.allowance import Exhausted, allowance
 from friso.equations.bandwidth import faster
+from friso.equations.structure import shared_structure
 from friso.hunting.boundary.branch import END_OF_RANGE, Branch, Point, Tracer
 from friso.hunting.boundary.locate import special_points, towards
 from friso.hunting.cycle.ensemble import Ensemble
@@ -41,13 +42,13 @@ def windows_again(
     """Windows `besides` some others in which a cycle attracts that repels at a factor of the bandwidth, `at`, where
     nothing attracts, on its way to the farthest factor; none where a limiter chatters, which makes multipliers rough,
     and no more once an allowance is used up."""
-    ahead = 1.0 if farthest > at else -1.0
+    ahead, form = 1.0 if farthest > at else -1.0, shared_structure(flat)
 
     def factor(place: float | np.ndarray) -> Any:
         return at * np.exp(ahead * place)
 
     def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
-        return Ensemble.held(faster(flat, factor(places)), len(places))
+        return Ensemble.held(faster(flat, factor(places)), len(places), form=form)
 
     def end(place: float, error: float, outward: float) -> AttractionEnd:
         inside, reserve = float(factor(place)), max(PRECISE, error)

@@ -35,6 +35,13 @@ MOST_KINDS, DEARER = 32, 30.0
 the next ones may take: of a stage that nothing attracts so far all kinds are followed for which the steps left
 suffice."""
 
+ABREAST = 4
+"""Runs that are followed of all that repeat themselves like a cycle that repels, on either side of it: those farthest
+from it, which leave it first, and as many together as take no longer than one."""
+
+TIMES = 2
+"""How many times the time of a cycle that repels a motion takes at most that repeats itself beside it."""
+
 ENOUGH = 3
 """Rounds after which no more motions that attract are looked for where one is known."""
 
@@ -98,6 +105,23 @@ class Swinging:
 
 _Kind = tuple[int, float, float]
 """The number of a stage, and peak to peak [m] and time [s] of a motion of it that repeats itself."""
+
+
+@dataclass(frozen=True)
+class _Beside:
+    """The numbers of the closed cycles that repel like which runs repeat themselves, `cycles` (runs,), -1: none; and by
+    which share they swing farther than these, `offsets` (runs,), 0 without one."""
+
+    cycles: np.ndarray
+    offsets: np.ndarray
+
+    @classmethod
+    def nothing(cls, count: int) -> _Beside:
+        return cls(np.full(count, -1), np.zeros(count))
+
+    def take(self, numbers: np.ndarray) -> _Beside:
+        """Those of the runs with these numbers."""
+        return _Beside(self.cycles[numbers], self.offsets[numbers])
 
 
 def _like(kinds: list[_Kind], owners: np.ndarray, ends: Ends) -> np.ndarray:
@@ -189,7 +213,7 @@ class Survey:
         repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
-            self._closed += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
+            self._closed += [(int(numbers[k]), size, times * time) for times in range(1, TIMES + 1)]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, owners: np.ndarray) -> None:
@@ -211,11 +235,13 @@ class Survey:
             swinging = self._within_budget(swinging, owners, ends)
             if not swinging.size:
                 return
-            if number > 0:
-                still = swinging[~ends.swing[swinging]]  # each of them somewhere else
-                moving = np.setdiff1d(swinging, still)
-                kinds = moving[self._kinds(owners[moving], ends.take(moving), self._affordable(owners, ends)[moving])]
-                swinging = np.union1d(kinds, still)
+            beside = self._beside(owners, ends)
+            apart = ~ends.swing if number > 0 else beside.cycles < 0  # each of them somewhere else
+            still = swinging[apart[swinging]]
+            moving = np.setdiff1d(swinging, still)
+            most = self._affordable(owners, ends)[moving]
+            kinds = moving[self._kinds(owners[moving], ends.take(moving), most, beside.take(moving))]
+            swinging = np.union1d(kinds, still)
             if number == ROUNDS - 1:
                 return self._last(runs.take(swinging), owners[swinging], ends.take(swinging), before[swinging])
             regular = self._exact(owners[swinging], ends.take(swinging))
@@ -255,12 +281,23 @@ class Survey:
         most = np.where(self.attracted, 0, self.left / (DEARER * np.maximum(steps, 1)))
         return np.maximum(most, MOST_KINDS)[owners]
 
-    def _kinds(self, owners: np.ndarray, ends: Ends, most: np.ndarray | int) -> np.ndarray:
+    def _kinds(
+        self, owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
+    ) -> np.ndarray:
         """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
         unknown what the others come to."""
-        chosen, surplus = _kinds(owners, ends, most)
+        chosen, surplus = _kinds(owners, ends, most, beside)
         self.unknown[owners[surplus]] = True
         return chosen
+
+    def _beside(self, owners: np.ndarray, ends: Ends) -> _Beside:
+        """Beside which closed cycles that repel runs repeat themselves like them: the nearest ones."""
+        cycles, offsets = np.full(len(owners), -1), np.full(len(owners), np.inf)
+        for number, kind in enumerate(self._closed):
+            offset = np.where(_like([kind], owners, ends), ends.repeats.size / kind[1] - 1, np.inf)
+            nearer = np.abs(offset) < np.abs(offsets)
+            cycles[nearer], offsets[nearer] = number // TIMES, offset[nearer]
+        return _Beside(cycles, np.where(cycles < 0, 0.0, offsets))
 
     def _repels(self, owners: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves like a cycle that repels, or like what no orbit that attracts could be closed
@@ -363,24 +400,30 @@ class Survey:
             self.add([motion])
 
 
-def _kinds(owners: np.ndarray, ends: Ends, most: np.ndarray | int) -> tuple[np.ndarray, np.ndarray]:
+def _kinds(
+    owners: np.ndarray, ends: Ends, most: np.ndarray | int, beside: _Beside | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, a
     number or one for each run, and of those that are like none of these. Runs that do not repeat themselves are on
-    their way, and soon apart."""
-    limits = np.broadcast_to(most, (len(owners),))
+    their way, and soon apart. A few of those `beside` a cycle that repels stand for all on the same side of it."""
+    limits, beside = np.broadcast_to(most, (len(owners),)), beside or _Beside.nothing(len(owners))
     chosen: dict[int, list[int]] = {}
     surplus: list[int] = []
     repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
     near = np.where(repeats, ALIKE, CLOSE)
+    cycles, sides = beside.cycles, np.sign(beside.offsets)
 
     def same_kind(k: int, j: int) -> bool:
+        if cycles[k] >= 0 or cycles[j] >= 0:
+            return bool(cycles[k] == cycles[j] and sides[k] == sides[j])
         same = abs(sizes[k] - sizes[j]) <= near[k] * sizes[j] and abs(times[k] - times[j]) <= ALIKE * times[j]
         return bool(same and repeats[k] == repeats[j])
 
-    for k in np.argsort(ends.repeats.swings, kind="stable").tolist():
+    for k in np.lexsort((ends.repeats.swings, -np.abs(beside.offsets))).tolist():
         same_stage = chosen.setdefault(int(owners[k]), [])
-        if not any(same_kind(k, j) for j in same_stage):
-            (same_stage if len(same_stage) < limits[k] else surplus).append(k)
+        alike = sum(same_kind(k, j) for j in same_stage)
+        if alike < (ABREAST if cycles[k] >= 0 else 1):
+            (same_stage if alike or len(same_stage) < limits[k] else surplus).append(k)
     stand = [k for numbers in chosen.values() for k in numbers]
     return np.array(stand, dtype=np.int64), np.array(surplus, dtype=np.int64)
