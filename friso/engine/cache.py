@@ -11,7 +11,6 @@ leaves the generated code as it was compiles nothing. What has not been used for
 
 from __future__ import annotations
 
-import ast
 import atexit
 import hashlib
 import logging
@@ -207,12 +206,19 @@ def entry_lock(file: Path) -> FileLock:
 
 
 def _without_words(source: str) -> str:
-    """The syntax of a module, without comments and docstrings."""
-    tree = ast.parse(source)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and ast.get_docstring(node) is not None:
-            del node.body[0]
-    return ast.dump(tree)
+    """What a module does: its bytecode, which has neither comments nor docstrings, without line numbers."""
+    return repr(_plain(compile(source, "", "exec", dont_inherit=True, optimize=2)))
+
+
+def _plain(part: object) -> object:
+    """A piece of code, or a constant of it, as what is the same in every process."""
+    if isinstance(part, CodeType):
+        names = (part.co_name, part.co_names, part.co_varnames, part.co_freevars, part.co_cellvars)
+        takes = (part.co_argcount, part.co_posonlyargcount, part.co_kwonlyargcount, part.co_flags)
+        return names, takes, part.co_code, part.co_exceptiontable, [_plain(constant) for constant in part.co_consts]
+    if isinstance(part, frozenset):  # in an order of its own in each process
+        return sorted(map(repr, part))
+    return [_plain(one) for one in part] if isinstance(part, tuple) else part
 
 
 @cache
