@@ -117,10 +117,11 @@ def is_number(cell: str, decimal: str) -> bool:
     return _NUMBER.fullmatch(cell) is not None
 
 
-def _is_row(cells: list[str], decimal: str, words: bool) -> bool:
-    """Whether cells are a row of values: numbers, gaps and time stamps, with `words` also a few words (a state)."""
-    numbers = sum(is_number(cell, decimal) for cell in cells)
-    rest = [cell for cell in cells if cell and not is_number(cell, decimal)]
+def _is_row(cells: list[str], numeric: list[bool], decimal: str, words: bool) -> bool:
+    """Whether cells, of which some are `numeric`, are a row of values: numbers, gaps and time stamps, with `words` also
+    a few words (a state)."""
+    numbers = sum(numeric)
+    rest = [cell for cell, number in zip(cells, numeric, strict=True) if cell and not number]
     if words:  # none of which is a number with the other sign: 1.234 may be a thousand of something
         other = "." if decimal == "," else ","
         return numbers >= 2 and len(rest) <= numbers and not any(is_number(cell, other) for cell in rest)
@@ -132,11 +133,11 @@ def layout(path: Path) -> TextLayout:
     Raises LogError where there is none."""
     encoding, lines = decoded_head(path)
     lines = lines[:HEAD_LINES]
-    fits = []
-    for words in (False, True):
-        layouts = [_fit(lines, encoding, *candidate, words) for candidate in _CANDIDATES]
-        fits += [max((fit for fit in layouts if fit is not None), key=lambda fit: fit[0], default=None)]
-    plain, worded = fits
+    split = {delimiter: [split_line(line, delimiter) for line in lines] for delimiter, _ in _CANDIDATES}
+    fits = [_fits(lines, encoding, delimiter, decimal, split[delimiter]) for delimiter, decimal in _CANDIDATES]
+    plain, worded = (
+        max((fit for fit in by if fit), key=lambda fit: fit[0], default=None) for by in zip(*fits, strict=True)
+    )
     chosen = worded if plain is None or (worded is not None and worded[0][0] > 2 * plain[0][0]) else plain
     if chosen is not None:
         best = chosen[1]
@@ -160,13 +161,26 @@ def _no_open_quote(above: list[str], delimiter: str, path: Path) -> None:
             raise LogError("log", actual, "a heading with its quotation marks closed", "", str(path))
 
 
+_Fit = tuple[tuple[int, bool, int], TextLayout] | None
+"""A layout, and how well it fits: rows of numbers, a heading as long as they are, columns. None for no fit."""
+
+
+def _fits(lines: list[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]]) -> tuple[_Fit, _Fit]:
+    """How well this delimiter, which gives these rows, and decimal sign fit without words in rows of numbers, and with
+    them."""
+    numeric = [[is_number(cell, decimal) for cell in cells] for cells in rows]
+
+    def fit(words: bool) -> _Fit:
+        is_row = [_is_row(cells, numbers, decimal, words) for cells, numbers in zip(rows, numeric, strict=True)]
+        return _fit(lines, encoding, delimiter, decimal, rows, is_row)
+
+    return fit(words=False), fit(words=True)
+
+
 def _fit(
-    lines: list[str], encoding: str, delimiter: str, decimal: str, words: bool
-) -> tuple[tuple[int, bool, int], TextLayout] | None:
-    """The layout with this delimiter and decimal sign, and how well it fits: rows of numbers, a heading as long as they
-    are, columns. None for no fit."""
-    rows = [split_line(line, delimiter) for line in lines]
-    is_row = [_is_row(cells, decimal, words) for cells in rows]
+    lines: list[str], encoding: str, delimiter: str, decimal: str, rows: list[list[str]], is_row: list[bool]
+) -> _Fit:
+    """How well this delimiter and decimal sign fit, with which these are rows of numbers."""
     if not any(is_row):
         return None
     first = next(i for i, row in enumerate(is_row) if row and _goes_on(is_row, rows, i))
