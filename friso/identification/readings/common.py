@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
+from scipy.linalg import solve_banded
 from scipy.signal import butter, sosfiltfilt, welch
 from scipy.stats import t as student
 
@@ -251,9 +251,10 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
     """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
     come to rest at `ends` [m], both of shape (n - 1,), from a deflection at the `start` [m] on; exact in each move."""
-    remaining = np.exp(-np.abs(moves) / ends)
-    steps = zip((np.sign(moves) * ends).tolist(), remaining.tolist(), strict=True)
-    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=start)])
+    kept = np.exp(-np.abs(moves) / ends)
+    after = np.append(start, np.sign(moves) * ends * (1 - kept))  # each deflection without that before
+    bands = np.stack([np.ones(len(after)), np.append(-kept, 0.0)])
+    return np.asarray(solve_banded((1, 0), bands, after, check_finite=False))
 
 
 def by_direction(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
