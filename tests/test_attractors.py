@@ -864,3 +864,14 @@ def test_of_runs_beside_a_cycle_that_repels_those_that_leave_it_first_are_follow
     chosen = learned._kinds(owners, cast(Ends, ends), 32, learned._beside(owners, cast(Ends, ends)))
     assert sorted(size[chosen]) == pytest.approx([0.5, 0.97, 0.99, 1 - 1e-5, 1.001, 1.005, 1.01, 1.02, 3.0, 3.01])
     assert not learned.unknown.any()
+
+
+def test_an_orbit_beside_the_edge_of_a_window_beyond_which_a_controller_pushes_is_closed() -> None:
+    """Its flow has no derivative there: the push holds the stage at the edge of its window, as a relay does, and the
+    orbit, by the equations linearised, repels. Runs come to it to within 1e-13."""
+    survey = attractors(Ensemble.held(draw(5101, 6, "axes").flat(), 1), thorough=True)
+    (motion,) = survey.motions
+    assert survey.decided.all()
+    assert motion.cycles is not None
+    assert motion.amplitude == pytest.approx(4.57664e-4, rel=1e-5)
+    assert motion.period == pytest.approx(2.77911, rel=1e-5)

@@ -64,8 +64,10 @@ class Ensemble:
 
     @property
     def chatters(self) -> bool:
-        """Whether the stages have a stroke limiter that may be touched and left many times in a swing."""
-        return self.structure.joint == "free"
+        """Whether the stages have a stroke limiter that may be touched and left many times in a swing, or a controller
+        that pushes beyond a window, at whose edge it may hold them as a relay does."""
+        controller = self.structure.controller
+        return self.structure.joint == "free" or (controller is not None and bool(controller.settings.push))
 
     @property
     def remember(self) -> bool:
