@@ -142,7 +142,9 @@ def filtered(flat: Flat, s: State, path: str, u: float, rates: dict[str, float])
     """A signal behind the filters of a path, whose states' rates are added to the `rates`."""
     for n in range(1, 13):
         row = f"controller.filters.{n}"
-        if flat.get(f"{row}.path") != path:
+        if f"{row}.path" not in flat:
+            break
+        if flat[f"{row}.path"] != path:
             continue
         kind, name = flat[f"{row}.kind"], f"filtered_filter_{n}"
         low, slope = s[name], s.get(f"{name}_rate", 0.0)

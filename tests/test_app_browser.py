@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -111,7 +112,7 @@ class Browsed:
     def check(self, crossover: str) -> None:
         """A crossover is typed, and the whole answer is there."""
         self.type("controller.crossover", crossover)
-        self.answered(friso.check(RIG, set={"controller.crossover": crossover}).sentences()[0])
+        self.answered(first_sentence(crossover))
 
     def set(self, changes: dict[str, Any]) -> None:
         """Keys are set, and the picture of their run is there."""
@@ -123,6 +124,12 @@ class Browsed:
         self.page.wait_for_function(
             "text => document.getElementById('picture').innerText.includes(text)", arg=text, timeout=180_000
         )
+
+
+@cache
+def first_sentence(crossover: str) -> str:
+    """Of the whole answer about the rig with this crossover."""
+    return friso.check(RIG, set={"controller.crossover": crossover}).sentences()[0]
 
 
 @pytest.fixture(scope="module")

@@ -119,11 +119,17 @@ def test_noise_is_normal() -> None:
             assert np.count_nonzero(side > size) == pytest.approx(beyond, abs=5 * np.sqrt(beyond))
 
 
+@cache
+def field() -> np.ndarray:
+    """Deviates of neighbouring seeds, along axis 0, at neighbouring ticks."""
+    return noise(np.arange(1000)[:, None], np.arange(1000))
+
+
 @pytest.mark.parametrize("lag", [1, 2, 3, 64])
 @pytest.mark.parametrize("along", [0, 1], ids=["seeds", "ticks"])
 def test_neighbours_are_independent(lag: int, along: int) -> None:
     """Of neighbouring seeds, and of neighbouring ticks, neither the deviates nor their squares tell of each other."""
-    z = np.moveaxis(noise(np.arange(1000)[:, None], np.arange(1000)), along, 0)
+    z = np.moveaxis(field(), along, 0)
     for values in (z, (z**2 - 1) / np.sqrt(2)):
         assert np.mean(values[lag:] * values[:-lag]) == pytest.approx(0, abs=5 / float(np.sqrt(values[lag:].size)))
 

@@ -129,7 +129,7 @@ def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, time
 
     for start, end in pairwise(corners):
         inside = (times >= start) & (times <= end)
-        options = {"rtol": 1e-10, "atol": 1e-12 * scales, "max_step": (end - start) / 20, "first_step": 1e-7}
+        options = {"rtol": 1e-9, "atol": 1e-11 * scales, "max_step": (end - start) / 20, "first_step": 1e-7}
         solution = solve_ivp(rates, (start, end), x, "Radau", dense_output=True, jac=jacobian, **options)
         assert solution.success
         states[inside], x = solution.sol(times[inside]).T, solution.y[:, -1]

@@ -171,6 +171,7 @@ def test_export(locked: Stage, tmp_path: Path) -> None:
     assert "[ pi-d ]--[ limit ]" in document["structure"][0]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_identify_in_its_own_loop(locked: Stage, tmp_path: Path) -> None:
     """A log that its own sampled loop wrote gives mass and friction back."""
     rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})

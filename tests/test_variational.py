@@ -3,6 +3,7 @@
 Saltation at a kink: Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from itertools import product
@@ -268,13 +269,20 @@ class Meeting:
     jumps: dict[str, float]
 
 
+@cache
+def numeric(name: str, kink: Kink | None = None) -> Callable[..., list[float]]:
+    """The surfaces of all kinks of a variant, or the jumps at one, of states, sides and what is held."""
+    _, whole = declared(name)
+    symbols = [whole.symbols, [item.beyond for item in whole.kinks], TIME, REFERENCE, whole.parameters]
+    surfaces = [entry.surface for entry in whole.kinks]
+    return sp.lambdify(symbols, surfaces if kink is None else [*whole.jumps[kink].values()])
+
+
 def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> Meeting:
     """A state drawn at random, one of its numbers then chosen to lie on the surface; `crossed` if met from beyond."""
     flat = VARIANTS[name].flat()
     _, whole = declared(name)
-    symbols = [whole.symbols, [item.beyond for item in whole.kinks], TIME, REFERENCE, whole.parameters]
-    surfaces = sp.lambdify(symbols, [entry.surface for entry in whole.kinks])
-    jumps = sp.lambdify(symbols, list(whole.jumps[kink].values()))
+    surfaces, jumps = numeric(name), numeric(name, kink)
     size = flat.get("joint.stroke", 1e-2)
     states, sides = size * rng.normal(size=len(whole.symbols)), np.zeros(len(whole.kinks))
     number = whole.kinks.index(kink)

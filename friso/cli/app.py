@@ -68,8 +68,8 @@ class ByQuestion(TyperGroup):
                     formatter.write_dl(rows)
 
 
-def command_line() -> typer.Typer:
-    """The commands of friso, in the order of their places."""
+def command_line(*names: str) -> typer.Typer:
+    """The commands of these names, by default all of friso, in the order of their places."""
     app = typer.Typer(
         cls=ByQuestion,
         rich_markup_mode=None,
@@ -77,7 +77,7 @@ def command_line() -> typer.Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     app.callback()(friso)
-    for name, command in sorted(((name, COMMANDS[name]) for name in COMMANDS), key=lambda item: item[1].place):
+    for name, command in sorted(((name, COMMANDS[name]) for name in names or COMMANDS), key=lambda item: item[1].place):
         app.command(name, cls=command.help_class)(with_checked_paths(command.function))
     return app
 
@@ -136,7 +136,7 @@ def _run() -> int:
             print(TOUR)
             return 0
         refuse_empty(sys.argv[1:])
-        app = command_line()
+        app = command_line(*{*sys.argv[1:2]}.intersection(COMMANDS))  # others take longer to be put together
         if {"-h", "--help"} & {*sys.argv[1:2]}:
             app.info.epilog = _plug_ins()
         return copy_context().run(app, standalone_mode=False) or 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -97,9 +98,15 @@ def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarra
     anything above the cut-off, or of fewer samples than the filter's own ends take, is returned as it is."""
     if cutoff >= 0.45 / sample_time:
         return values
-    sections = butter(ORDER, cutoff, fs=1 / sample_time, output="sos")
+    sections = _butterworth(sample_time, cutoff)
     padding = min(int(3 / (cutoff * sample_time)), len(values) - 1)
     return values if len(values) < 10 else sosfiltfilt(sections, values, padlen=padding)
+
+
+@lru_cache(maxsize=16)
+def _butterworth(sample_time: float, cutoff: float) -> np.ndarray:
+    """Sections of the low-pass; a fit asks for the same one at every step."""
+    return np.asarray(butter(ORDER, cutoff, fs=1 / sample_time, output="sos"))
 
 
 def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
